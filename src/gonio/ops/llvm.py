@@ -1,0 +1,116 @@
+"""Find a libLLVM that Dr.Jit can use, and read its version before Dr.Jit loads it.
+
+Dr.Jit ships no LLVM and loads the first it finds. With LLVM 14, 15 and 16 Mitsuba 3.9 aborts the whole
+process ("Cannot select fminimum"), and an abort cannot be caught, so the version is read from the file,
+without loading it: every libLLVM carries its version as a symbol-version string such as `LLVM_19.1`.
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import mmap
+import os
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import MachineError
+
+OLDEST_USABLE = 17  # 14, 15 and 16 measured to abort under Mitsuba 3.9; 19.1 and 23.1 measured to work
+VARIABLE = "DRJIT_LIBLLVM_PATH"
+
+_SYSTEM_FOLDERS = (
+    "/usr/lib/x86_64-linux-gnu",
+    "/usr/lib/aarch64-linux-gnu",
+    "/usr/lib64",
+    "/usr/lib",
+    "/usr/local/lib",
+    "/opt/homebrew/opt/llvm/lib",
+    "/usr/local/opt/llvm/lib",
+)
+
+
+@dataclass(frozen=True)
+class Library:
+    """A libLLVM: where it is, its version ("" where the file names none) and who provided it."""
+
+    path: Path
+    version: str
+    source: str  # "environment", "wheel" or "system"
+
+    @property
+    def usable(self) -> bool:
+        return bool(self.version) and int(self.version.split(".")[0]) >= OLDEST_USABLE
+
+
+def read_version(path: Path) -> str:
+    """The version of the libLLVM at `path`, "" where it is none; the file is read, not loaded."""
+    try:
+        with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
+            match = re.search(rb"\0LLVM_(\d+(?:\.\d+)?)\0", text)
+            if match:
+                return match[1].decode()
+    except (OSError, ValueError):  # missing, unreadable or empty
+        return ""
+    # macOS and Windows builds carry no version nodes; their file names do.
+    match_name = re.search(r"LLVM[-.](?:so\.|C\.)?(\d+(?:\.\d+)?)", path.resolve().name)
+    return match_name[1] if match_name else ""
+
+
+def _candidates() -> list[tuple[Path, str]]:
+    found: list[tuple[Path, str]] = []
+    given = os.environ.get(VARIABLE)
+    if given:
+        found.append((Path(given), "environment"))
+    for prefix in dict.fromkeys((sys.prefix, sys.base_prefix)):
+        for folder, pattern in (("lib", "libLLVM*.so*"), ("lib", "libLLVM*.dylib"), ("bin", "LLVM-C*.dll")):
+            found += [(path, "wheel") for path in sorted(Path(prefix, folder).glob(pattern))]
+    for folder in _SYSTEM_FOLDERS:
+        for pattern in ("libLLVM*.so*", "libLLVM*.dylib"):
+            found += [(path, "system") for path in sorted(Path(folder).glob(pattern))]
+    for folder in sorted(Path("/usr/lib").glob("llvm-*/lib"), reverse=True):
+        found += [(path, "system") for path in sorted(folder.glob("libLLVM*.so*"))]
+    by_linker = ctypes.util.find_library("LLVM")
+    if by_linker and os.path.isabs(by_linker):
+        found.append((Path(by_linker), "system"))
+    return found
+
+
+def libraries() -> list[Library]:
+    """Every libLLVM in reach, one entry a file: environment first, then the wheel, then the system's, newest first."""
+    seen: dict[Path, Library] = {}
+    for path, source in _candidates():
+        real = path.resolve()
+        if real not in seen:
+            seen[real] = Library(real, read_version(real), source)
+    order = {"environment": 0, "wheel": 1, "system": 2}
+
+    def rank(library: Library) -> tuple[int, float]:
+        return order[library.source], -float(library.version or 0)
+
+    return sorted(seen.values(), key=rank)
+
+
+def use() -> Library:
+    """Choose the first usable libLLVM and hand it to Dr.Jit; call before Dr.Jit starts its LLVM backend.
+
+    A library that the environment names is never replaced in silence: an unusable one is an error.
+    Raises MachineError where nothing fits.
+    """
+    found = libraries()
+    install = "pip install karellen-llvm-core (Linux x86-64), or apt-get install libllvm19, or any LLVM >= 17"
+    for library in found:
+        if library.usable:
+            os.environ[VARIABLE] = str(library.path)
+            return library
+        if library.source == "environment":
+            what = (
+                f"{VARIABLE} names LLVM {library.version}, which aborts the process; {OLDEST_USABLE} or newer is needed"
+                if library.version
+                else f"{VARIABLE} names '{library.path}', which is missing or no libLLVM"
+            )
+            raise MachineError(what, "LLVM", f"unset {VARIABLE} or point it at a newer one; {install}")
+    too_old = ", ".join(f"{x.version} at {x.path}" for x in found if x.version)
+    what = f"no LLVM {OLDEST_USABLE} or newer found" + (f" (too old: {too_old})" if too_old else "")
+    raise MachineError(what, "LLVM", install)

@@ -1,0 +1,65 @@
+"""Choose the machine to render on: find LLVM, pick Mitsuba's variant, load Mitsuba once.
+
+Everything in `render` gets Mitsuba through `load()`, so that no import can start Dr.Jit with a wrong LLVM.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from types import ModuleType
+
+from ..errors import InputError, MachineError
+from ..ops import llvm
+
+DEVICES = ("auto", "cpu", "cuda")
+
+
+def cuda_available() -> bool:
+    """Whether an NVIDIA driver with at least one device answers (asked without starting Dr.Jit)."""
+    for name in ("libcuda.so.1", "nvcuda.dll"):
+        try:
+            driver = ctypes.CDLL(name)
+            count = ctypes.c_int(0)
+            if driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0:
+                return count.value > 0
+        except OSError:
+            continue
+    return False
+
+
+def variant_for(device: str = "cpu", spectral: bool = False) -> str:
+    """Mitsuba's variant for a device: "cpu" (LLVM), "cuda", or "auto" (CUDA where there is one)."""
+    if device not in DEVICES:
+        raise InputError(f"unknown device '{device}'", "--device", "one of " + ", ".join(DEVICES))
+    has_cuda = cuda_available() if device != "cpu" else False
+    if device == "cuda" and not has_cuda:
+        raise MachineError("no CUDA device answers", "--device cuda", "use --device cpu, or install an NVIDIA driver")
+    return ("cuda_ad_" if has_cuda else "llvm_ad_") + ("spectral" if spectral else "rgb")
+
+
+def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
+    """Mitsuba, with a variant set: the current one where `device` is None and one is set, else `variant_for`.
+
+    threads  how many cores to use; None leaves Dr.Jit's default (all)
+    Raises MachineError where no usable LLVM or no GPU is found.
+    """
+    if os.environ.get("DRJIT_LIBLLVM_PATH") is None or device != "cuda":
+        try:
+            llvm.use()
+        except MachineError:
+            if device != "cuda":
+                raise
+    import mitsuba as mi
+
+    if device is not None or mi.variant() is None:
+        variant = variant_for(device or "cpu", spectral)
+        if mi.variant() != variant:
+            mi.set_variant(variant)
+    if threads is not None:
+        import drjit as dr
+
+        if threads < 1:
+            raise InputError(f"{threads} threads asked for", "--threads", "give 1 or more")
+        dr.set_thread_count(threads)
+    return mi
