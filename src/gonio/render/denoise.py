@@ -1,0 +1,62 @@
+"""Remove the noise of few samples with Intel Open Image Denoise, an optional extra (`gonio[denoise]`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError, MachineError
+
+_INSTALL = "pip install 'gonio[denoise]', or leave --denoise out"
+
+
+def available() -> str:
+    """The version of pyoidn in reach, "" where there is none; nothing is loaded."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("pyoidn")
+    except PackageNotFoundError:
+        return ""
+
+
+def require() -> None:
+    """Raise MachineError where OIDN is missing: asked before a render, so that no time is lost."""
+    if not available():
+        raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _INSTALL)
+
+
+def denoise(
+    image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndarray | None = None
+) -> np.ndarray:
+    """The picture without noise: (H, W, 3) float32, linear, unbounded above.
+
+    albedo  surface colour in [0, 1], noisy or not; keeps texture edges sharp
+    normal  shading normals in [-1, 1]; keeps geometric edges sharp; needs `albedo` (a rule of OIDN)
+    Biased: what looks like noise is taken for noise. Values that are not finite are taken as 0.
+    Raises MachineError where OIDN is missing or fails, InputError for arrays of other shapes.
+    """
+    colour = _checked("image", image, np.asarray(image).shape)
+    guides = {
+        name: np.clip(_checked(name, guide, colour.shape), low, 1)
+        for name, guide, low in (("albedo", albedo, 0), ("normal", normal, -1))
+        if guide is not None
+    }
+    if "normal" in guides and "albedo" not in guides:
+        raise InputError("a normal map alone cannot guide the denoiser", "normal", "give albedo too")
+    require()
+    try:
+        from pyoidn.denoise import denoise as filter_picture
+
+        return np.asarray(filter_picture(np.maximum(colour, 0), hdr=True, **guides))
+    except ImportError as error:
+        raise MachineError(f"pyoidn {available()} cannot be used: {error}", "--denoise", _INSTALL) from error
+    except (RuntimeError, OSError) as error:
+        raise MachineError(f"Open Image Denoise failed: {error}", "--denoise", _INSTALL) from error
+
+
+def _checked(name: str, picture: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.nan_to_num(np.ascontiguousarray(picture, np.float32), nan=0.0, posinf=0.0, neginf=0.0)
+    if array.ndim != 3 or array.shape[2] != 3 or array.shape != tuple(shape):
+        expected = "(H, W, 3)" if name == "image" else str(tuple(shape))
+        raise InputError(f"'{name}' has shape {array.shape}, expected {expected}", name)
+    return array

@@ -1,0 +1,362 @@
+"""Pictures on disk: .exr, .hdr, .png and .npz, with the settings that made them, written whole or not at all.
+
+A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. PNG is what a screen shows: times
+2^exposure, clamped, sRGB-encoded, 8 bit. The settings go into EXR attributes, PNG text chunks, comment lines
+of the Radiance header, or an array named `metadata` in an .npz.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, MachineError, did_you_mean
+from . import engine
+
+Value = str | int | float
+Metadata = Mapping[str, Value]
+
+SUFFIXES = (".exr", ".hdr", ".png", ".npz")
+_PREFIX = "gonio."  # keeps our attributes apart from the format's own, and finds them again
+
+# A file may claim any size in its header. DEFLATE, the densest coding here, reaches 1032 to 1, so a picture
+# with more pixels than this times its bytes is a lie (even at one byte a pixel), and is not allocated.
+_MOST_PIXELS_PER_BYTE = 1032
+_MOST_PIXELS = 1 << 28  # 16384 x 16384: 3 GiB as float32 RGB
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture read from `path`; `hdr` is False where the file holds a screen's values (.png)."""
+
+    pixels: np.ndarray
+    path: Path
+    hdr: bool = True
+    metadata: dict[str, Value] = field(default_factory=dict)
+
+
+# --- writing -------------------------------------------------------------------------------------------
+
+
+def check_writable(path: str | Path) -> Path:
+    """The file `path` will become (links followed), or an InputError before hours are spent on it."""
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        hint = (
+            did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
+        )
+        raise InputError(f"unknown picture format '{target.suffix}'", str(path), hint)
+    return check_folder(target)
+
+
+def check_folder(path: str | Path) -> Path:
+    """As `check_writable`, whatever the format."""
+    target = Path(path).expanduser()
+    if target.is_symlink():
+        target = target.resolve()
+    folder = target.parent
+    if not folder.is_dir():
+        hint = f"mkdir -p '{folder}', or choose another"
+        raise InputError(f"the folder '{folder}' does not exist", str(path), hint)
+    if target.is_dir():
+        raise InputError("this is a folder, expected a file name", str(path), "name a file, such as a.exr")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"no permission to write in '{folder}'", str(path), "choose another folder with -o")
+    return target
+
+
+def write_whole(path: str | Path, content: bytes | Callable[[Path], None]) -> Path:
+    """Write a file so that at every moment `path` is the old one or the whole new one.
+
+    content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
+    Raises MachineError where the disk is full; nothing of the new file is left then.
+    """
+    target = check_folder(path)
+    # In the same folder, hence on the same file system, where a rename is one step.
+    temporary = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
+    try:
+        if callable(content):
+            content(temporary)
+            with open(temporary, "rb") as file:
+                os.fsync(file.fileno())
+        else:
+            with open(temporary, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())  # a full disk can show itself as late as here
+        os.replace(temporary, target)
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
+        hint = "free some space, or choose another folder with -o; nothing was written"
+        raise MachineError(what, str(path), hint) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+    return target
+
+
+def write(
+    path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None, exposure: float = 0.0
+) -> Path:
+    """Write a picture in the format its suffix names, whole or not at all.
+
+    exposure  stops; PNG only, since the other formats keep radiance as it is
+    """
+    target = check_writable(path)
+    picture = np.ascontiguousarray(pixels, dtype=np.float32)
+    if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
+        raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))
+    settings = dict(metadata or {})
+    suffix = target.suffix.lower()
+    if suffix == ".png":
+        content = png_bytes(to_screen(picture, exposure), settings)
+    elif suffix == ".npz":
+        content = _npz_bytes(picture, settings)
+    elif suffix == ".hdr":
+        content = _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
+    else:
+        content = _bitmap_bytes(picture, settings, "OpenEXR")
+    return write_whole(path, content)
+
+
+def to_screen(pixels: np.ndarray, exposure: float = 0.0) -> np.ndarray:
+    """Linear radiance to a screen's 8-bit values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
+    x = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0) * np.float32(2.0**exposure), 0, 1)
+    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
+    return (encoded * 255 + 0.5).astype(np.uint8)
+
+
+def from_screen(values: np.ndarray) -> np.ndarray:
+    """sRGB-encoded values in [0, 1] to linear ones; the inverse of `to_screen` at exposure 0."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def png_bytes(values: np.ndarray, metadata: Metadata | None = None) -> bytes:
+    """An 8-bit RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks."""
+    height, width = values.shape[:2]
+    rows = values.reshape(height, width * 3)
+    # Filter 2 (difference to the row above, modulo 256) halves the size of smooth pictures.
+    difference = np.diff(rows, axis=0, prepend=np.uint8(0))
+    filtered = np.concatenate([np.full((height, 1), 2, np.uint8), difference], axis=1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    def text(key: str, value: str) -> bytes:
+        if (key + value).isascii():
+            return chunk(b"tEXt", key.encode() + b"\0" + value.encode())
+        return chunk(b"iTXt", key.encode() + b"\0\0\0\0\0" + value.encode("utf-8"))
+
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+            chunk(b"sRGB", b"\0"),
+            *(text(_PREFIX + key, _one_line(value)) for key, value in (metadata or {}).items()),
+            chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
+            chunk(b"IEND", b""),
+        ]
+    )
+
+
+def _bitmap_bytes(picture: np.ndarray, metadata: Metadata, file_format: str) -> bytes:
+    mi = engine.load()
+    bitmap = mi.Bitmap(picture)
+    for key, value in metadata.items():
+        bitmap.metadata()[_PREFIX + key] = value
+    stream = mi.MemoryStream()
+    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, file_format))
+    return stream.raw_buffer()
+
+
+def _with_comments(radiance: bytes, metadata: Metadata) -> bytes:
+    """A Radiance file with the settings as comment lines behind its first line."""
+    rest = radiance.split(b"\n", 1)[1]  # Mitsuba opens with "#?RGBE", which not every reader takes
+    lines = [f"# {_PREFIX}{key}={_one_line(value)}".encode() for key, value in metadata.items()]
+    return b"\n".join([b"#?RADIANCE", *lines, rest])
+
+
+def _npz_bytes(picture: np.ndarray, metadata: Metadata) -> bytes:
+    import io
+
+    stream = io.BytesIO()
+    np.savez_compressed(stream, radiance=picture, metadata=np.array(json.dumps(dict(metadata))))
+    return stream.getvalue()
+
+
+def _one_line(value: Value) -> str:
+    return re.sub(r"[\0\r\n]+", " ", value) if isinstance(value, str) else json.dumps(value)
+
+
+# --- reading -------------------------------------------------------------------------------------------
+
+
+def read(path: str | Path) -> Picture:
+    """A picture as linear RGB, with the settings that Gonio wrote into it.
+
+    PNG is decoded from sRGB; an .npz holds `radiance` (or one array only). Grey becomes three channels.
+    Raises InputError for a file that is missing, empty, damaged, of another format, or larger than its bytes
+    can hold.
+    """
+    source = Path(path).expanduser()
+    suffix = source.suffix.lower()
+    if suffix not in SUFFIXES:
+        what = f"unknown picture format '{source.suffix}'"
+        raise InputError(what, str(path), "use one of " + ", ".join(SUFFIXES))
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read this picture: {error.strerror}", str(path), _nearby(source)) from error
+    if not content:
+        raise InputError("this picture is an empty file", str(path), "render it again")
+    if suffix == ".npz":
+        pixels, metadata = _read_npz(source)
+    else:
+        _check_claimed_size(content, suffix, path)
+        pixels, metadata = _read_bitmap(source, content, suffix)
+    return Picture(pixels, source, suffix != ".png", metadata)
+
+
+def _nearby(source: Path) -> str:
+    if not source.parent.is_dir():
+        return f"the folder '{source.parent}' does not exist"
+    near = [entry.name for entry in source.parent.iterdir() if entry.suffix.lower() in SUFFIXES]
+    return did_you_mean(source.name, near) if near and len(near) <= 20 else "check the name"
+
+
+def _check_claimed_size(content: bytes, suffix: str, path: str | Path) -> None:
+    size = _claimed_size(content, suffix)
+    if size is None:
+        raise InputError(
+            f"this is no {suffix[1:].upper()} picture", str(path), "check the file or its suffix"
+        )
+    width, height = size
+    if width <= 0 or height <= 0 or width * height > min(_MOST_PIXELS, _MOST_PIXELS_PER_BYTE * len(content)):
+        what = f"the header claims {width}x{height} pixels, which a file of {len(content)} bytes cannot hold"
+        if 0 < width * height <= _MOST_PIXELS_PER_BYTE * len(content):
+            what = f"{width}x{height} pixels are more than {_MOST_PIXELS}"
+        raise InputError(what, str(path), "the file is damaged or too large")
+
+
+def _claimed_size(content: bytes, suffix: str) -> tuple[int, int] | None:
+    """Width and height by the header, None where it is not of this format."""
+    if suffix == ".png":
+        if content[:8] != b"\x89PNG\r\n\x1a\n" or len(content) < 24:
+            return None
+        return struct.unpack(">II", content[16:24])
+    if suffix == ".exr":
+        if content[:4] != b"\x76\x2f\x31\x01":
+            return None
+        match = re.search(rb"dataWindow\0box2i\0\x10\0\0\0(.{16})", content[: 1 << 20], re.DOTALL)
+        if not match:
+            return None
+        left, top, right, bottom = struct.unpack("<iiii", match[1])
+        return right - left + 1, bottom - top + 1
+    if content[:2] != b"#?":
+        return None
+    match = re.search(rb"\n\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n", content[: 1 << 20])
+    return (int(match[2]), int(match[1])) if match else None
+
+
+def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[np.ndarray, dict[str, Value]]:
+    mi, path = engine.load(), str(source)
+    try:
+        bitmap = mi.Bitmap(str(source), _mitsuba_format(mi, suffix))
+        metadata = _metadata(bitmap, content, suffix)
+        if suffix == ".png":  # by our own decoding: a 16-bit PNG would be taken for linear
+            values = np.array(bitmap)
+            pixels = from_screen(_three_channels(values, path) / np.float32(np.iinfo(values.dtype).max))
+        else:
+            pixels = _three_channels(np.array(bitmap).astype(np.float32), path)
+    except RuntimeError as error:
+        raise InputError(
+            f"this picture is damaged: {_reason(error)}", path, "render or copy it again"
+        ) from error
+    return np.ascontiguousarray(pixels), metadata
+
+
+def _mitsuba_format(mi: object, suffix: str) -> object:
+    names = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
+    return getattr(mi.Bitmap.FileFormat, names[suffix])  # type: ignore[attr-defined]
+
+
+def _three_channels(values: np.ndarray, path: str | Path) -> np.ndarray:
+    grey = values if values.ndim == 3 else values[..., None]
+    if grey.shape[2] in (1, 2):  # luminance, with or without alpha
+        return np.repeat(grey[..., :1], 3, axis=2)
+    if grey.shape[2] in (3, 4):
+        return grey[..., :3]
+    raise InputError(f"{grey.shape[2]} channels, expected RGB", str(path), "keep one layer only")
+
+
+def _reason(error: Exception) -> str:
+    """Mitsuba's message without its class and the file's name, which the error names already."""
+    return re.sub(r'^\s*(\[[^\]]*\]\s*)?("[^"]*":\s*)?', "", str(error).strip().splitlines()[-1])
+
+
+def _metadata(bitmap: object, content: bytes, suffix: str) -> dict[str, Value]:
+    found: Iterator[tuple[str, Value]]
+    if suffix == ".exr":
+        properties = bitmap.metadata()  # type: ignore[attr-defined]
+        found = ((key, properties[key]) for key in properties.keys())  # noqa: SIM118 - no mapping
+    elif suffix == ".hdr":
+        lines = content.split(b"\n\n", 1)[0].decode("utf-8", "replace").splitlines()
+        ours = (line[2:].partition("=") for line in lines if line.startswith(f"# {_PREFIX}"))
+        found = (_parsed(key, value) for key, _, value in ours)
+    else:
+        found = _png_texts(content)
+    return {key.removeprefix(_PREFIX): value for key, value in found if key.startswith(_PREFIX)}
+
+
+def _png_texts(content: bytes) -> Iterator[tuple[str, Value]]:
+    at = 8
+    while at + 8 <= len(content):
+        length, kind = struct.unpack(">I4s", content[at : at + 8])
+        key, _, value = content[at + 8 : at + 8 + length].partition(b"\0")
+        if kind == b"tEXt":
+            yield _parsed(key.decode("latin-1"), value.decode("latin-1"))
+        elif kind == b"iTXt" and value[:2] == b"\0\0":  # not compressed
+            yield _parsed(key.decode("latin-1"), value[2:].split(b"\0", 2)[-1].decode("utf-8", "replace"))
+        at += 12 + length
+
+
+def _parsed(key: str, value: str) -> tuple[str, Value]:
+    """Numbers come back as numbers."""
+    try:
+        return key, int(value)
+    except ValueError:
+        try:
+            return key, float(value)
+        except ValueError:
+            return key, value
+
+
+def _read_npz(source: Path) -> tuple[np.ndarray, dict[str, Value]]:
+    where = str(source)
+    try:
+        with np.load(source, allow_pickle=False) as archive:
+            names = [name for name in archive.files if name != "metadata"]
+            name = "radiance" if "radiance" in names else names[0] if len(names) == 1 else ""
+            if not name:
+                hint = "save it with np.savez(path, radiance=picture); found: " + ", ".join(names)
+                raise InputError("no array named 'radiance'", where, hint)
+            array = archive[name]
+            metadata = json.loads(str(archive["metadata"])) if "metadata" in archive.files else {}
+    except (ValueError, OSError, EOFError, KeyError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"this .npz cannot be read: {error}", where, "save it with np.savez(...)") from error
+    if array.ndim not in (2, 3) or array.dtype.kind not in "fiu" or array.size == 0:
+        what = f"'{name}' is {array.dtype} of shape {array.shape}, expected (H, W, 3) numbers"
+        raise InputError(what, where)
+    return _three_channels(array.astype(np.float32), where), metadata if isinstance(metadata, dict) else {}

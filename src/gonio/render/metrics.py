@@ -1,0 +1,283 @@
+"""How far one picture is from another: RMSE, relMSE, mean ratio, and FLIP.
+
+All take linear RGB pictures of shape (H, W, 3), row 0 on top: `test` first, `reference` second. FLIP asks
+what a person sees who flips between the two: contrast sensitivity of the eye, colour distance, edges and
+points, each after [Andersson2020]; pictures of high dynamic range after [Andersson2021], the worst of the
+exposures at which the reference can be shown.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+# The usual desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m [Andersson2020, section 6].
+PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
+
+# relMSE divides by r^2 + this, so that a black reference pixel does not rule the mean; with radiances near
+# one, it caps the weight of a pixel at 100.
+RELATIVE_FLOOR = 0.01
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What `gonio compare` reports; `exposures` are the stops that HDR-FLIP spans, None for LDR."""
+
+    rmse: float
+    relmse: float
+    mean_ratio: float
+    flip: float
+    exposures: tuple[float, float] | None = None
+
+    def value(self, metric: str) -> float:
+        return getattr(self, metric)
+
+    def as_dict(self) -> dict[str, object]:
+        return asdict(self)
+
+
+METRICS: dict[str, str] = {
+    "rmse": "root of the mean squared difference, in the picture's own unit",
+    "relmse": "mean of (x - r)^2 / (r^2 + 0.01)",
+    "flip": "mean FLIP, 0 (same) to 1: what a person sees who flips between the two",
+}
+
+
+def _pair(test: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    a, b = np.asarray(test, np.float64), np.asarray(reference, np.float64)
+    if a.shape != b.shape:
+        raise InputError(
+            f"the pictures differ in size: {_size(a)} against {_size(b)}", "", "render both at one --size"
+        )
+    if a.ndim != 3 or a.shape[2] != 3 or a.size == 0:
+        raise InputError(f"expected an RGB picture of shape (H, W, 3), got {a.shape}")
+    for name, picture in (("first", a), ("second", b)):
+        bad = int(np.count_nonzero(~np.isfinite(picture)))
+        if bad:
+            raise InputError(f"the {name} picture holds {bad} values that are not finite numbers")
+    return a, b
+
+
+def _size(picture: np.ndarray) -> str:
+    return f"{picture.shape[1]}x{picture.shape[0]}" if picture.ndim >= 2 else str(picture.shape)
+
+
+def rmse(test: np.ndarray, reference: np.ndarray) -> float:
+    """sqrt(mean((x - r)^2)), over all pixels and channels."""
+    a, b = _pair(test, reference)
+    return float(np.sqrt(np.mean((a - b) ** 2)))
+
+
+def relmse_map(test: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """(x - r)^2 / (r^2 + 0.01), averaged over the channels: (H, W)."""
+    a, b = _pair(test, reference)
+    return ((a - b) ** 2 / (b**2 + RELATIVE_FLOOR)).mean(axis=2)
+
+
+def relmse(test: np.ndarray, reference: np.ndarray) -> float:
+    """mean((x - r)^2 / (r^2 + 0.01)): the squared relative error, that dark pixels cannot blow up."""
+    return float(relmse_map(test, reference).mean())
+
+
+def mean_ratio(test: np.ndarray, reference: np.ndarray) -> float:
+    """mean(x) / mean(r): 1 where no energy is lost or made; NaN where the reference is black."""
+    a, b = _pair(test, reference)
+    return float(a.mean() / b.mean()) if b.mean() != 0 else (1.0 if a.mean() == 0 else math.nan)
+
+
+def compare(test: np.ndarray, reference: np.ndarray, hdr: bool = True) -> Comparison:
+    """All measures at once; `hdr` False takes both pictures as shown on a screen, in [0, 1]."""
+    exposures = exposure_range(reference) if hdr else None
+    return Comparison(
+        rmse(test, reference),
+        relmse(test, reference),
+        mean_ratio(test, reference),
+        float(flip_map(test, reference, hdr).mean()),
+        exposures,
+    )
+
+
+# --- FLIP ------------------------------------------------------------------------------------------------
+
+_XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Andersson2020]
+    [
+        [10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
+        [2613072 / 12288897, 8788810 / 12288897, 887015 / 12288897],
+        [1425312 / 73733382, 8788810 / 73733382, 70074185 / 73733382],
+    ]
+)
+_RGB_FROM_XYZ = np.linalg.inv(_XYZ_FROM_RGB)
+_WHITE = _XYZ_FROM_RGB.sum(axis=1)
+
+_HYAB_POWER = 0.7  # q_c, [Andersson2020, section 4.1.3]: squeezes large colour distances
+_KNEE_IN, _KNEE_OUT = 0.4, 0.95  # p_c, p_t: 40 % of the largest distance maps to .95
+_FEATURE_WIDTH = 0.082  # w, degrees: the width of an edge or point that the eye detects
+_FEATURE_POWER = 0.5  # q_f
+
+# Contrast sensitivity as sums of Gaussians, (a1, b1, a2, b2): [Andersson2020, table 1]; achromatic,
+# red-green, blue-yellow.
+_SENSITIVITY = (
+    (1.0, 0.0047, 0.0, 1e-5),
+    (1.0, 0.0053, 0.0, 1e-5),
+    (34.1, 0.04, 13.5, 0.025),
+)
+
+
+def flip_map(
+    test: np.ndarray,
+    reference: np.ndarray,
+    hdr: bool = True,
+    pixels_per_degree: float = PIXELS_PER_DEGREE,
+) -> np.ndarray:
+    """FLIP per pixel, (H, W), 0 to 1.
+
+    With `hdr` False both pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True
+    both are brought to the screen at several exposures by ACES tone mapping, and every pixel keeps its worst
+    [Andersson2021, eq. 6]; the exposures follow from the reference alone (see `exposure_range`).
+    Not symmetric in HDR: swapping the pictures changes the exposures.
+    """
+    a, b = _pair(test, reference)
+    if not hdr:
+        return _ldr_flip(np.clip(a, 0, 1), np.clip(b, 0, 1), pixels_per_degree)
+    start, stop = exposure_range(b)
+    count = max(2, math.ceil(stop - start))  # one a stop [Andersson2021, section 3.2]
+    worst = np.zeros(a.shape[:2])
+    for exposure in np.linspace(start, stop, count):
+        test_shown, reference_shown = (_aces(np.maximum(x, 0) * 2.0**exposure) for x in (a, b))
+        np.maximum(worst, _ldr_flip(test_shown, reference_shown, pixels_per_degree), out=worst)
+    return worst
+
+
+_ACES = (0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14)
+
+
+def _aces(x: np.ndarray) -> np.ndarray:
+    k0, k1, k2, k3, k4, k5 = _ACES
+    return np.clip((k0 * x * x + k1 * x + k2) / (k3 * x * x + k4 * x + k5), 0, 1)
+
+
+def exposure_range(reference: np.ndarray) -> tuple[float, float]:
+    """First and last exposure in stops (powers of two): where ACES maps the reference's brightest pixel, and
+    then its median, to 0.85 [Andersson2021, section 3.2]."""
+    k0, k1, k2, k3, k4, k5 = _ACES
+    a, b, c = k0 - 0.85 * k3, k1 - 0.85 * k4, k2 - 0.85 * k5
+    x_max = -b / (2 * a) + math.sqrt((b / (2 * a)) ** 2 - c / a)  # solves _aces(x) = 0.85
+    luminance = np.maximum(np.asarray(reference, np.float64), 0) @ _XYZ_FROM_RGB[1]
+    if luminance.max() <= 0:
+        return 0.0, 0.0  # a black reference has no exposure of its own; it is shown as it stands
+    # A picture whose median is black would ask for endless stops: 2^-23 of the peak is below float32's step.
+    median = max(float(np.median(luminance)), float(luminance.max()) * 2.0**-23)
+    return math.log2(x_max / luminance.max()), math.log2(x_max / median)
+
+
+def _ldr_flip(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float) -> np.ndarray:
+    """LDR-FLIP of two linear RGB pictures in [0, 1]: dE_c^(1 - dE_f) [Andersson2020, eq. 5]."""
+    a, b = _opponent(test), _opponent(reference)
+    distance = _colour_distance(a, b, pixels_per_degree)
+    features = _feature_distance((a[..., 0] + 16) / 116, (b[..., 0] + 16) / 116, pixels_per_degree)
+    return distance ** (1 - features)
+
+
+def _opponent(rgb: np.ndarray) -> np.ndarray:
+    """Linear RGB to YyCxCz, the linear twin of L*a*b* in which the eye's filter acts."""
+    x, y, z = np.moveaxis(rgb @ _XYZ_FROM_RGB.T / _WHITE, -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def _from_opponent(ycc: np.ndarray) -> np.ndarray:
+    y = (ycc[..., 0] + 16) / 116
+    xyz = np.stack([y + ycc[..., 1] / 500, y, y - ycc[..., 2] / 200], axis=-1) * _WHITE
+    return xyz @ _RGB_FROM_XYZ.T
+
+
+def _hunt_lab(rgb: np.ndarray) -> np.ndarray:
+    """L*a*b* with the Hunt adjustment: colours seem fuller when brighter, a and b scale by 0.01 L."""
+    t = rgb @ _XYZ_FROM_RGB.T / _WHITE
+    delta = 6 / 29
+    x, y, z = np.moveaxis(np.where(t > delta**3, np.cbrt(t), t / (3 * delta**2) + 4 / 29), -1, 0)
+    lightness = 116 * y - 16
+    return np.stack([lightness, 5 * lightness * (x - y), 2 * lightness * (y - z)], axis=-1)
+
+
+def _hyab(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """City-block in lightness, Euclidean in chroma: better than either for large differences."""
+    difference = a - b
+    return np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2])
+
+
+def _colour_distance(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float) -> np.ndarray:
+    def seen(ycc: np.ndarray) -> np.ndarray:
+        filtered = np.stack(
+            [_contrast_filter(ycc[..., i], *_SENSITIVITY[i], pixels_per_degree) for i in range(3)], axis=-1
+        )
+        return _hunt_lab(np.clip(_from_opponent(filtered), 0, 1))
+
+    power = _hyab(seen(test), seen(reference)) ** _HYAB_POWER
+    green, blue = _hunt_lab(np.eye(3)[1]), _hunt_lab(np.eye(3)[2])  # the farthest pair of the sRGB cube
+    largest = float(_hyab(green, blue)) ** _HYAB_POWER
+    knee = _KNEE_IN * largest
+    return np.where(
+        power < knee,
+        power * (_KNEE_OUT / knee),
+        _KNEE_OUT + (power - knee) / (largest - knee) * (1 - _KNEE_OUT),
+    )
+
+
+def _contrast_filter(
+    channel: np.ndarray, a1: float, b1: float, a2: float, b2: float, pixels_per_degree: float
+) -> np.ndarray:
+    """The eye's blur, a sum of two Gaussians, each separable, which together sum to one."""
+    widest = max(b for row in _SENSITIVITY for b in (row[1], row[3]))
+    radius = math.ceil(3 * math.sqrt(widest / (2 * math.pi**2)) * pixels_per_degree)
+    x = np.arange(-radius, radius + 1) / pixels_per_degree
+    total, weight = np.zeros_like(channel), 0.0
+    for a, b in ((a1, b1), (a2, b2)):
+        if a == 0:
+            continue
+        line = np.exp(-(math.pi**2) * x * x / b)
+        scale = a * math.sqrt(math.pi / b)
+        total += scale * _along(_along(channel, line, 0), line, 1)
+        weight += scale * line.sum() ** 2
+    return total / weight
+
+
+def _feature_distance(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float) -> np.ndarray:
+    """The larger of the edge and the point difference [Andersson2020, eq. 4]."""
+    sigma = 0.5 * _FEATURE_WIDTH * pixels_per_degree
+    radius = math.ceil(3 * sigma)
+    x = np.arange(-radius, radius + 1, dtype=np.float64)
+    gauss = np.exp(-x * x / (2 * sigma * sigma))
+    edge, point = -x * gauss, (x * x / sigma**2 - 1) * gauss
+
+    def strength(luminance: np.ndarray, detector: np.ndarray) -> np.ndarray:
+        # Positive and negative weights each sum to one, as those of the two-dimensional filter do.
+        across = gauss / gauss.sum()
+        along = np.where(detector < 0, detector / -detector[detector < 0].sum(), 0)
+        along = along + np.where(detector > 0, detector / detector[detector > 0].sum(), 0)
+        horizontal = _along(_along(luminance, along, 1), across, 0)
+        vertical = _along(_along(luminance, along, 0), across, 1)
+        return np.hypot(horizontal, vertical)
+
+    edges, points = (np.abs(strength(reference, x) - strength(test, x)) for x in (edge, point))
+    return np.clip((np.maximum(edges, points) / math.sqrt(2)) ** _FEATURE_POWER, 0, 1)
+
+
+def _along(channel: np.ndarray, weights: np.ndarray, axis: int) -> np.ndarray:
+    """Correlate along one axis, the border pixels repeated outward.
+
+    Correlation and convolution differ by a reflection; of our filters only the edge detector is odd, and of
+    it only the absolute value is used.
+    """
+    radius = len(weights) // 2
+    padding = [(0, 0), (0, 0)]
+    padding[axis] = (radius, radius)
+    padded = np.pad(channel, padding, mode="edge")
+    length = channel.shape[axis]
+    total = np.zeros_like(channel)
+    for i, weight in enumerate(weights):
+        total += weight * (padded[i : i + length] if axis == 0 else padded[:, i : i + length])
+    return total
