@@ -1,0 +1,68 @@
+"""Gonio: a laboratory for the scattering of light by materials.
+
+    import gonio as go
+    gold = go.Conductor.preset("Au", alpha=0.2)
+    value = gold.eval(wo, wi)            # (N, 3) arrays in, (N, 3) out
+    sample = gold.sample(wo, u)          # .wi .weight .pdf .delta
+
+Names load when first used; Dr.Jit and Mitsuba load when something is first computed.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_PLACES = {
+    "GonioError": "errors",
+    "GonioWarning": "errors",
+    "InputError": "errors",
+    "MachineError": "errors",
+    "get_precision": "ops",
+    "set_precision": "ops",
+    "BSDF": "models",
+    "Sample": "models",
+    "model": "models",
+}
+_ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
+
+if TYPE_CHECKING:
+    from . import models
+    from .errors import GonioError, GonioWarning, InputError, MachineError
+    from .models import BSDF, Sample, model
+    from .ops import get_precision, set_precision
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("_"):
+        raise AttributeError(name)
+    if name == "models":  # the module itself, which can be called: go.models()
+        return import_module(".models", __name__)
+    if name in _PLACES:
+        return getattr(import_module("." + _PLACES[name], __name__), name)
+    wanted = _ALIASES.get(name, name)
+    for cls in import_module(".models", __name__).models().values():
+        if cls.__name__ == wanted:
+            return cls
+    raise AttributeError(f"module 'gonio' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    classes = import_module(".models", __name__).models().values()
+    return sorted([*globals(), *_PLACES, *_ALIASES, *(cls.__name__ for cls in classes)])
+
+
+__all__ = [
+    "BSDF",
+    "GonioError",
+    "GonioWarning",
+    "InputError",
+    "MachineError",
+    "Sample",
+    "get_precision",
+    "model",
+    "models",
+    "set_precision",
+]

@@ -1,0 +1,47 @@
+"""The materials, one file each. A new one is one new file in this folder: discovery finds it."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+from functools import lru_cache
+from types import ModuleType
+
+from ..errors import InputError, did_you_mean
+from .base import BSDF, Parameter, Sample
+
+__all__ = ["BSDF", "Parameter", "Sample", "model", "models"]
+
+
+@lru_cache
+def models() -> dict[str, type[BSDF]]:
+    """Every material class by name, in alphabetical order."""
+    found: dict[str, type[BSDF]] = {}
+    for module in pkgutil.iter_modules(__path__):
+        members = vars(importlib.import_module(f"{__name__}.{module.name}"))
+        for member in members.values():
+            if isinstance(member, type) and issubclass(member, BSDF) and member.name:
+                found[member.name] = member
+    return dict(sorted(found.items()))
+
+
+def model(name: str) -> type[BSDF]:
+    """The class of that name; underscores, hyphens and case do not matter. InputError where there is none."""
+    known = models()
+    wanted = name.lower().replace("_", "-")
+    by_class = {cls.__name__.lower(): key for key, cls in known.items()}
+    key = wanted if wanted in known else by_class.get(name.lower(), "")
+    if not key:
+        raise InputError(f"unknown material '{name}'", "model", did_you_mean(wanted, list(known)))
+    return known[key]
+
+
+class _CallableModule(ModuleType):
+    """`import gonio as go; go.models()`: a package's submodule hides a function of the same name, so it is callable."""
+
+    def __call__(self) -> dict[str, type[BSDF]]:
+        return models()
+
+
+sys.modules[__name__].__class__ = _CallableModule

@@ -1,0 +1,8 @@
+"""What light does at a surface: frame, reflection and refraction, Fresnel, microfacets, warps, refractive indices.
+
+Everything here is written in the vocabulary of `gonio.ops` and knows no material.
+"""
+
+from . import frame, fresnel, indices, masking, ndf, special, warp
+
+__all__ = ["frame", "fresnel", "indices", "masking", "ndf", "special", "warp"]

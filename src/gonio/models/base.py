@@ -1,0 +1,367 @@
+"""What a material is: a frozen set of declared parameters, and pure methods over them.
+
+    class Lambert(BSDF):
+        albedo: Value = spectrum(0.5, "share of light that is reflected", high=1.0)
+
+        def eval(self, wo, wi, mode="radiance"):
+            return self.albedo * ops.where(..., ...)
+
+Only `eval` must be written; `pdf` and `sample` fall back to cosine sampling, `f` follows from `eval`. A parameter is
+declared once, with kind, range, unit and a line of documentation; the command line, the scene reader, the plugin and
+the manual read that declaration.
+
+The methods are written in the vocabulary of `gonio.ops` and see *bound* parameters: Dr.Jit values, or symbols while
+recording. Whoever calls them from outside may hand over NumPy arrays, lists or Dr.Jit vectors: the wrapper that
+`BSDF` puts around each method binds the parameters, converts, and returns the same kind.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from .. import ops
+from ..errors import GonioWarning, InputError, did_you_mean
+from ..ops import backend, graph
+from ..optics import warp
+
+Value = Any  # a number, an array with one value a ray, a texture in a scene; bound: a Dr.Jit value or a symbol
+
+MODES = ("radiance", "importance")
+
+
+class Sample(NamedTuple):
+    """What `sample` returns, one entry a ray.
+
+    wi      direction chosen, unit
+    weight  eval / pdf; of a delta lobe, its reflectance over its probability; 0 where sampling failed
+    pdf     density of wi, 1/sr; of a delta lobe, its discrete probability; 0 where sampling failed
+    delta   whether wi was chosen from a delta lobe
+    eta     index on wi's side over index on wo's side: 1 for reflection
+    """
+
+    wi: Any
+    weight: Any
+    pdf: Any
+    delta: Any
+    eta: Any
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Declaration of one parameter.
+
+    kind       "float", "spectrum", "alpha" (one width or two), "angle", "choice", "flag" or "bsdf"
+    low, high  closed range; outside it is an error, above `high` only a warning where `soft_high`
+    choices    name -> what it means, for kind "choice"
+    """
+
+    name: str
+    kind: str
+    default: Any
+    doc: str
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    soft_high: bool = False
+    choices: dict[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def required(self) -> bool:
+        return self.default is dataclasses.MISSING
+
+    @property
+    def numeric(self) -> bool:
+        return self.kind in ("float", "spectrum", "alpha", "angle")
+
+    @property
+    def range(self) -> str:
+        """The range in words, as errors and the manual print it."""
+        if self.kind == "choice":
+            return " | ".join(self.choices)
+        if not self.numeric:
+            return self.kind
+        low = "" if self.low == -math.inf else f">= {self.low:g}"
+        high = "" if self.high == math.inf else f"<= {self.high:g}"
+        return " and ".join(x for x in (low, high) if x) or "any number"
+
+    def check(self, value: Any, where: str) -> None:
+        """Raise InputError, or warn, where `value` cannot stand for this parameter."""
+        if self.kind == "choice":
+            if value not in self.choices:
+                raise InputError(f"unknown {self.name} '{value}'", where, did_you_mean(str(value), list(self.choices)))
+        elif self.kind == "flag":
+            if not isinstance(value, bool | np.bool_):
+                raise InputError(f"{value!r} given, True or False expected", where)
+        elif self.kind == "bsdf":
+            if not isinstance(value, BSDF):
+                raise InputError(f"{type(value).__name__} given, a material expected", where)
+        elif not backend.is_drjit(value) and not isinstance(value, graph.Node) and value is not None:
+            self._check_number(value, where)
+
+    def _check_number(self, value: Any, where: str) -> None:
+        if self.kind == "alpha" and isinstance(value, tuple | list):
+            if len(value) != 2:
+                raise InputError(f"{len(value)} widths given, one or two expected", where)
+            for item in value:
+                self.check(item, where)
+            return
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{value!r} given, a number or an array expected", where) from None
+        if isinstance(value, str | bytes) or array.ndim > (2 if self.kind == "spectrum" else 1):
+            raise InputError(f"{value!r} given, a number or an array expected", where)
+        if not np.all(np.isfinite(array)):
+            raise InputError(f"{value!r} is not finite", where)
+        if array.size and array.min() < self.low:
+            raise InputError(f"{array.min():g} given, {self.range} expected", where)
+        if array.size and array.max() > self.high:
+            if not self.soft_high:
+                raise InputError(f"{array.max():g} given, {self.range} expected", where)
+            import warnings
+
+            text = f"{where}: {array.max():g} is over {self.high:g}: the material gives back more light than it receives"
+            warnings.warn(text, GonioWarning, stacklevel=5)
+
+
+def _declare(kind: str, default: Any, doc: str, **more: Any) -> Any:
+    return dataclasses.field(default=default, metadata={"kind": kind, "doc": doc, **more})
+
+
+def number(default: Any = dataclasses.MISSING, doc: str = "", **more: Any) -> Any:
+    """Declare a number; `low`, `high`, `unit` as in `Parameter`."""
+    return _declare("float", default, doc, **more)
+
+
+def spectrum(default: Any = dataclasses.MISSING, doc: str = "", **more: Any) -> Any:
+    """Declare a colour: a number (grey), three values, or an array (N, channels)."""
+    return _declare("spectrum", default, doc, **more)
+
+
+def width(default: Any = dataclasses.MISSING, doc: str = "") -> Any:
+    """Declare a microfacet width alpha, or a tuple of two (along x, along y); bound: a vector of two."""
+    return _declare("alpha", default, doc, low=0.0, high=1.0)
+
+
+def angle(default: Any = 0.0, doc: str = "") -> Any:
+    """Declare an angle in radians; bound: the vector (cos, sin), or None where it is the plain number 0."""
+    return _declare("angle", default, doc, unit="rad")
+
+
+def choice(default: str, doc: str, choices: dict[str, str]) -> Any:
+    """Declare a choice between names; it shapes the code, so it is known before anything runs."""
+    return _declare("choice", default, doc, choices=choices)
+
+
+def flag(default: bool, doc: str) -> Any:
+    """Declare a switch that shapes the code."""
+    return _declare("flag", default, doc)
+
+
+def bsdf(doc: str) -> Any:
+    """Declare a material inside a material."""
+    return _declare("bsdf", dataclasses.MISSING, doc)
+
+
+class BSDF:
+    """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
+
+    breaks      law -> reason, for laws that the model breaks by nature (Phong: reciprocity, energy)
+    transmits   whether light can pass to the other side
+    """
+
+    name: ClassVar[str] = ""
+    breaks: ClassVar[dict[str, str]] = {}
+    _bound = False
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if not cls.__name__.startswith("_"):
+            cls.name = "".join("-" + c.lower() if c.isupper() else c for c in cls.__name__).lstrip("-").replace("_", "-")
+        for method in ("eval", "pdf", "sample"):
+            if method in cls.__dict__:
+                setattr(cls, method, _doorway(cls.__dict__[method]))
+        dataclass(frozen=True, eq=False)(cls)
+
+    def __post_init__(self) -> None:
+        for parameter in self.parameters().values():
+            parameter.check(getattr(self, parameter.name), f"{type(self).__name__}.{parameter.name}")
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """The declared parameters by name."""
+        return {
+            field.name: Parameter(name=field.name, default=field.default, **field.metadata)
+            for field in dataclasses.fields(cls)  # type: ignore[arg-type]
+            if field.metadata
+        }
+
+    # ------------------------------------------------------------------ the protocol
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        """f(wo, wi) |cos theta_i|, a spectrum, 1/sr; 0 for delta lobes.
+
+        wo, wi  (N, 3) unit vectors away from the surface: toward the viewer, toward the light
+        mode    "radiance" (transmission carries (eta_o/eta_i)^2) or "importance" (it does not)
+        Returns (N, channels).
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no eval")
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes. Here: cosine sampling."""
+        same_side = wo.z * wi.z > 0.0
+        return ops.where(same_side, ops.abs(wi.z) * ops.inv_pi, 0.0)
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+        """Choose wi for wo.
+
+        u  (N, 3) in [0, 1): the first picks the lobe, the others the direction
+        Here: cosine sampling on wo's side.
+        """
+        local = warp.square_to_cosine_hemisphere(u.y, u.z)
+        wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
+        pdf = self.pdf(wo, wi)
+        valid = pdf > 0.0
+        weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+
+    @property
+    def transmits(self) -> bool:
+        return False
+
+    @property
+    def delta(self) -> str:
+        """Whether the lobes are delta distributions: "never", "always" or "maybe" (it depends on the ray)."""
+        return "never"
+
+    # ------------------------------------------------------------------ from outside
+
+    def f(self, wo: Any, wi: Any, mode: str = "radiance", precision: str | None = None) -> Any:
+        """The BSDF itself, eval / |cos theta_i|, 1/sr; 0 at cos theta_i = 0. Shapes as in `eval`."""
+        value = self.eval(wo, wi, mode=mode, precision=precision)  # type: ignore[call-arg]
+        if backend.is_drjit(wi):
+            return value * ops.safe_div(1.0, ops.abs(wi.z))
+        cos = np.abs(np.broadcast_to(np.asarray(wi, dtype=value.dtype), (len(value), 3))[:, 2:])
+        return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0)
+
+    def bind(self, convert: Callable[[Parameter, Any], Any]) -> Any:
+        """A copy whose numeric parameters are what `convert(parameter, value)` makes of them, inner materials too."""
+        clone = object.__new__(type(self))
+        clone.__dict__.update(self.__dict__)
+        clone.__dict__["_bound"] = True
+        for parameter in self.parameters().values():
+            value = getattr(self, parameter.name)
+            if parameter.kind == "bsdf":
+                clone.__dict__[parameter.name] = value.bind(convert)
+            elif parameter.numeric:
+                clone.__dict__[parameter.name] = convert(parameter, value)
+        return clone
+
+    def record(self, method: str = "eval", mode: str = "radiance") -> graph.Graph:
+        """The method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
+
+        def symbol(parameter: Parameter, value: Any) -> Any:
+            if parameter.kind == "angle" and value is None:
+                return None
+            return graph.symbol({"float": "float", "spectrum": "spectrum"}.get(parameter.kind, "vec2"))
+
+        bound = self.bind(lambda p, v: symbol(p, None if _no_turn(p, v) else v))
+        inner = inspect.unwrap(getattr(type(self), method))
+        more = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
+        kinds = {"wo": "vec3", "u": "vec3"} if method == "sample" else {"wo": "vec3", "wi": "vec3"}
+        return ops.record(inner, types=kinds, name=f"{type(self).__name__}_{method}", **{"self": bound}, **more)
+
+
+def never(like: Any) -> Any:
+    """False for every ray."""
+    return like != like
+
+
+def _no_turn(parameter: Parameter, value: Any) -> bool:
+    return parameter.kind == "angle" and isinstance(value, int | float) and value == 0
+
+
+def converter(kind: backend.Types) -> Callable[[Parameter, Any], Any]:
+    """How plain parameter values become Dr.Jit values of the given types."""
+
+    def convert(parameter: Parameter, value: Any) -> Any:
+        if parameter.kind == "spectrum":
+            if backend.is_drjit(value):
+                return value
+            array = np.asarray(value, dtype=np.float64)
+            if array.ndim == 0:
+                array = np.broadcast_to(array, (3,))
+            return backend.vector_of(array, array.shape[-1], kind)
+        if parameter.kind == "alpha":
+            if isinstance(value, tuple | list):
+                return kind.vec2(backend.float_of(value[0], kind), backend.float_of(value[1], kind))
+            if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
+                return value
+            one = backend.float_of(value, kind)
+            return kind.vec2(one, one)
+        if parameter.kind == "angle":
+            if _no_turn(parameter, value):
+                return None
+            if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
+                return value
+            s, c = ops.sincos(backend.float_of(value, kind))
+            return kind.vec2(c, s)
+        return backend.float_of(value, kind)
+
+    return convert
+
+
+def _doorway(method: Callable) -> Callable:
+    """Let bound parameters through; for anything else bind, convert to Dr.Jit and convert the answer back."""
+    inner = ops.function(method)
+
+    @functools.wraps(method)
+    def enter(self: BSDF, wo: Any, other: Any, mode: str = "radiance", precision: str | None = None) -> Any:
+        args = (mode,) if takes_mode else ()
+        if self._bound:
+            return inner(self, wo, other, *args)
+        if mode not in MODES:
+            raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{method.__name__}", " or ".join(MODES))
+        as_drjit = backend.is_drjit(wo)
+        if as_drjit:
+            kind = backend.types_like(type(wo))
+            return inner(self.bind(converter(kind)), wo, other, *args)
+        kind = backend.types(precision)
+        first, second, count = _rows(wo, other, method.__name__)
+        bound = self.bind(converter(kind))
+        result = inner(bound, backend.vector_of(first, 3, kind), backend.vector_of(second, 3, kind), *args)
+        if isinstance(result, tuple):
+            return type(result)(*[backend.to_numpy(value, count) for value in result])  # type: ignore[call-arg]
+        return backend.to_numpy(result, count)
+
+    takes_mode = "mode" in inspect.signature(method).parameters
+    return enter
+
+
+def _rows(a: Any, b: Any, name: str) -> tuple[np.ndarray, np.ndarray, int]:
+    """Two arguments as arrays of shape (N, 3) or (3,), and N."""
+    arrays = []
+    for label, value in (("wo", a), ("u" if name == "sample" else "wi", b)):
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.ndim not in (1, 2) or array.shape[-1] != 3:
+            raise InputError(f"an array of shape {array.shape}, expected (N, 3)", f"{name}: {label}")
+        arrays.append(array)
+    sizes = {len(x) for x in arrays if x.ndim == 2 and len(x) != 1} or {1}
+    if len(sizes) > 1:
+        raise InputError(f"{sizes} rows given, the same number expected", name)
+    return arrays[0], arrays[1], sizes.pop()
+
+
+for _name in ("pdf", "sample"):  # the fall-backs are called from outside too
+    setattr(BSDF, _name, _doorway(BSDF.__dict__[_name]))

@@ -1,0 +1,37 @@
+"""Blinn's half-vector variant of Phong's model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..ops import dot, function, safe_div
+from ..optics.frame import half_vector, reflect
+from ..optics.warp import square_to_power_lobe, square_to_power_lobe_pdf
+from .phong import _Empirical
+
+
+class BlinnPhong(_Empirical):
+    """Phong's model with the highlight (n.h)^p, h the half vector (Blinn1977): kd cos theta_i + ks max(0, n.h)^p.
+
+    n.h never turns negative where light and viewer are above the surface, so the highlight has no cut-off edge. For a
+    highlight as wide as Phong's take about four times the exponent. Neither reciprocal nor energy conserving.
+    """
+
+    @function
+    def _highlight(self, wo: Any, wi: Any) -> Any:
+        """n.h: cosine between the normal and the half vector."""
+        return half_vector(wo, wi).z
+
+    @function
+    def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
+        """Density of wi when h has density (p + 1) / (2 pi) cos^p: over 4 (v.h) (Walter2007, eq. 14)."""
+        h = half_vector(wo, wi)
+        return safe_div(square_to_power_lobe_pdf(h.z, self.p), 4.0 * dot(wo, h))
+
+    @function
+    def _highlight_sample(self, wo: Any, u1: Any, u2: Any) -> Any:
+        """The viewer mirrored at a sampled half vector."""
+        return reflect(wo, square_to_power_lobe(u1, u2, self.p))
+
+
+__all__ = ["BlinnPhong"]

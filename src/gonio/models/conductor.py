@@ -1,0 +1,84 @@
+"""Torrance-Sparrow conductor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..ops import abs, dot, function, safe_div, where
+from ..optics import fresnel, frame, indices
+from . import microfacet
+from .base import BSDF, Sample, Value, angle, choice, spectrum, width
+
+
+class Conductor(BSDF):
+    """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
+
+    D, G and F are chosen by name. alpha below 1e-4 is a perfect mirror. Light that a second facet would reflect is lost:
+    at alpha = 1 more than half.
+    """
+
+    eta: Value = spectrum(0.0, "real part of the refractive index, over the outside's", low=0.0)
+    k: Value = spectrum(1.0, "imaginary part of the refractive index, over the outside's", low=0.0)
+    alpha: Value = width(0.1, "width of the microfacet distribution; two for anisotropy")
+    rotation: Value = angle(0.0, "turn of the anisotropy's axes about the normal, from dp/du")
+    ndf: str = choice("ggx", "distribution of microfacet normals", microfacet.NDFS)
+    masking: str = choice("smith-correlated", "masking and shadowing", microfacet.MASKINGS)
+    fresnel: str = choice("exact", "Fresnel reflectance", fresnel.KINDS)
+    albedo: Value = spectrum(1.0, "factor on everything reflected", low=0.0, high=1.0, soft_high=True)
+    sampling: str = choice("visible", "which normals are sampled", microfacet.SAMPLINGS)
+
+    @classmethod
+    def preset(cls, name: str, **parameters: Any) -> Conductor:
+        """A metal by name or symbol: Conductor.preset("Au", alpha=0.2). InputError where it is unknown."""
+        metal = indices.metal(name)
+        return cls(eta=metal.eta, k=metal.k, **parameters)
+
+    @function
+    def reflectance(self, cos_theta: Any) -> Any:
+        """F by name, times albedo, at a facet seen under cos_theta."""
+        if self.fresnel == "one":
+            return self.albedo * 1.0
+        if self.fresnel == "schlick":
+            return self.albedo * fresnel.schlick(cos_theta, fresnel.r0_conductor(self.eta, self.k))
+        return self.albedo * fresnel.conductor(cos_theta, self.eta, self.k)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        """albedo F D G / (4 cos theta_o); 0 where alpha makes it a mirror."""
+        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
+        alpha, smooth = microfacet.widths(self.alpha)
+        m = frame.half_vector(wo, wi)
+        facets = microfacet.reflection(self, wo, wi, m, alpha)
+        return self.reflectance(abs(dot(wo, m))) * where(_above(wo, wi) & ~smooth, facets, 0.0)
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        """Density of the sampled normal over 4 (o.m) (Walter2007, eq. 14)."""
+        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
+        alpha, smooth = microfacet.widths(self.alpha)
+        m = frame.half_vector(wo, wi)
+        density = safe_div(microfacet.normal_pdf(self, wo, m, alpha), 4.0 * abs(dot(wo, m)))
+        return where(_above(wo, wi) & ~smooth, density, 0.0)
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+        """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
+        wo = frame.rotate(wo, self.rotation)
+        alpha, smooth = microfacet.widths(self.alpha)
+        m = microfacet.sample_normal(self, wo, u.y, u.z, alpha)
+        m = where(smooth, frame.upright(wo), m)
+        wi = frame.reflect(wo, m)
+        cos_m = abs(dot(wo, m))
+        above = _above(wo, wi)
+        pdf = safe_div(microfacet.normal_pdf(self, wo, m, alpha), 4.0 * cos_m)
+        pdf = where(above, where(smooth, 1.0, pdf), 0.0)
+        facets = where(smooth, 1.0, safe_div(microfacet.reflection(self, wo, wi, m, alpha), pdf))
+        weight = self.reflectance(cos_m) * where(pdf > 0.0, facets, 0.0)
+        return Sample(frame.rotate_back(wi, self.rotation), weight, pdf, smooth & above, 1.0 + 0.0 * pdf)
+
+    @property
+    def delta(self) -> str:
+        return microfacet.delta(self.alpha)
+
+
+def _above(wo: Any, wi: Any) -> Any:
+    return (wo.z > 0.0) & (wi.z > 0.0)
+
+

@@ -1,0 +1,71 @@
+"""What the two microfacet materials share: how a width is read, which normals are sampled, D G over the cosines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..ops import abs, backend, maximum, vec2, vec3, where
+from ..optics import masking
+from ..optics.ndf import distribution, distributions
+
+NDFS = {name: (type(ndf).__doc__ or "").split(" (")[0] for name, ndf in distributions().items()}
+MASKINGS = masking.KINDS
+SAMPLINGS = {
+    "visible": "normals as wo sees them",
+    "bounded": "visible normals whose reflection can lie above the surface (GGX)",
+    "normals": "all normals, by D cos",
+}
+
+# Below this width a facet's tilt, about alpha, is no more than a thousand roundings of a float32 direction (6e-8), and
+# D's peak, 1 / (pi alpha^2), passes 3e7: the lobe can no longer be resolved and is taken as a mirror's.
+SMOOTH = 1e-4
+
+
+def widths(alpha: Any) -> tuple[Any, Any]:
+    """(alpha held above `SMOOTH`, whether the surface is smooth)."""
+    smooth = (alpha.x < SMOOTH) & (alpha.y < SMOOTH)
+    return vec2(maximum(alpha.x, SMOOTH), maximum(alpha.y, SMOOTH)), smooth
+
+
+def delta(alpha: Any) -> str:
+    """Whether widths, as the user gave them, make a delta lobe: "never", "always" or "maybe"."""
+    if backend.is_drjit(alpha):
+        return "maybe"
+    values = np.asarray(alpha, dtype=float)
+    smooth = np.max(values, axis=-1) < SMOOTH if isinstance(alpha, tuple | list) else values < SMOOTH
+    return "always" if np.all(smooth) else "maybe" if np.any(smooth) else "never"
+
+
+def upper(w: Any) -> Any:
+    """w turned to the upper side."""
+    return vec3(w.x, w.y, abs(w.z))
+
+
+def sample_normal(model: Any, wo: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+    """A normal (m.z > 0) by the model's `sampling`; for wo below the surface, as its mirror image above sees it."""
+    ndf = distribution(model.ndf)
+    if model.sampling == "normals":
+        return ndf.sample(u1, u2, alpha)
+    if model.sampling == "bounded":
+        return ndf.sample_bounded(upper(wo), u1, u2, alpha)
+    return ndf.sample_visible(upper(wo), u1, u2, alpha)
+
+
+def normal_pdf(model: Any, wo: Any, m: Any, alpha: Any) -> Any:
+    """Density of `sample_normal`, 1/sr."""
+    ndf = distribution(model.ndf)
+    if model.sampling == "normals":
+        return ndf.pdf(m, alpha)
+    if model.sampling == "bounded":
+        return ndf.pdf_bounded(upper(wo), m, alpha)
+    return ndf.pdf_visible(wo, m, alpha)
+
+
+def reflection(model: Any, wo: Any, wi: Any, m: Any, alpha: Any) -> Any:
+    """D G / (4 |cos theta_o|): the microfacet BRDF without F, times |cos theta_i|."""
+    ndf = distribution(model.ndf)
+    g = masking.masking_shadowing(model.masking, ndf, wo, wi, m, alpha)
+    cos_o = abs(wo.z)
+    return where(cos_o > 0.0, g * ndf.D(m, alpha) / (4.0 * where(cos_o > 0.0, cos_o, 1.0)), 0.0)

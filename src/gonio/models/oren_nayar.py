@@ -1,0 +1,42 @@
+"""Oren-Nayar's rough diffuse reflection."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..ops import function, inv_pi, maximum, sqr, where
+from .base import BSDF, Value, number, spectrum
+
+
+class OrenNayar(BSDF):
+    """Diffuse reflection of a surface of Lambertian V-grooves, in the qualitative form (OrenNayar1994, sec. 4.4).
+
+    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a = max(theta_o, theta_i), b = min(theta_o, theta_i)
+    A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
+
+    No trigonometry: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and the sines times the
+    cosine of the azimuth are the scalar product of the tangential parts. Not valid beyond small sigma (about 0.5 rad);
+    the formula is used as it stands. It loses energy as sigma grows; interreflections are left out.
+    """
+
+    albedo: Value = spectrum(0.5, "share of light that a groove's side reflects", low=0.0, high=1.0, soft_high=True)
+    sigma: Value = number(0.3, "standard deviation of the grooves' slope angle", low=0.0, unit="rad")
+
+    @function
+    def _shape(self, wo: Any, wi: Any) -> Any:
+        """A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)."""
+        s2 = sqr(self.sigma)
+        a = 1.0 - 0.5 * s2 / (s2 + 0.33)
+        b = 0.45 * s2 / (s2 + 0.09)
+        tangential = maximum(wo.x * wi.x + wo.y * wi.y, 0.0)
+        # both cosines vanish together only where the caller masks the result
+        return a + b * tangential / maximum(maximum(wo.z, wi.z), 1e-7)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        """albedo / pi (A + B ...) cos theta_i above the surface."""
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        return self.albedo * where(above, self._shape(wo, wi) * wi.z * inv_pi, 0.0)
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        """cos theta_i / pi above the surface: B's part is small and as smooth."""
+        return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)

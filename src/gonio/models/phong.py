@@ -1,0 +1,124 @@
+"""Phong's empirical model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import ops
+from ..errors import InputError
+from ..ops import dot, function, inv_pi, mean, pow, vec3, where
+from ..optics.frame import mirror
+from ..optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
+from .base import BSDF, Sample, Value, flag, never, number, spectrum
+
+
+class _Empirical(BSDF):
+    """Ambient, diffuse and specular part: kd (n.l) + ks (highlight)^p, as Phong1975 wrote it down.
+
+    No 1/pi, no normalization, no cosine on the specular term, so f = eval / cos theta_i grows without bound at
+    grazing light. Shared by the two highlights.
+    """
+
+    kd: Value = spectrum(0.5, "diffuse coefficient", low=0.0)
+    ks: Value = spectrum(0.3, "specular coefficient", low=0.0)
+    p: Value = number(32.0, "falloff of the highlight", low=0.0)
+    ka: Value = spectrum(0.0, "ambient coefficient: ka times the scene's ambient light is added", low=0.0)
+    check_sum: bool = flag(False, "require ka + kd + ks = 1")
+
+    breaks = {
+        "reciprocity": "the specular term has no cosine, so f divides it by cos theta_i alone",
+        "energy": "neither term is normalized: kd = 1 reflects pi times what it receives",
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.check_sum:
+            import numpy as np
+
+            total = np.asarray(self.ka) + np.asarray(self.kd) + np.asarray(self.ks)
+            if not np.allclose(total, 1.0, atol=1e-6):
+                raise InputError(
+                    f"ka + kd + ks = {np.round(total, 6).tolist()}, 1 expected",
+                    type(self).__name__,
+                    "change a coefficient, or leave check_sum out",
+                )
+
+    def _highlight(self, wo: Any, wi: Any) -> Any:
+        """Base of the power, the cosine that peaks in the highlight."""
+        raise NotImplementedError
+
+    def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
+        raise NotImplementedError
+
+    def _highlight_sample(self, wo: Any, u1: Any, u2: Any) -> Any:
+        raise NotImplementedError
+
+    @function
+    def _specular_share(self, wo: Any) -> Any:
+        """Probability of the specular lobe: its power against that of the diffuse lobe, ks 2 pi / (p + 1) : kd pi."""
+        specular = mean(self.ks) * 2.0 / (self.p + 1.0)
+        both = specular + mean(self.kd)
+        return ops.safe_div(specular, both)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        """kd (n.l) + ks (highlight)^p for light and viewer above the surface (course sheet, eq. 1)."""
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        return self.kd * where(above, wi.z, 0.0) + self.ks * where(above, pow(self._highlight(wo, wi), self.p), 0.0)
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        """Mixture of the cosine and the highlight's lobe."""
+        share = self._specular_share(wo)
+        density = (1.0 - share) * wi.z * inv_pi + share * self._highlight_pdf(wo, wi)
+        return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+        """u1 picks a lobe; a direction below the surface is a failed sample."""
+        diffuse = square_to_cosine_hemisphere(u.y, u.z)
+        specular = self._highlight_sample(wo, u.y, u.z)
+        wi = where(u.x < self._specular_share(wo), specular, diffuse)
+        pdf = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+
+    @property
+    def ambient(self) -> Any:
+        """Factor of the scene's ambient light."""
+        return self.ka
+
+
+class Phong(_Empirical):
+    """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored at n (course sheet, eq. 1; Phong1975).
+
+    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p, exactly that: the light's 1 / r^2 is the renderer's. The base of
+    the power is cut at 0, or an even p would light the wrong side, and light below the surface gives nothing.
+    Neither reciprocal nor energy conserving.
+    """
+
+    @function
+    def _highlight(self, wo: Any, wi: Any) -> Any:
+        """v.r: cosine between the viewer and the mirrored light."""
+        return dot(wo, mirror(wi))
+
+    @function
+    def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
+        """Density of a cos^p lobe about the mirrored viewer, 1/sr."""
+        return square_to_power_lobe_pdf(dot(mirror(wo), wi), self.p)
+
+    @function
+    def _highlight_sample(self, wo: Any, u1: Any, u2: Any) -> Any:
+        """A direction of a cos^p lobe about the mirrored viewer."""
+        return _around(mirror(wo), square_to_power_lobe(u1, u2, self.p))
+
+
+@function
+def _around(axis: Any, w: Any) -> Any:
+    """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
+    sign = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
+    a = -1.0 / (sign + axis.z)
+    b = axis.x * axis.y * a
+    s = vec3(1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x)
+    t = vec3(b, sign + axis.y * axis.y * a, -axis.y)
+    return s * w.x + t * w.y + axis * w.z
+
+
+__all__ = ["Phong"]

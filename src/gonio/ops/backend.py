@@ -1,0 +1,128 @@
+"""Dr.Jit arrays: which array types to use, and the way in and out of NumPy.
+
+Dr.Jit starts here and nowhere else outside `render`, after an LLVM that works has been found.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import lru_cache
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from . import llvm
+
+PRECISIONS = ("float32", "float64")
+_precision = "float32"
+
+
+class Types(NamedTuple):
+    """Dr.Jit's array types of one device and precision, for values that have one entry a ray."""
+
+    float: type
+    bool: type
+    vec2: type
+    vec3: type
+    vec4: type
+    module: ModuleType
+
+
+def set_precision(precision: str) -> None:
+    """Set the precision of evaluations on NumPy arrays: "float32" (default) or "float64", the oracle."""
+    global _precision
+    if precision not in PRECISIONS:
+        raise InputError(f"unknown precision '{precision}'", "set_precision", 'give "float32" or "float64"')
+    _precision = precision
+
+
+def get_precision() -> str:
+    return _precision
+
+
+@lru_cache
+def drjit() -> ModuleType:
+    """Dr.Jit, with a working LLVM handed over before its first use."""
+    if "drjit" not in sys.modules:
+        llvm.use()
+    import drjit as dr
+
+    return dr
+
+
+@lru_cache
+def _types(backend: str, double: bool) -> Types:
+    dr = drjit()
+    module: ModuleType = getattr(getattr(dr, backend), "ad")
+    end = "64" if double else ""
+    return Types(
+        getattr(module, "Float" + end),
+        module.Bool,
+        getattr(module, "Array2f" + end),
+        getattr(module, "Array3f" + end),
+        getattr(module, "Array4f" + end),
+        module,
+    )
+
+
+def types(precision: str | None = None) -> Types:
+    """The types for a precision; the one that is set where `precision` is None. CPU: small arrays live there."""
+    precision = precision or _precision
+    if precision not in PRECISIONS:
+        raise InputError(f"unknown precision '{precision}'", "precision", 'give "float32" or "float64"')
+    return _types("llvm", precision == "float64")
+
+
+@lru_cache
+def types_like(kind: type) -> Types:
+    """The types that go with a Dr.Jit array type: same device, same precision."""
+    dr = drjit()
+    backend = "cuda" if dr.backend_v(kind) == dr.JitBackend.CUDA else "llvm"
+    return _types(backend, dr.itemsize_v(kind) == 8 and not dr.is_mask_v(kind))
+
+
+def is_drjit(value: Any) -> bool:
+    """Whether a value is a Dr.Jit array (asked without loading Dr.Jit)."""
+    dr = sys.modules.get("drjit")
+    return dr is not None and dr.is_array_v(value)
+
+
+def float_of(value: Any, kind: Types) -> Any:
+    """A number or an array of shape (N,) as a Dr.Jit float.
+
+    A number becomes an evaluated array of one entry, never a literal: a literal would be baked into the kernel,
+    and every new value would compile it again.
+    """
+    dr = drjit()
+    if is_drjit(value):
+        return value
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim == 0:
+        return dr.opaque(kind.float, float(array))
+    if array.ndim != 1:
+        raise InputError(f"a value of shape {array.shape}, expected a number or (N,)", "parameter")
+    return kind.float(np.ascontiguousarray(array))
+
+
+def vector_of(value: Any, size: int, kind: Types) -> Any:
+    """Rows of shape (N, size) or one of shape (size,) as a Dr.Jit vector of `size` components."""
+    if is_drjit(value):
+        return value
+    array = np.asarray(value, dtype=np.float64)
+    vector = (kind.vec2, kind.vec3, kind.vec4)[size - 2]
+    return vector(*[float_of(array[..., i], kind) for i in range(size)])
+
+
+def to_numpy(value: Any, count: int) -> np.ndarray:
+    """A Dr.Jit float as (count,), a vector as (count, size); what is uniform is repeated `count` times."""
+    dr = drjit()
+    if not dr.is_array_v(value):
+        return np.full(count, value)
+    array = np.asarray(value.numpy())
+    count = max(count, array.shape[-1])  # parameters may have more rows than the directions
+    if dr.is_vector_v(value) or array.ndim == 2:
+        array = array.T
+        return np.ascontiguousarray(np.broadcast_to(array, (count, array.shape[-1])))
+    return np.ascontiguousarray(np.broadcast_to(array, (count,)))

@@ -1,0 +1,428 @@
+"""The recorder: model code run on symbols leaves a typed graph, with names, docstrings and source lines kept.
+
+    graph = record(lambda a, b: sqrt(a * a + b * b), a="float", b="float")
+    graph.evaluate(a=np.array([3.0]), b=np.array([4.0]))      # -> array([5.])
+
+A graph is a list of functions in order of definition, the entry last. A function is a straight line of
+`Node`s: no branches (`where` instead) and no loops (static loops unroll while recording). Calls of functions
+marked `@function` stay calls, so that a shader writer can give each its name, arguments and documentation.
+
+Types are "float", "bool", "vec2", "vec3" and "spectrum". Operators broadcast a float over the components of the
+others. A spectrum has as many channels as whoever evaluates the graph gives it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import GonioError
+
+_HERE = str(Path(__file__).parent)
+_SIZES = {"vec2": 2, "vec3": 3}
+_COMPONENTS = {"x": 0, "y": 1, "z": 2}
+
+
+class RecordingError(GonioError):
+    """Code that the recorder cannot follow; names the file and line."""
+
+
+def _source_line() -> str:
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+        frame = frame.f_back
+    return f"{frame.f_code.co_filename}:{frame.f_lineno}"
+
+
+class Node:
+    """One value in a recorded function: an operation, its arguments, its type and the line that wrote it."""
+
+    __slots__ = ("args", "function", "index", "op", "source", "static", "type")
+    __array_ufunc__ = None  # NumPy scalars on the left must defer to the operators below
+
+    def __init__(self, function: Function, op: str, type: str, args: tuple, static: Any = None) -> None:
+        self.function, self.op, self.type, self.args, self.static = function, op, type, args, static
+        self.source = _source_line()
+        self.index = len(function.nodes)
+        function.nodes.append(self)
+
+    def __repr__(self) -> str:
+        return f"%{self.index}:{self.type}={self.op}"
+
+    def __bool__(self) -> bool:
+        raise RecordingError(
+            "a Python `if`, `and`, `or` or `not` on a value", _source_line(), "use where(mask, a, b), &, | and ~"
+        )
+
+    def __getattr__(self, name: str) -> Node:
+        if name in _COMPONENTS and _COMPONENTS[name] < _SIZES.get(self.type, 0):
+            return emit("component", "float", self, static=_COMPONENTS[name])
+        raise AttributeError(f"a {self.type} has no '{name}'")
+
+    def __neg__(self) -> Node:
+        return emit("neg", self.type, self)
+
+    def __invert__(self) -> Node:
+        return emit("not", "bool", self)
+
+    def __add__(self, other: Any) -> Node:
+        return arithmetic("add", self, other)
+
+    def __radd__(self, other: Any) -> Node:
+        return arithmetic("add", other, self)
+
+    def __sub__(self, other: Any) -> Node:
+        return arithmetic("sub", self, other)
+
+    def __rsub__(self, other: Any) -> Node:
+        return arithmetic("sub", other, self)
+
+    def __mul__(self, other: Any) -> Node:
+        return arithmetic("mul", self, other)
+
+    def __rmul__(self, other: Any) -> Node:
+        return arithmetic("mul", other, self)
+
+    def __truediv__(self, other: Any) -> Node:
+        return arithmetic("div", self, other)
+
+    def __rtruediv__(self, other: Any) -> Node:
+        return arithmetic("div", other, self)
+
+    def __lt__(self, other: Any) -> Node:
+        return emit("lt", "bool", self, other)
+
+    def __le__(self, other: Any) -> Node:
+        return emit("le", "bool", self, other)
+
+    def __gt__(self, other: Any) -> Node:
+        return emit("gt", "bool", self, other)
+
+    def __ge__(self, other: Any) -> Node:
+        return emit("ge", "bool", self, other)
+
+    def __eq__(self, other: object) -> Node:  # type: ignore[override]
+        return emit("eq", "bool", self, other)
+
+    def __ne__(self, other: object) -> Node:  # type: ignore[override]
+        return emit("ne", "bool", self, other)
+
+    def __and__(self, other: Any) -> Node:
+        return emit("and", "bool", self, other)
+
+    __rand__ = __and__
+
+    def __or__(self, other: Any) -> Node:
+        return emit("or", "bool", self, other)
+
+    __ror__ = __or__
+    __hash__ = object.__hash__
+
+
+class Function:
+    """A recorded function.
+
+    name, doc, source  of the Python function it came from
+    parameters         name -> type, in order; "self.alpha" is the field `alpha` of the model
+    nodes              every value, in order of evaluation
+    result             the returned nodes, in the shape in which Python returned them (a tuple, a NamedTuple, a node)
+    """
+
+    def __init__(self, name: str, doc: str, source: str) -> None:
+        self.name, self.doc, self.source = name, doc, source
+        self.parameters: dict[str, str] = {}
+        self.nodes: list[Node] = []
+        self.result: Any = None
+
+    def parameter(self, name: str, type: str) -> Node:
+        self.parameters[name] = type
+        return Node(self, "parameter", type, (), static=name)
+
+
+class Graph:
+    """Recorded functions in order of definition; `entry` is the last."""
+
+    def __init__(self) -> None:
+        self.functions: list[Function] = []
+        self._known: dict[Any, Function] = {}
+
+    @property
+    def entry(self) -> Function:
+        return self.functions[-1]
+
+    def evaluate(self, **values: Any) -> Any:
+        """Run the graph on NumPy arrays in float64, as an independent reading of the same source.
+
+        values  by parameter name ("self.alpha" of a model as self_alpha); vectors and spectra component first,
+                shape (3, N), floats (N,) or numbers
+        Returns what the recorded function returned, in the same structure.
+        """
+        given = {name: np.asarray(value) for name, value in values.items()}
+        missing = [n for n in self.entry.parameters if n.replace(".", "_") not in given]
+        if missing:
+            raise RecordingError(f"no value for {', '.join(missing)}", self.entry.name)
+        with np.errstate(all="ignore"):
+            return _run(self.entry, [given[n.replace(".", "_")] for n in self.entry.parameters])
+
+
+_stack: list[tuple[Graph, Function]] = []
+
+
+def emit(op: str, type: str, *args: Any, static: Any = None) -> Node:
+    """Append one operation to the function that is being recorded."""
+    if not _stack:
+        raise RecordingError("a recorded value outlived its recording", _source_line())
+    function = _stack[-1][1]
+    for arg in args:
+        if isinstance(arg, Node) and arg.function is not function:
+            raise RecordingError(
+                f"a value of '{arg.function.name}' is used inside '{function.name}'",
+                _source_line(),
+                "pass it as an argument: a @function sees its arguments only",
+            )
+    return Node(function, op, type, args, static)
+
+
+def type_of(value: Any) -> str:
+    if isinstance(value, Node):
+        return value.type
+    if isinstance(value, bool | np.bool_):
+        return "bool"
+    if isinstance(value, int | float | np.number):
+        return "float"
+    raise RecordingError(f"a {type(value).__name__} inside recorded code", _source_line(), "numbers and nodes only")
+
+
+def widest(*values: Any) -> str:
+    """The type of an elementwise operation: floats broadcast over one wider type."""
+    types = {type_of(v) for v in values} - {"float"}
+    if len(types) > 1:
+        raise RecordingError(f"an operation mixes {' and '.join(sorted(types))}", _source_line())
+    return types.pop() if types else "float"
+
+
+def arithmetic(op: str, a: Any, b: Any) -> Node:
+    return emit(op, widest(a, b), a, b)
+
+
+# --------------------------------------------------------------------------- structured arguments and results
+
+
+def _flatten(value: Any, name: str) -> Iterator[tuple[str, Node]]:
+    """The nodes inside an argument (node, tuple, list, object with fields), each with its path."""
+    if isinstance(value, Node):
+        yield name, value
+    elif isinstance(value, tuple | list):
+        fields = getattr(value, "_fields", None) or [str(i) for i in range(len(value))]
+        for field, item in zip(fields, value, strict=True):
+            yield from _flatten(item, f"{name}.{field}")
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        for field in dataclasses.fields(value):
+            yield from _flatten(getattr(value, field.name), f"{name}.{field.name}")
+
+
+def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
+    """The same structure with each node replaced."""
+    if isinstance(value, Node):
+        return replace(value)
+    if isinstance(value, tuple | list):
+        items = [_rebuild(item, replace) for item in value]
+        return type(value)(*items) if hasattr(value, "_fields") else type(value)(items)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        clone = object.__new__(type(value))
+        clone.__dict__.update(value.__dict__)
+        for field in dataclasses.fields(value):
+            clone.__dict__[field.name] = _rebuild(getattr(value, field.name), replace)
+        return clone
+    return value
+
+
+def _static_key(value: Any) -> Any:
+    """What of an argument is not a node but shapes the recording: names, flags, classes and plain numbers."""
+    if isinstance(value, Node):
+        return value.type
+    if isinstance(value, tuple | list):
+        return tuple(_static_key(item) for item in value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = dataclasses.fields(value)
+        return (type(value), *(_static_key(getattr(value, f.name)) for f in fields))
+    try:
+        hash(value)
+    except TypeError:
+        return id(value)
+    return value
+
+
+def _define(graph: Graph, python_function: Callable, arguments: dict[str, Any], name: str) -> Function:
+    source = f"{python_function.__code__.co_filename}:{python_function.__code__.co_firstlineno}"
+    function = Function(name, inspect.getdoc(python_function) or "", source)
+    _stack.append((graph, function))
+    try:
+        inner = {}
+        for argument, value in arguments.items():
+            names = (path for path, _ in _flatten(value, argument))
+            inner[argument] = _rebuild(value, lambda node, names=names: function.parameter(next(names), node.type))
+        function.result = _rebuild_constants(python_function(**inner))
+    finally:
+        _stack.pop()
+    graph.functions.append(function)
+    return function
+
+
+def _rebuild_constants(result: Any) -> Any:
+    """Numbers that a function returns as they stand become nodes, so that a result is nodes only."""
+    if isinstance(result, bool | int | float | np.number):
+        return emit("constant", type_of(result), static=result)
+    if isinstance(result, tuple):
+        items = [_rebuild_constants(item) for item in result]
+        return type(result)(*items) if hasattr(result, "_fields") else tuple(items)
+    return result
+
+
+def call(python_function: Callable, args: tuple, kwargs: dict) -> Any:
+    """Record a call of a `@function`, defining it first where this combination of types is new."""
+    bound = inspect.signature(python_function).bind(*args, **kwargs)
+    bound.apply_defaults()
+    graph, _ = _stack[-1]
+    key = (python_function, *(_static_key(value) for value in bound.arguments.values()))
+    function = graph._known.get(key)
+    if function is None:
+        taken = {f.name for f in graph.functions} | {f.name for _, f in _stack}
+        stem = python_function.__name__.strip("_")
+        owner = bound.arguments.get("self")
+        if owner is not None:
+            stem = f"{type(owner).__name__}_{stem}"
+        name, count = stem, 1
+        while name in taken:
+            count += 1
+            name = f"{stem}_{count}"
+        function = graph._known[key] = _define(graph, python_function, dict(bound.arguments), name)
+    nodes = [node for argument, value in bound.arguments.items() for _, node in _flatten(value, argument)]
+    called = emit("call", "tuple", *nodes, static=function)
+    if isinstance(function.result, Node):
+        called.type = function.result.type
+        return called
+    counter = iter(range(10_000))
+    return _rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)))
+
+
+def recording(values: tuple) -> bool:
+    """Whether any of the arguments holds a node."""
+    return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
+
+
+def record(python_function: Callable, *, types: dict[str, str] | None = None, name: str = "", **more: Any) -> Graph:
+    """Record a function of named arguments.
+
+    types  argument name -> "float", "bool", "vec2", "vec3" or "spectrum"; or give them as keywords
+    more   arguments that are not symbols are handed over as they stand, objects with symbolic fields included
+    """
+    graph = Graph()
+    kinds = dict(types or {})
+    values = dict(more)
+    for argument, value in list(values.items()):
+        if value in ("float", "bool", "vec2", "vec3", "spectrum"):
+            kinds[argument] = values.pop(argument)
+    outer = Function("outer", "", "")
+    signature = inspect.signature(python_function)
+    arguments: dict[str, Any] = {}
+    for argument in signature.parameters:
+        if argument in kinds:
+            arguments[argument] = Node(outer, "parameter", kinds[argument], (), static=argument)
+        elif argument in values:
+            arguments[argument] = values[argument]
+    _define(graph, python_function, arguments, name or python_function.__name__.strip("_"))
+    return graph
+
+
+def symbol(kind: str) -> Node:
+    """A free-standing symbol, to be a field of an object that is handed to `record`."""
+    return Node(Function("outer", "", ""), "parameter", kind, ())
+
+
+# --------------------------------------------------------------------------- evaluation in NumPy
+
+
+def _erf(x: Any) -> np.ndarray:
+    return np.vectorize(math.erf, otypes=[float])(x)
+
+
+def _dot(a: Any, b: Any) -> np.ndarray:
+    return sum(a[i] * b[i] for i in range(len(a)))
+
+
+_NUMPY: dict[str, Callable] = {
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "div": np.divide,
+    "neg": np.negative,
+    "lt": np.less,
+    "le": np.less_equal,
+    "gt": np.greater,
+    "ge": np.greater_equal,
+    "eq": np.equal,
+    "ne": np.not_equal,
+    "and": np.logical_and,
+    "or": np.logical_or,
+    "not": np.logical_not,
+    "where": np.where,
+    "sqrt": np.sqrt,
+    "abs": np.abs,
+    "minimum": np.minimum,
+    "maximum": np.maximum,
+    "exp": np.exp,
+    "log": np.log,
+    "pow": np.power,
+    "sin": np.sin,
+    "cos": np.cos,
+    "atan2": np.arctan2,
+    "floor": np.floor,
+    "erf": _erf,
+    "copysign": np.copysign,
+    "isfinite": np.isfinite,
+    "dot": _dot,
+    "mean": lambda a: np.mean(a, axis=0),
+    "max_component": lambda a: np.max(a, axis=0),
+}
+
+
+def _run(function: Function, arguments: list) -> Any:
+    values: list[Any] = []
+    remaining = iter(arguments)
+
+    def get(arg: Any) -> Any:
+        return values[arg.index] if isinstance(arg, Node) else arg
+
+    for node in function.nodes:
+        args = [get(a) for a in node.args]
+        if node.op == "parameter":
+            values.append(next(remaining))
+        elif node.op == "constant":
+            values.append(np.asarray(node.static))
+        elif node.op == "component":
+            values.append(args[0][node.static])
+        elif node.op == "vector":
+            values.append(np.stack(np.broadcast_arrays(*[np.asarray(a, float) for a in args])))
+        elif node.op == "call":
+            values.append(_run(node.static, args))
+        elif node.op == "element":
+            values.append(list(_leaves(args[0]))[node.static])
+        else:
+            values.append(_NUMPY[node.op](*args))
+    return _rebuild(function.result, get)
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _leaves(item)
+    else:
+        yield value

@@ -1,0 +1,64 @@
+"""The local frame: +z is the shading normal, x the tangent; all directions are unit vectors that point away."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import ops
+from ..ops import dot, function, sqr, vec3
+
+
+def reflect(w: Any, m: Any) -> Any:
+    """w mirrored at the normal m: 2 (w.m) m - w."""
+    return m * (2.0 * dot(w, m)) - w
+
+
+def mirror(w: Any) -> Any:
+    """w mirrored at the surface normal z."""
+    return vec3(-w.x, -w.y, w.z)
+
+
+@function
+def refract(w: Any, m: Any, cos_t: Any, eta: Any) -> Any:
+    """w refracted at the normal m (on w's side): Snell's law, eta sin t_t = sin t_w.
+
+    cos_t  cosine of the transmitted direction, positive, from `fresnel.cos_transmitted`
+    eta    index on the far side over index on w's side
+    """
+    return m * (dot(w, m) / eta - cos_t) - w * (1.0 / eta)
+
+
+def upright(like: Any) -> Any:
+    """The surface normal, one for every ray of `like`."""
+    zero = 0.0 * like.z
+    return vec3(zero, zero, 1.0 + zero)
+
+
+def rotate(w: Any, rotation: Any) -> Any:
+    """w in a frame that is turned about z by an angle given as the vector (cos, sin); None is no rotation at all."""
+    if rotation is None:
+        return w
+    return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
+
+
+def rotate_back(w: Any, rotation: Any) -> Any:
+    """The inverse of `rotate`."""
+    if rotation is None:
+        return w
+    return vec3(rotation.x * w.x - rotation.y * w.y, rotation.x * w.y + rotation.y * w.x, w.z)
+
+
+def sin2(w: Any) -> Any:
+    """Squared sine of the angle to the normal, from x and y: 1 - z^2 would cancel near the normal."""
+    return sqr(w.x) + sqr(w.y)
+
+
+def half_vector(wo: Any, wi: Any) -> Any:
+    """Normal of the facet that mirrors wo into wi, unit; z where wo = -wi, which no facet above does."""
+    h = wo + wi
+    length2 = dot(h, h)
+    return h * (1.0 / ops.sqrt(ops.maximum(length2, TINY)))
+
+
+# The smallest normal float32 is 1.2e-38; its root, squared again, must not vanish in a quotient.
+TINY = 1e-30

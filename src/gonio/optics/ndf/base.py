@@ -1,0 +1,61 @@
+"""What every distribution of normals offers; a member must give D, Lambda and `sample`, all else has a default."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from ...ops import abs, dot, maximum, safe_div
+
+
+class NDF:
+    """Distribution of microfacet normals with widths alpha = (alpha_x, alpha_y).
+
+    All methods take unit vectors of the local frame. m lies above the surface (m.z > 0); a direction v may lie on
+    either side, Smith's terms depend on |v.z|.
+    """
+
+    name: ClassVar[str] = ""
+
+    def D(self, m: Any, alpha: Any) -> Any:
+        """Density of normals, 1/sr: its integral over D(m) m.z is 1."""
+        raise NotImplementedError
+
+    def Lambda(self, v: Any, alpha: Any) -> Any:
+        """Smith's Lambda, exact: masked over visible projected area (Heitz2014)."""
+        raise NotImplementedError
+
+    def G1(self, v: Any, alpha: Any) -> Any:
+        """Smith's masking of one direction, 1 / (1 + Lambda)."""
+        return 1.0 / (1.0 + self.Lambda(v, alpha))
+
+    def G1_customary(self, v: Any, alpha: Any) -> Any:
+        """G1 as `smith-separable` means it; the exact one unless the field customarily uses a fit."""
+        return self.G1(v, alpha)
+
+    def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A normal with density D(m) m.z."""
+        raise NotImplementedError
+
+    def pdf(self, m: Any, alpha: Any) -> Any:
+        """Density of `sample`, D(m) m.z."""
+        return self.D(m, alpha) * maximum(m.z, 0.0)
+
+    def sample_visible(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A normal as v (v.z >= 0) sees them; without a routine of its own, all normals instead."""
+        return self.sample(u1, u2, alpha)
+
+    def pdf_visible(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of `sample_visible`."""
+        return self.pdf(m, alpha)
+
+    def visible_density(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of visible normals, G1(v) |v.m| D(m) / |v.z| (Heitz2014b)."""
+        return safe_div(self.G1(v, alpha) * abs(dot(v, m)) * self.D(m, alpha), abs(v.z))
+
+    def sample_bounded(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A visible normal whose reflection is less likely to fall below the surface; else `sample_visible`."""
+        return self.sample_visible(v, u1, u2, alpha)
+
+    def pdf_bounded(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of `sample_bounded`."""
+        return self.pdf_visible(v, m, alpha)

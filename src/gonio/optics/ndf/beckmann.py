@@ -1,0 +1,104 @@
+"""Beckmann: Gaussian slopes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ... import ops
+from ...ops import abs, clamp, erf, exp, function, log, maximum, minimum, normalize, safe_sqrt, sincos, sqr, sqrt, vec3, where
+from ..special import erfinv
+from .base import NDF
+from .ggx import slant2
+
+_INV_SQRT_PI = ops.pi**-0.5
+
+
+class Beckmann(NDF):
+    """D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4) (Heitz2014; isotropic: Walter2007, eq. 25)."""
+
+    name = "beckmann"
+
+    @function
+    def D(self, m: Any, alpha: Any) -> Any:
+        """Beckmann density of normals, 1/sr."""
+        z2 = sqr(m.z)
+        # tan^2 / alpha^2 over 80 leaves exp under 2e-35: the floor keeps z^4 from vanishing in float32
+        z2 = maximum(z2, 1e-9)
+        exponent = (sqr(m.x / alpha.x) + sqr(m.y / alpha.y)) / z2
+        return where(m.z > 0.0, exp(-exponent) / (ops.pi * alpha.x * alpha.y * sqr(z2)), 0.0)
+
+    def _cotangent(self, v: Any, alpha: Any) -> Any:
+        """|v.z| / slant = 1 / (alpha tan), held below 1e9."""
+        return abs(v.z) / maximum(sqrt(slant2(v, alpha)), 1e-9)
+
+    @function
+    def Lambda(self, v: Any, alpha: Any) -> Any:
+        """(erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), a = 1 / (alpha tan) (Heitz2014; Walter2007, sec. 5.2, for G1)."""
+        a = maximum(self._cotangent(v, alpha), 1e-15)
+        return maximum(0.5 * (erf(a) - 1.0) + exp(-sqr(a)) * (0.5 * _INV_SQRT_PI) / a, 0.0)
+
+    @function
+    def G1_customary(self, v: Any, alpha: Any) -> Any:
+        """Rational fit of G1 for a = 1 / (alpha tan) < 1.6, else 1 (Walter2007, eq. 27; course sheet, eq. 8)."""
+        a = self._cotangent(v, alpha)
+        fit = a * (3.535 + 2.181 * a) / (1.0 + a * (2.276 + 2.577 * a))
+        return where(a < 1.6, fit, 1.0)
+
+    @function
+    def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A normal with density D(m) m.z: Gaussian slopes by Box-Muller (Walter2007, eq. 28)."""
+        r = safe_sqrt(-log(1.0 - u1))
+        s, c = sincos((2.0 * ops.pi) * u2)
+        return normalize(vec3(r * c * alpha.x, r * s * alpha.y, 1.0 + 0.0 * r))
+
+    @function
+    def sample_visible(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A visible normal: slopes of the unit Gaussian as seen from the stretched v (Heitz2014b, sec. 3 and 5).
+
+        Along v the slope x has the cumulated density c(x) ~ (1 + erf x) / 2 + tan exp(-x^2) / (2 sqrt(pi)) up to
+        x = cot; Newton's method in b = erf x, where its derivative is (1 - x tan) / 2, held by a bracket (Jakob2014).
+        Across v the slope is Gaussian.
+        """
+        stretched = normalize(vec3(alpha.x * v.x, alpha.y * v.y, v.z))
+        sin_v = sqrt(sqr(stretched.x) + sqr(stretched.y))
+        cos_v = maximum(stretched.z, 1e-6)
+        tan_v = sin_v / cos_v
+        upright = sin_v < 1e-6
+        cos_phi = where(upright, 1.0, stretched.x / where(upright, 1.0, sin_v))
+        sin_phi = where(upright, 0.0, stretched.y / where(upright, 1.0, sin_v))
+
+        # the slope is below cot; erf(4) is 1 within float32
+        cot = minimum(1.0 / maximum(tan_v, 1e-6), 4.0)
+        high = erf(cot)
+        low = -0.99999988 + 0.0 * high
+        total = 0.5 * (1.0 + high) + tan_v * exp(-sqr(cot)) * (0.5 * _INV_SQRT_PI)
+        target = u1 * total
+        # start where the normalized c would be linear in an angle: Jakob2014's observation, in our own fit
+        b = clamp(2.0 * u1 * (0.5 + 0.5 * high) - 1.0, low, high)
+        for _ in range(7):
+            x = erfinv(b)
+            excess = 0.5 * (1.0 + b) + tan_v * exp(-sqr(x)) * (0.5 * _INV_SQRT_PI) - target
+            low = where(excess < 0.0, b, low)
+            high = where(excess < 0.0, high, b)
+            step = b - excess / maximum(0.5 * (1.0 - x * tan_v), 1e-4)
+            # the step moves toward the root; past the far end of the bracket it is replaced by bisection
+            inside = where(excess < 0.0, step - high, low - step) < 0.0
+            b = where(inside, step, 0.5 * (low + high))
+        slope_x = self._polish(erfinv(b), tan_v, target)
+        slope_y = self._polish(erfinv(clamp(2.0 * u2 - 1.0, -0.99999988, 0.99999988)), 0.0 * u2, u2)
+        x = (cos_phi * slope_x - sin_phi * slope_y) * alpha.x
+        y = (sin_phi * slope_x + cos_phi * slope_y) * alpha.y
+        return normalize(vec3(-x, -y, 1.0 + 0.0 * x))
+
+    @function
+    def _polish(self, x: Any, tan_v: Any, target: Any) -> Any:
+        """One step of Newton's method in x on c(x) = target: takes the 3e-7 of `erfinv` out of the float64 twin."""
+        gauss = exp(-sqr(x)) * _INV_SQRT_PI
+        excess = 0.5 * (1.0 + erf(x)) + 0.5 * tan_v * gauss - target
+        slope = gauss * (1.0 - x * tan_v)
+        # far in the tail and at the cot, where c is flat, the step is all rounding
+        return where(slope > 1e-3, x - excess / maximum(slope, 1e-3), x)
+
+    def pdf_visible(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of visible normals."""
+        return self.visible_density(v, m, alpha)

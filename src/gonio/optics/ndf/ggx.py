@@ -1,0 +1,88 @@
+"""GGX (Trowbridge-Reitz)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ... import ops
+from ...ops import abs, clamp, dot, function, maximum, minimum, normalize, safe_div, safe_sqrt, sincos, sqr, sqrt, vec3, where
+from ..frame import sin2
+from .base import NDF
+
+
+def slant2(v: Any, alpha: Any) -> Any:
+    """(alpha_x v_x)^2 + (alpha_y v_y)^2: squared sine, stretched by the widths."""
+    return sqr(alpha.x * v.x) + sqr(alpha.y * v.y)
+
+
+class GGX(NDF):
+    """D = 1 / (pi alpha_x alpha_y (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2 + m_z^2)^2) (isotropic: Walter2007, eq. 33)."""
+
+    name = "ggx"
+
+    @function
+    def D(self, m: Any, alpha: Any) -> Any:
+        """GGX density of normals, 1/sr. Written in m_x, m_y: the form in m_z alone cancels at the peak."""
+        stretched = sqr(m.x / alpha.x) + sqr(m.y / alpha.y) + sqr(m.z)
+        return where(m.z > 0.0, 1.0 / (ops.pi * alpha.x * alpha.y * sqr(stretched)), 0.0)
+
+    @function
+    def Lambda(self, v: Any, alpha: Any) -> Any:
+        """(-1 + sqrt(1 + alpha^2 tan^2)) / 2 (Heitz2014, eq. 72), as t / (2 (1 + sqrt(1 + t))): no cancellation."""
+        t = slant2(v, alpha) / maximum(sqr(v.z), 1e-30)
+        return 0.5 * t / (1.0 + sqrt(1.0 + t))
+
+    @function
+    def G1(self, v: Any, alpha: Any) -> Any:
+        """2 |v.z| / (|v.z| + sqrt(v.z^2 + slant^2)) (Walter2007, eq. 34), without a tangent."""
+        z = abs(v.z)
+        return safe_div(2.0 * z, z + sqrt(sqr(z) + slant2(v, alpha)))
+
+    @function
+    def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A normal with density D(m) m.z: a disk's slopes, stretched (Walter2007, eq. 35)."""
+        r = sqrt(u1 / (1.0 - u1))
+        s, c = sincos((2.0 * ops.pi) * u2)
+        return normalize(vec3(r * c * alpha.x, r * s * alpha.y, 1.0 + 0.0 * r))
+
+    @function
+    def sample_visible(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A visible normal: the half vector with a uniform point of a spherical cap (Dupuy2023)."""
+        stretched = normalize(vec3(alpha.x * v.x, alpha.y * v.y, v.z))
+        return self._from_cap(stretched, stretched.z, u1, u2, alpha)
+
+    def _from_cap(self, stretched: Any, depth: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+        # the cap reaches down to z = -depth
+        z = (1.0 - u2) * (1.0 + depth) - depth
+        r = safe_sqrt((1.0 - z) * (1.0 + z))
+        s, c = sincos((2.0 * ops.pi) * u1)
+        h = vec3(r * c + stretched.x, r * s + stretched.y, z + stretched.z)
+        # grazing view and the lowest point of the cap add up to zero length; any facet upright then
+        return normalize(vec3(alpha.x * h.x, alpha.y * h.y, maximum(h.z, 1e-12)))
+
+    @function
+    def pdf_visible(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of visible normals, G1 |v.m| D / |v.z|, with |v.z| cancelled: finite at grazing."""
+        z = abs(v.z)
+        return 2.0 * abs(dot(v, m)) * self.D(m, alpha) / maximum(z + sqrt(sqr(z) + slant2(v, alpha)), 1e-30)
+
+    @function
+    def sample_bounded(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
+        """A visible normal from the part of the cap whose reflections can lie above the surface (Eto2023)."""
+        stretched = normalize(vec3(alpha.x * v.x, alpha.y * v.y, v.z))
+        return self._from_cap(stretched, self._bound(v, alpha) * stretched.z, u1, u2, alpha)
+
+    @function
+    def pdf_bounded(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of `sample_bounded`: 2 |v.m| D / (k |v.z| + sqrt(v.z^2 + slant^2)) (Eto2023)."""
+        z = abs(v.z)
+        length = sqrt(sqr(z) + slant2(v, alpha))
+        return 2.0 * abs(dot(v, m)) * self.D(m, alpha) / maximum(self._bound(v, alpha) * z + length, 1e-30)
+
+    def _bound(self, v: Any, alpha: Any) -> Any:
+        """k: how far the cap reaches down, as a share of the full depth (Eto2023)."""
+        a2 = sqr(clamp(minimum(alpha.x, alpha.y), 0.0, 1.0))
+        s2 = sqr(1.0 + sqrt(sin2(v)))
+        return (1.0 - a2) * s2 / (s2 + a2 * sqr(v.z))
+
+

@@ -1,0 +1,57 @@
+"""Special functions that the optics needs, built from the vocabulary alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import ops
+from ..ops import exp, function, log, sqr, sqrt, where
+
+# Giles2010, the single-precision polynomial: coefficients in falling powers.
+_CENTRE = (2.81022636e-08, 3.43273939e-07, -3.5233877e-06, -4.39150654e-06, 0.00021858087)
+_CENTRE += (-0.00125372503, -0.00417768164, 0.246640727, 1.50140941)
+_TAIL = (-0.000200214257, 0.000100950558, 0.00134934322, -0.00367342844, 0.00573950773)
+_TAIL += (-0.0076224613, 0.00943887047, 1.00167406, 2.83297682)
+
+
+@function
+def erfinv(x: Any) -> Any:
+    """Inverse error function on (-1, 1): Giles2010's polynomial, relative error about 4e-7."""
+    w = -log((1.0 - x) * (1.0 + x))
+    centre = w < 5.0
+    t = where(centre, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
+    value = where(centre, _CENTRE[0], _TAIL[0])
+    for a, b in zip(_CENTRE[1:], _TAIL[1:], strict=True):
+        value = value * t + where(centre, a, b)
+    return value * x
+
+
+def _log1p(x: Any) -> Any:
+    """log(1 + x), accurate for small x, by the quotient that cancels the rounding of 1 + x (Kahan)."""
+    u = 1.0 + x
+    same = u == 1.0
+    return where(same, x, log(u) * x / where(same, 1.0, u - 1.0))
+
+
+def _stirling(x: Any) -> Any:
+    """The series of log Gamma beyond its leading terms; the next term is under 2e-9 at x = 4."""
+    r = 1.0 / x
+    r2 = sqr(r)
+    return r * (1 / 12 - r2 * (1 / 360 - r2 * (1 / 1260 - r2 * (1 / 1680 - r2 * (1 / 1188)))))
+
+
+@function
+def beta(a: Any, b: Any) -> Any:
+    """Euler's beta function B(a, b) for a, b >= 1, without the cancellation of three log-gammas.
+
+    Both arguments are moved up by three with B(a, b) = B(a + 1, b) (a + b) / a, then Stirling's series is taken with
+    its leading terms joined into ratios. Relative error under 1e-8 in float64, about 1e-6 in float32.
+    """
+    ratio: Any = 1.0
+    s = a + b
+    for j in range(3):
+        ratio = ratio * ((s + (2.0 * j)) * (s + (2.0 * j + 1.0))) / ((a + float(j)) * (b + float(j)))
+    a3, b3 = a + 3.0, b + 3.0
+    s3 = a3 + b3
+    leading = (a3 - 0.5) * _log1p(-b3 / s3) + (b3 - 0.5) * _log1p(-a3 / s3) - 0.5 * log(s3 * (0.5 * ops.inv_pi))
+    return ratio * exp(leading + _stirling(a3) + _stirling(b3) - _stirling(s3))

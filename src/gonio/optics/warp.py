@@ -1,0 +1,35 @@
+"""Maps from the unit square to directions, each with its density."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import ops
+from ..ops import function, safe_sqrt, sincos, vec3
+
+
+@function
+def square_to_cosine_hemisphere(u1: Any, u2: Any) -> Any:
+    """A direction with density cos(theta) / pi about +z; Malley's method (PBRT4)."""
+    r = ops.sqrt(u1)
+    s, c = sincos((2.0 * ops.pi) * u2)
+    return vec3(r * c, r * s, safe_sqrt(1.0 - u1))
+
+
+def square_to_cosine_hemisphere_pdf(w: Any) -> Any:
+    """cos(theta) / pi above the horizon, 0 below; 1/sr."""
+    return ops.maximum(w.z, 0.0) * ops.inv_pi
+
+
+@function
+def square_to_power_lobe(u1: Any, u2: Any, p: Any) -> Any:
+    """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994)."""
+    cos_theta = ops.pow(1.0 - u1, 1.0 / (p + 1.0))
+    sin_theta = safe_sqrt(1.0 - cos_theta * cos_theta)
+    s, c = sincos((2.0 * ops.pi) * u2)
+    return vec3(sin_theta * c, sin_theta * s, cos_theta)
+
+
+def square_to_power_lobe_pdf(cos_theta: Any, p: Any) -> Any:
+    """(p + 1) / (2 pi) cos(theta)^p above, 0 below; 1/sr."""
+    return (p + 1.0) * (0.5 * ops.inv_pi) * ops.pow(cos_theta, p)
