@@ -1,0 +1,13 @@
+"""Scenes: the lab's JSON and Gonio's additions to it, validated, and built for Mitsuba.
+
+    from gonio.render import engine, scene
+    description = scene.read("examples/phong")
+    mitsuba_scene = scene.build(description, engine.load())
+"""
+
+from __future__ import annotations
+
+from .reader import read
+from .schema import SceneDescription, json_schema
+
+__all__ = ["SceneDescription", "json_schema", "read"]

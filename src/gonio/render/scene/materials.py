@@ -1,0 +1,295 @@
+"""The materials of a scene file, made from what the models declare about themselves.
+
+Two families share the `type` key. The lab's six types keep the lab's keys, meaning and defaults (`LAB`); every model
+of `gonio.models` can be named too, with its own parameters and defaults: as `gonio-conductor`, and without the
+prefix where the lab does not use the name. A new model file needs no change here.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, Union
+
+from pydantic import AfterValidator, Field, Strict, create_model, model_validator
+
+from ...errors import GonioWarning, InputError
+from ...models import BSDF, Parameter, models
+from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
+
+
+@dataclass(frozen=True)
+class LabType:
+    """How a type of the lab's format maps onto a model.
+
+    renamed   the lab's key -> the parameter it sets, value unchanged
+    defaults  parameters whose default in the lab differs from the model's
+    required  keys that the lab insists on
+    ignored   keys that are accepted without effect
+    """
+
+    model: str
+    doc: str
+    renamed: dict[str, str] = field(default_factory=dict)
+    defaults: dict[str, Any] = field(default_factory=dict)
+    required: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+
+_LAB_MICROFACETS = {"ndf": "beckmann", "masking": "smith-separable", "fresnel": "schlick"}
+LAB = {
+    "matte": LabType("lambert", "Ideal diffuse reflection.", defaults={"albedo": 0.5}),
+    "mirror": LabType("mirror", "Ideal mirror; it reflects 1 whatever `albedo` says.", ignored=("albedo",)),
+    "phong": LabType("phong", "kd cos_i + ks (v.r)^p, as the lab sheet's eq. 1.", required=("p",)),
+    "oren-nayar": LabType(
+        "oren-nayar", "Oren-Nayar; `roughness` is sigma as it stands.", {"roughness": "sigma"}, required=("roughness",)
+    ),
+    "conductor": LabType(
+        "conductor",
+        "Rough metal; `roughness` is alpha itself, not squared. Beckmann, separable Smith, Schlick unless said.",
+        {"roughness": "alpha"},
+        _LAB_MICROFACETS,
+        required=("roughness",),
+    ),
+    "dielectric": LabType(
+        "dielectric",
+        "Rough glass; `roughness` is alpha itself, not squared. Beckmann, separable Smith, Schlick unless said.",
+        {"roughness": "alpha"},
+        _LAB_MICROFACETS,
+        required=("roughness",),
+    ),
+}
+
+
+class Argument(NamedTuple):
+    """A parameter's value in a scene. `key` is its key in the file; `squared`: the parameter is the value's square."""
+
+    value: Any
+    key: str
+    squared: bool = False
+
+
+class MaterialPart(Part):
+    """What all materials share; the subclasses are made by `_declare`."""
+
+    type: str
+    normalmap: NormalMap | None = None
+    """Normals from an image."""
+    two_sided: Annotated[bool, Strict()] | None = None
+    """Whether both sides reflect alike; by default all materials do that let no light through."""
+
+    model: ClassVar[type[BSDF]]
+    declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
+    dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
+    lab: ClassVar[LabType | None]
+
+    def get(self, key: str) -> Any:
+        return getattr(self, _attribute(key))
+
+    def arguments(self) -> dict[str, Argument]:
+        """Parameter name -> value, for all that the file gives and all that the lab fixes."""
+        found: dict[str, Argument] = {}
+        if self.lab:
+            found.update({name: Argument(value, name) for name, value in self.lab.defaults.items()})
+        for key, parameter in self.declared.items():
+            if (value := self.get(key)) is not None:
+                found[parameter.name] = Argument(value, key)
+        for dial, width in self.dials.items():
+            if (value := self.get(dial)) is not None:
+                found[width] = Argument(value, dial, squared=True)
+        return found
+
+    @property
+    def preset(self) -> str | None:
+        return getattr(self, _attribute("preset"), None)
+
+    def children(self) -> Iterator[tuple[str, MaterialPart]]:
+        for key in self.declared:
+            if isinstance(value := self.get(key), MaterialPart):
+                yield key, value
+
+    def instance(self) -> BSDF:
+        """The model with this material's values; a textured parameter keeps its default.
+
+        Raises InputError where the model refuses a combination (a two-sided glass).
+        """
+        parameters = self.model.parameters()
+        values: dict[str, Any] = {}
+        for name, (value, _, squared) in self.arguments().items():
+            if isinstance(value, MaterialPart):
+                values[name] = value.instance()
+            elif isinstance(value, (bool, str)):
+                values[name] = value
+            elif not any(isinstance(item, ImageTexture) for item in _items(value)):
+                numbers = [item**2 if squared else item for item in _items(value)]
+                values[name] = tuple(numbers) if isinstance(value, (list, tuple)) else numbers[0]
+        for name, parameter in parameters.items():
+            if parameter.required and name not in values:
+                values[name] = min(max(0.5, parameter.low), parameter.high)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", GonioWarning)  # `reader` has its own, with their place in the file
+            return self.model(**values)
+
+    @property
+    def transmits(self) -> bool:
+        """Whether light passes through to the other side."""
+        return bool(self.instance().transmits)
+
+    @model_validator(mode="after")
+    def _one_spelling(self) -> MaterialPart:
+        spellings: dict[str, list[str]] = {}
+        for key, parameter in self.declared.items():
+            spellings.setdefault(parameter.name, []).append(key)
+        for dial, width in self.dials.items():
+            spellings.setdefault(width, []).append(dial)
+        for name, keys in spellings.items():
+            given = [key for key in keys if self.get(key) is not None]
+            if len(given) > 1:
+                raise invalid(
+                    f"both '{given[0]}' and '{given[1]}' are given", f"they set the same {name}; keep one", given[1]
+                )
+            needed = self.lab and any(key in self.lab.required for key in keys)
+            if needed and not given:
+                raise invalid(f"key '{self.lab.required[0]}' is missing", f"give one of {', '.join(keys)}")
+        self._check_preset()
+        return self
+
+    def _check_preset(self) -> None:
+        if self.preset is None:
+            return
+        taken = [key for key in ("eta", "k") if key in self.declared and self.get(key) is not None]
+        if taken:
+            raise invalid(f"both 'preset' and '{taken[0]}' are given", "a preset sets the index; keep one", "preset")
+        try:
+            self.model.preset(self.preset)  # type: ignore[attr-defined]
+        except InputError as error:
+            raise invalid(error.what, error.hint, "preset") from None
+
+
+def _attribute(key: str) -> str:
+    # A prefix keeps a model's parameter from hiding a method of pydantic's (`copy`, `json`) or of ours.
+    return f"value_{key}"
+
+
+_KINDS: dict[str, Any] = {
+    "float": Scalar,
+    "angle": Scalar,
+    "spectrum": Colour,
+    "alpha": Width,
+    "flag": Annotated[bool, Strict()],
+    "bsdf": ForwardRef("Material"),
+}
+
+
+def numbers_in(value: Any) -> Iterator[float]:
+    """The plain numbers of a value: itself, a colour's channels, a pair's widths."""
+    if isinstance(value, (list, tuple)):
+        for item in value:
+            yield from numbers_in(item)
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        yield float(value)
+
+
+def _items(value: Any) -> tuple[Any, ...]:
+    return tuple(value) if isinstance(value, (list, tuple)) else (value,)
+
+
+def _in_range(parameter: Parameter, key: str) -> Callable[[Any], Any]:
+    def check(value: Any) -> Any:
+        for number in numbers_in(value):
+            if number < parameter.low or (number > parameter.high and not parameter.soft_high):
+                raise invalid(f"{number:g} is out of range: {key} is {parameter.range}", _doc(parameter))
+        return value
+
+    return check
+
+
+def _doc(parameter: Parameter) -> str:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    return f"{parameter.name}: {parameter.doc}{unit}"
+
+
+def _field(parameter: Parameter, key: str, required: bool, doc: str = "") -> tuple[Any, Any]:
+    if parameter.kind == "choice":
+        kind: Any = Literal[tuple(parameter.choices)]
+    else:
+        kind = Annotated[_KINDS[parameter.kind], AfterValidator(_in_range(parameter, key))]
+    doc = doc or f"{parameter.doc} ({parameter.range})"
+    # JSON Schema's minimum and maximum hold for numbers only, so they do no harm beside lists and textures.
+    limits = {"minimum": parameter.low, "maximum": math.inf if parameter.soft_high else parameter.high}
+    extra: dict[str, Any] = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
+    if required:
+        return kind, Field(alias=key, description=doc, json_schema_extra=extra)
+    return kind | None, Field(None, alias=key, description=doc, json_schema_extra=extra)
+
+
+def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> type[MaterialPart]:
+    """The pydantic class of one material type."""
+    parameters = model.parameters()
+    declared = dict(parameters)
+    dials: dict[str, str] = {}
+    docs: dict[str, str] = {}
+    if lab:
+        declared = {key: p for key, p in declared.items() if key not in lab.ignored}
+        for key, name in lab.renamed.items():
+            declared[key] = parameters[name]
+            docs[key] = f"The same as {name} in the lab's format: {parameters[name].doc} ({parameters[name].range})"
+    else:
+        for name, parameter in parameters.items():
+            dial = name.replace("alpha", "roughness")
+            if parameter.kind == "alpha" and dial not in parameters:
+                dials[dial] = name
+                docs[dial] = f"The artist's dial in place of {name}: {name} = {dial}^2. Giving both is an error."
+    fields: dict[str, Any] = {"type": (Literal[names], Field(description=lab.doc if lab else _summary(model)))}
+    for key, parameter in declared.items():
+        # A lab key that has a second spelling is checked by `_one_spelling`, which knows both.
+        required = key in lab.required and key not in lab.renamed if lab else parameter.required
+        fields[_attribute(key)] = _field(parameter, key, required, docs.get(key, ""))
+    for dial, name in dials.items():
+        fields[_attribute(dial)] = _field(parameters[name], dial, False, docs[dial])
+    for key in lab.ignored if lab else ():
+        fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="Accepted and ignored."))
+    if hasattr(model, "preset"):
+        doc = "A named refractive index in place of the numbers, e.g. \"Au\"."
+        fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
+    title = "".join(word.capitalize() for word in names[0].split("-"))
+    cls = create_model(title, __base__=MaterialPart, __doc__=lab.doc if lab else _summary(model), **fields)
+    cls.model, cls.declared, cls.dials, cls.lab = model, declared, dials, lab
+    return cls
+
+
+def _summary(model: type[BSDF]) -> str:
+    return (model.__doc__ or model.__name__).strip().splitlines()[0]
+
+
+def _spellings(name: str) -> tuple[str, ...]:
+    """A model's names in a scene, with hyphens or underscores; the lab's own types come first."""
+    plain = () if name in LAB else (name,)
+    return tuple(dict.fromkeys(s for n in (*plain, f"gonio-{name}") for s in (n, n.replace("-", "_"))))
+
+
+def _all() -> list[type[MaterialPart]]:
+    known = models()
+    classes = [_declare((name,), known[lab.model], lab) for name, lab in LAB.items()]
+    return classes + [_declare(_spellings(name), model, None) for name, model in known.items()]
+
+
+MATERIALS = _all()
+BY_TYPE = {name: cls for cls in MATERIALS for name in cls.model_fields["type"].annotation.__args__}  # type: ignore
+
+if TYPE_CHECKING:
+    Material: TypeAlias = MaterialPart
+else:
+    Material = Annotated[Union[tuple(MATERIALS)], Field(discriminator="type")]  # noqa: UP007
+    for _cls in MATERIALS:
+        _cls.model_rebuild(_types_namespace={"Material": Material})
+
+
+def textures_in(material: MaterialPart) -> Iterator[tuple[str, ImageTexture]]:
+    """The images that a material names itself (not those of its children), by key."""
+    for key in type(material).keys():
+        value = material.get(key) if _attribute(key) in type(material).model_fields else None
+        if isinstance(value, ImageTexture):
+            yield key, value

@@ -1,0 +1,96 @@
+"""Setting values of a scene by path, as `gonio study --vary shapes.*.material.roughness=.1,.5` does.
+
+A path is a JSON pointer ("/scene/shapes/0/material/p") or dotted ("scene.shapes.0.material.p"); the leading `scene` may
+be left out, and `*` stands for every item. The value goes into the raw JSON, so that validation sees it as if it had
+been written in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ...errors import InputError, did_you_mean
+from .materials import BY_TYPE
+
+
+def apply(raw: dict[str, Any], overrides: Mapping[str, Any]) -> None:
+    """Set each path to its value, in place. Raises InputError where a path leads nowhere."""
+    for path, value in overrides.items():
+        _set(raw, path, value)
+
+
+def _set(raw: dict[str, Any], path: str, value: Any) -> None:
+    steps = _steps(raw, path)
+    holders = [raw]
+    for index, step in enumerate(steps[:-1]):
+        holders = [item for holder in holders for item in _below(holder, step, path, steps[:index], steps)]
+    last = steps[-1]
+    if last == "*":
+        for holder in holders:
+            for key in _keys(holder):
+                holder[key] = value
+        return
+    chosen = _that_take(holders, last) if "*" in steps else holders
+    if not chosen:
+        known = sorted({str(key) for holder in holders if isinstance(holder, dict) for key in holder})
+        raise InputError(f"nothing there has the key '{last}'", f"path {path}", did_you_mean(last, known))
+    for holder in chosen:
+        if isinstance(holder, dict):
+            holder[last] = value
+        else:
+            holder[_index(holder, last, path)] = value
+
+
+def _steps(raw: dict[str, Any], path: str) -> list[str]:
+    if path.startswith("/"):
+        steps = [step.replace("~1", "/").replace("~0", "~") for step in path[1:].split("/")]
+    else:
+        steps = path.split(".")
+    if not path.strip("/.") or "" in steps:
+        raise InputError("an empty path", f"path '{path}'", "write e.g. shapes.0.material.roughness")
+    if not path.startswith("/") and steps[0] in ("shapes", "lights", "acceleration"):
+        steps.insert(0, "scene")
+    return steps
+
+
+def _keys(holder: Any) -> list[Any]:
+    if isinstance(holder, dict):
+        return list(holder)
+    return list(range(len(holder))) if isinstance(holder, list) else []
+
+
+def _below(holder: Any, step: str, path: str, before: list[str], steps: list[str]) -> list[Any]:
+    """The values one step down; with a `*` before, holders without that key are passed over."""
+    if step == "*":
+        return [holder[key] for key in _keys(holder)]
+    if isinstance(holder, dict):
+        if step in holder:
+            return [holder[step]]
+        if "*" in before:
+            return []
+        known = list(holder) + (list(holder["scene"]) if "scene" in holder and isinstance(holder["scene"], dict) else [])
+        raise InputError(f"no key '{step}'", f"path {path}", did_you_mean(step, [str(key) for key in known]))
+    if isinstance(holder, list):
+        return [holder[_index(holder, step, path)]]
+    if "*" in before:
+        return []
+    raise InputError(f"'{'.'.join(before)}' holds nothing that could be named '{step}'", f"path {path}", "shorten it")
+
+
+def _index(holder: Any, step: str, path: str) -> int:
+    if not isinstance(holder, list):
+        raise InputError(f"nothing can be set below {holder!r}", f"path {path}", "shorten the path")
+    if not step.isascii() or not step.isdigit() or len(step) > 9 or int(step) >= len(holder):
+        hint = f"0 to {len(holder) - 1}, or *" if holder else "the list is empty"
+        raise InputError(f"no item '{step}' in a list of {len(holder)}", f"path {path}", hint)
+    return int(step)
+
+
+def _that_take(holders: list[Any], key: str) -> list[Any]:
+    """Of several objects, those that have the key; where none has it, those materials that know it."""
+    with_key = [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
+    if with_key:
+        return with_key
+    types = [(h, BY_TYPE.get(str(h.get("type")))) for h in holders if isinstance(h, dict)]
+    return [holder for holder, cls in types if cls and key in cls.keys()]

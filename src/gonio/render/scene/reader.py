@@ -1,0 +1,203 @@
+"""From a path to a validated scene: read the text, set overrides, validate, find the files it names."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ...errors import InputError, did_you_mean
+from . import overrides as override
+from .materials import MaterialPart, numbers_in
+from .schema import SceneDescription
+from .text import kind_of, pointer, read_json
+from .values import Part
+
+SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
+
+
+def read(
+    path: Path | str, *, allow_outside: bool = False, overrides: Mapping[str, Any] | None = None
+) -> SceneDescription:
+    """A scene from a folder with a scene.json, or from a .json file.
+
+    allow_outside  let textures and meshes lie outside the scene's folder
+    overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
+    Raises InputError for everything that is wrong with the file or with what it names.
+
+        description = read("scenes/phong", overrides={"shapes.*.material.roughness": 0.3})
+    """
+    file = _scene_file(Path(path))
+    raw = read_json(file)
+    if overrides:
+        override.apply(raw, copy.deepcopy(dict(overrides)))
+    try:
+        description = SceneDescription.model_validate(raw)
+    except ValidationError as error:
+        raise explain(error, raw, file) from None
+    description._path = file
+    description._allow_outside = allow_outside
+    description._raw = raw
+    _check_output(description)
+    for where, part in parts(description):
+        if (name := getattr(part, "file", None)) is not None:
+            description.locate(name, f"{where}/file")
+        if isinstance(part, MaterialPart):
+            _check_material(description, where, part)
+    return description
+
+
+def _scene_file(path: Path) -> Path:
+    try:
+        if path.is_dir():
+            file = path / "scene.json"
+            if not file.is_file():
+                others = sorted(p.name for p in path.glob("*.json"))
+                hint = f"name the file: {path / others[0]}" if others else "give a folder with a scene.json, or a .json file"
+                raise InputError("the folder has no scene.json", str(path), hint)
+            return file
+        if path.is_file():
+            return path
+        if path.exists():
+            raise InputError("neither a folder nor a file", str(path), "give a scene's folder or its .json file")
+        near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be opened: {error}", str(path), "check the path") from None
+    hint = did_you_mean(path.name, near[:200]) if near else "check the path"
+    raise InputError("no such file or folder", str(path), hint if hint.startswith("did") else "check the path")
+
+
+def _check_output(description: SceneDescription) -> None:
+    name = Path(description.output.filename)
+    if not description._allow_outside and (name.is_absolute() or ".." in name.parts or "\\" in str(name)):
+        raise InputError(
+            f"the picture '{name}' would be written outside the folder",
+            description.where("/output/filename"),
+            "give a plain file name, or use --allow-outside",
+        )
+
+
+def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> None:
+    for name, (value, key, _) in material.arguments().items():
+        parameter = material.model.parameters()[name]
+        if parameter.numeric and any(number > parameter.high for number in numbers_in(value)):
+            description._warnings.append(
+                f"{description.where(f'{where}/{key}')}: {name} over {parameter.high:g}: "
+                "the material gives back more light than it receives"
+            )
+    for key in material.lab.ignored if material.lab else ():
+        if material.get(key) is not None:
+            description._warnings.append(
+                f"{description.where(f'{where}/{key}')}: ignored, as in the lab; "
+                f"a 'gonio-{material.lab.model}' uses it"  # type: ignore[union-attr]
+            )
+    try:
+        material.instance()
+    except InputError as error:
+        raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
+
+
+def parts(part: Part, steps: str = "") -> Iterator[tuple[str, Any]]:
+    """Every object of a scene with its JSON pointer, parents first."""
+    yield steps, part
+    for name, field in type(part).model_fields.items():
+        value = getattr(part, name)
+        here = steps + pointer(field.alias or name)
+        if isinstance(value, Part):
+            yield from parts(value, here)
+        elif isinstance(value, (list, tuple)):
+            for index, item in enumerate(value):
+                if isinstance(item, Part):
+                    yield from parts(item, here + pointer(index))
+
+
+# ---------------------------------------------------------------------- pydantic's errors in our words
+
+
+def explain(error: ValidationError, raw: dict[str, Any], file: Path) -> InputError:
+    """The first error with place, expectation and hint; the next few in a line each."""
+    found: dict[str, tuple[str, str]] = {}
+    for detail in error.errors(include_url=False):
+        where, what, hint = _one(detail, raw)
+        found.setdefault(where, (what, hint))
+    (where, (what, hint)), *others = found.items()
+    lines = [what]
+    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: SHOWN - 1]]
+    if len(others) >= SHOWN:
+        lines.append(f"and {len(others) - SHOWN + 1} more")
+    return InputError("\n  ".join(lines), f"{file}#{where}", hint)
+
+
+def _one(detail: Any, raw: Any) -> tuple[str, str, str]:
+    """Pointer, what is wrong, and a hint, of one of pydantic's errors."""
+    kind, context = detail["type"], detail.get("ctx", {})
+    steps, value = _place(detail["loc"], raw, keep_last=kind == "missing")
+    got = kind_of(value)
+    more: tuple[str, ...] = ()
+    hint = "`gonio schema` lists every key"
+    if kind == "scene":
+        what, hint = context["what"], context["hint"]
+        more = (context["key"],) if context["key"] else ()
+    elif kind == "unknown_key":
+        what = f"unknown key '{context['key']}' of {context['of']}"
+        hint, more = did_you_mean(context["key"], context["known"]), (context["key"],)
+    elif kind == "missing":
+        *steps, last = steps
+        what = f"key '{last}' is missing"
+        hint = f"add \"{last}\""
+    elif kind == "expected":
+        what, hint = f"expected {detail['msg']}, got {got}", _unquote(value) or f"give {detail['msg']}"
+    elif kind == "union_tag_invalid":
+        tag, known = context["tag"], [item.strip(" '") for item in context["expected_tags"].split(",")]
+        what, hint, more = f"unknown type '{tag}'", did_you_mean(tag, known), ("type",)
+    elif kind == "union_tag_not_found":
+        what, hint = "key 'type' is missing", 'add "type": it says what this object is'
+    elif kind == "literal_error":
+        known = [item.strip(" '") for item in context["expected"].replace(" or ", ", ").split(",")]
+        what = f"expected {context['expected']}, got {got}"
+        hint = did_you_mean(value, known) if isinstance(value, str) else "one of the names listed"
+    elif kind in ("float_type", "int_type"):
+        what = f"expected a {'whole number' if kind == 'int_type' else 'number'}, got {got}"
+        hint = _unquote(value) or "give a number"
+    elif kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        sign = {"greater_than": ">", "greater_than_equal": ">=", "less_than": "<", "less_than_equal": "<="}[kind]
+        limit = next(context[name] for name in ("gt", "ge", "lt", "le") if name in context)
+        what, hint = f"expected a number {sign} {limit:g}, got {value}", f"give a number {sign} {limit:g}"
+    elif kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
+        what, hint = f"expected an object {{...}}, got {got}", "put it in { }"
+    elif kind == "list_type":
+        what, hint = f"expected a list [...], got {got}", "put it in [ ]"
+    elif kind == "bool_type":
+        what, hint = f"expected true or false, got {got}", "without quotes"
+    elif kind == "string_type":
+        what, hint = f"expected a string, got {got}", "put it in double quotes"
+    elif kind == "string_too_short":
+        what, hint = "expected a name, got an empty string", "give a file name"
+    else:
+        what = f"{detail['msg'][0].lower()}{detail['msg'][1:]}, got {got}"
+    return pointer(*steps, *more), what, hint
+
+
+def _unquote(value: Any) -> str:
+    try:
+        return f"write {float(value):g} without quotes" if isinstance(value, str) else ""
+    except ValueError:
+        return ""
+
+
+def _place(location: tuple[str | int, ...], raw: Any, keep_last: bool) -> tuple[list[str | int], Any]:
+    """The steps into the file and the value there. Pydantic's location also names the union's tags: dropped."""
+    steps: list[str | int] = []
+    value = raw
+    for index, step in enumerate(location):
+        if isinstance(value, dict) and step in value and not (step == value.get("type") and step != "type"):
+            value = value[step]
+        elif isinstance(value, list) and isinstance(step, int) and step < len(value):
+            value = value[step]
+        elif not (keep_last and index == len(location) - 1):
+            continue
+        steps.append(step)
+    return steps, value

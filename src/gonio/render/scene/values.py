@@ -1,0 +1,162 @@
+"""The smallest parts of a scene: numbers, vectors, colours, textures, and the base of every object in it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from .text import kind_of
+
+LARGEST = 1e18  # its square still fits a 32-bit float, so that lengths of vectors stay finite
+
+
+def invalid(what: str, hint: str, key: str = "") -> PydanticCustomError:
+    """An error for a validator to raise: `key` names the key of the object that is at fault."""
+    # Braces would be read as placeholders, hence the text goes in as one.
+    return PydanticCustomError("scene", "{what}", {"what": what, "hint": hint, "key": key})
+
+
+class Part(BaseModel):
+    """An object of the scene file: unknown keys are errors, values are not coerced, nothing changes afterwards."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, use_attribute_docstrings=True, protected_namespaces=(), hide_input_in_errors=True
+    )
+    article: ClassVar[str] = "this object"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            known = cls.keys()
+            for key in data:
+                if key not in known:
+                    raise PydanticCustomError(
+                        "unknown_key", "unknown key", {"key": key, "known": known, "of": cls.describe(data)}
+                    )
+        return data
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """The keys of this object as the file spells them."""
+        return [field.alias or name for name, field in cls.model_fields.items()]
+
+    @classmethod
+    def describe(cls, data: dict[str, Any]) -> str:
+        kind = data.get("type")
+        return f"'{kind}'" if isinstance(kind, str) else cls.__name__.lower()
+
+
+def _not_a_flag(value: Any) -> Any:
+    if isinstance(value, bool):  # Python counts True as 1
+        raise invalid(f"expected a number, got {kind_of(value)}", "give a number")
+    return value
+
+
+def _whole(value: Any) -> Any:
+    # JSON does not tell 8 from 8.0
+    return int(value) if isinstance(value, float) and value.is_integer() else _not_a_flag(value)
+
+
+def _bounded(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise invalid(f"{value:g} is too large", f"numbers go up to {LARGEST:g}, what 32-bit arithmetic can square")
+    return value
+
+
+Number = Annotated[float, Strict(), BeforeValidator(_not_a_flag), AfterValidator(_bounded)]
+Whole = Annotated[int, Strict(), BeforeValidator(_whole)]
+Positive = Annotated[Number, Field(gt=0)]
+NonNegative = Annotated[Number, Field(ge=0)]
+
+
+def _of_length(count: int, names: str) -> BeforeValidator:
+    def check(value: Any) -> Any:
+        if not isinstance(value, (list, tuple)) or len(value) != count:
+            raise invalid(f"expected {count} numbers {names}, got {kind_of(value)}", f"give {names}")
+        return value
+
+    return BeforeValidator(check)
+
+
+Vector = Annotated[tuple[Number, Number, Number], _of_length(3, "[x, y, z]")]
+Rgb = Annotated[tuple[Number, Number, Number], _of_length(3, "[r, g, b]")]
+Light = Annotated[tuple[NonNegative, NonNegative, NonNegative], _of_length(3, "[r, g, b]")]
+
+
+class ImageTexture(Part):
+    """An image over the surface's uv. v = 0 is the top of the image; 8-bit values count as v/255."""
+
+    type: Literal["imageTex"]
+    file: str = Field(min_length=1)
+    """Image beside the scene: .png, .jpg, .hdr, .exr, .bmp, .pfm, .ppm."""
+    color_space: Literal["raw", "srgb"] = Field("raw", alias="colorSpace")
+    """"srgb" decodes 8-bit values to linear light; "raw" (the lab's) takes them as they stand."""
+    filter: Literal["bilinear", "nearest"] = "bilinear"
+    """What lies between two texels."""
+    wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
+    """What lies outside [0, 1]."""
+
+
+class NormalMap(Part):
+    """An image of normals: 2c - 1 is (tangent, bitangent, normal); tangent = dp/du, bitangent = normal x tangent."""
+
+    type: Literal["imageTex"] = "imageTex"
+    file: str = Field(min_length=1)
+    """Image beside the scene."""
+
+
+def _kind_of_value(value: Any) -> str | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, (int, float)):
+        return "<number>"
+    if isinstance(value, (list, tuple)):
+        return "<list>"
+    return "<texture>" if isinstance(value, (dict, ImageTexture)) else None
+
+
+def _either(expected: str) -> Discriminator:
+    """Tell number, list and texture apart by what the value is. The tags stand in <> so that `reader` can drop them."""
+    return Discriminator(_kind_of_value, "expected", expected)
+
+
+Texture = Annotated[ImageTexture, Tag("<texture>")]
+Scalar = Annotated[
+    Annotated[Number, Tag("<number>")] | Texture,
+    _either("a number or a texture {type: imageTex, file}"),
+]
+Colour = Annotated[
+    Annotated[Number, Tag("<number>")] | Annotated[Rgb, Tag("<list>")] | Texture,
+    _either("[r, g, b], a number (grey) or a texture {type: imageTex, file}"),
+]
+Width = Annotated[
+    Annotated[Number, Tag("<number>")]
+    | Annotated[tuple[Scalar, Scalar], _of_length(2, "[along x, along y]"), Tag("<list>")]
+    | Texture,
+    _either("a number, two numbers [along x, along y] or a texture {type: imageTex, file}"),
+]
+Radiance = Annotated[
+    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")],
+    _either("[r, g, b] or a number (grey)"),
+]
+Sky = Annotated[
+    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Texture,
+    _either("a texture {type: imageTex, file} or [r, g, b]"),
+]
+
+def rgb(value: float | tuple[float, float, float]) -> list[float]:
+    """A colour as three values; a number is grey."""
+    return [float(value)] * 3 if isinstance(value, (int, float)) else [float(c) for c in value]
