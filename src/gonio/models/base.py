@@ -242,6 +242,10 @@ class BSDF:
         """Whether the lobes are delta distributions: "never", "always" or "maybe" (it depends on the ray)."""
         return "never"
 
+    def tint(self, wo: Any) -> Any:
+        """A colour for denoisers to tell materials apart by: near the albedo seen from wo, without noise."""
+        return getattr(self, "albedo", 1.0)
+
     # ------------------------------------------------------------------ from outside
 
     def f(self, wo: Any, wi: Any, mode: str = "radiance", precision: str | None = None) -> Any:

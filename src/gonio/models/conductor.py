@@ -73,6 +73,10 @@ class Conductor(BSDF):
         weight = self.reflectance(cos_m) * where(pdf > 0.0, facets, 0.0)
         return Sample(frame.rotate_back(wi, self.rotation), weight, pdf, smooth & above, 1.0 + 0.0 * pdf)
 
+    def tint(self, wo: Any) -> Any:
+        """F at the surface's own normal."""
+        return self.reflectance(abs(wo.z))
+
     @property
     def delta(self) -> str:
         return microfacet.delta(self.alpha)

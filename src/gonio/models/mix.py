@@ -40,6 +40,10 @@ class Mix(BSDF):
         delta_weight = where(pick_b, sb.weight, sa.weight)
         return Sample(wi, where(delta, delta_weight, density_weight), pdf, delta, where(pick_b, sb.eta, sa.eta))
 
+    def tint(self, wo: Any) -> Any:
+        """The average of both."""
+        return self.a.tint(wo) * (1.0 - self.weight) + self.b.tint(wo) * self.weight
+
     @property
     def transmits(self) -> bool:
         return self.a.transmits or self.b.transmits

@@ -80,6 +80,10 @@ class _Empirical(BSDF):
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
 
+    def tint(self, wo: Any) -> Any:
+        """The diffuse part's colour."""
+        return self.kd
+
     @property
     def ambient(self) -> Any:
         """Factor of the scene's ambient light."""

@@ -36,6 +36,10 @@ class TwoSided(BSDF):
         s = self.base.sample(_turned(wo, wo), u, mode)
         return Sample(_turned(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
 
+    def tint(self, wo: Any) -> Any:
+        """The base's."""
+        return self.base.tint(_turned(wo, wo))
+
     @property
     def delta(self) -> str:
         return self.base.delta

@@ -1,0 +1,23 @@
+"""Gonio's models as Mitsuba plugins.
+
+    import mitsuba as mi
+    mi.set_variant("llvm_ad_rgb")
+    import gonio.mitsuba
+    bsdf = mi.load_dict({"type": "gonio_conductor", "preset": "Au", "alpha": 0.2})
+
+The import sets a variant only where none is set, and registers again whenever the variant changes.
+"""
+
+from __future__ import annotations
+
+from .render import adapter, engine
+
+_mi = engine.load()
+adapter.register(_mi)
+
+
+def _variant_changed(old: str | None, new: str | None) -> None:
+    adapter.register(_mi)
+
+
+_mi.detail.add_variant_callback(_variant_changed)

@@ -1,0 +1,346 @@
+"""Every Gonio model as a Mitsuba plugin, by one generic adapter: `conductor` becomes `gonio_conductor`, and so on.
+
+Here alone the two conventions meet. Mitsuba names the viewer's direction `wi` and the sampled one `wo`; Gonio's `wo`
+is the viewer's. A plugin's properties carry the names of the model's parameters; a number or colour is held as an
+opaque value (a changed value compiles nothing), anything else is a texture that is looked up at each hit. Widths may be
+given as `alpha`, or as `alpha_x` and `alpha_y`. Every plugin takes two properties more: `two_sided` (shade both sides;
+no nested call as in Mitsuba's own `twosided`) and, where the model has presets, `preset`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from .. import ops
+from ..errors import InputError, did_you_mean
+from ..models import BSDF, Parameter, Sample, models
+from ..models.two_sided import TwoSided
+
+_registered: dict[str, type] = {}
+
+
+def plugin_name(model_name: str) -> str:
+    """Name of a model's plugin: "blinn-phong" is `gonio_blinn_phong`."""
+    return "gonio_" + model_name.replace("-", "_")
+
+
+def register(mi: ModuleType) -> None:
+    """Register every model with Mitsuba's current variant; once a variant, whatever the number of calls."""
+    variant = mi.variant()
+    if variant is None or variant.startswith("scalar"):
+        return  # Python plugins are written for arrays
+    if variant not in _registered:
+        _registered[variant] = _adapter_class(mi)
+    adapter = _registered[variant]
+    for name, model in models().items():
+        mi.register_bsdf(plugin_name(name), lambda props, model=model: adapter(props, model))
+
+
+class _Slot:
+    """Where a numeric parameter's value comes from: opaque values, or textures."""
+
+    def __init__(self, parameter: Parameter, values: dict[str, Any], textures: dict[str, Any]) -> None:
+        self.parameter, self.values, self.textures = parameter, values, textures
+
+
+def _adapter_class(mi: ModuleType) -> type:
+    import drjit as dr
+
+    def read(props: Any, model: type[BSDF], preset: Any, parameter: Parameter) -> tuple[_Slot, Any]:
+        """A parameter's slot, and a plain value that tells of its range (a texture: the whole range)."""
+        where = f"{plugin_name(model.name)}.{parameter.name}"
+        names = [parameter.name]
+        if parameter.kind == "alpha" and (props.has_property("alpha_x") or props.has_property("alpha_y")):
+            names = ["alpha_x", "alpha_y"]
+            if not all(props.has_property(name) for name in names) or props.has_property("alpha"):
+                raise InputError("give alpha, or both alpha_x and alpha_y", where)
+        values: dict[str, Any] = {}
+        textures: dict[str, Any] = {}
+        plain: list[Any] = []
+        for name in names:
+            if props.has_property(name):
+                given, value = props.type(name), None
+                if given in (mi.Properties.Type.Float, mi.Properties.Type.Integer):
+                    value = float(props[name])
+                elif given == mi.Properties.Type.Color:
+                    value = np.asarray(props[name], dtype=float).ravel()
+                elif given == mi.Properties.Type.String:
+                    raise InputError(f"'{props[name]}' given, a number or a texture expected", where)
+                if value is None or (parameter.kind == "spectrum" and mi.is_spectral and np.ndim(value)):
+                    textures[name] = props.get_unbounded_texture(name)
+                    plain.append(np.array([max(parameter.low, 0.0), min(parameter.high, 1.0)]))
+                    constant = constant_of(textures[name]) if parameter.kind == "spectrum" else None
+                    if constant is not None:
+                        values[name], plain[-1] = constant, np.asarray(constant).ravel()
+                        del textures[name]
+                    continue
+            elif preset is not None and hasattr(preset, name):
+                value = np.asarray(getattr(preset, name), dtype=float)
+                if value.ndim and mi.is_spectral:
+                    textures[name] = mi.load_dict({"type": "rgb", "value": value.tolist(), "unbounded": True})
+                    plain.append(value)
+                    continue
+                value = value if value.ndim else float(value)
+            else:
+                if parameter.required:
+                    raise InputError("missing", where, parameter.doc)
+                value = parameter.default
+            parameter.check(value if np.ndim(value) else float(value), where)
+            plain.append(value)
+            if parameter.kind == "angle" and value == 0:
+                continue  # no rotation at all
+            if parameter.kind == "spectrum":
+                values[name] = mi.Spectrum(*map(float, value)) if np.ndim(value) else mi.Spectrum(float(value))
+            else:
+                values[name] = mi.Float(float(value))
+            dr.make_opaque(values[name])
+        for name in textures:
+            props.mark_queried(name) if hasattr(props, "mark_queried") else None
+        return _Slot(parameter, values, textures), (tuple(plain) if len(plain) == 2 else plain[0])
+
+    def constant_of(texture: Any) -> Any:
+        """The opaque colour of a texture that is one colour everywhere, else None; spectra stay textures."""
+        if mi.is_spectral or mi.is_monochromatic or texture.is_spatially_varying():
+            return None
+        value = mi.Spectrum(texture.eval(dr.zeros(mi.SurfaceInteraction3f)))
+        dr.make_opaque(value)
+        return value
+
+    class Foreign:
+        """Another plugin's BSDF under Gonio's protocol, at one surface interaction."""
+
+        def __init__(self, bsdf: Any, si: Any, active: Any) -> None:
+            self.bsdf, self.si, self.active = bsdf, si, active
+
+        def _at(self, wo: Any, mode: str) -> tuple[Any, Any]:
+            si = mi.SurfaceInteraction3f(self.si)
+            si.wi = mi.Vector3f(wo)
+            return mi.BSDFContext(transport_mode(mode)), si
+
+        def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+            ctx, si = self._at(wo, mode)
+            return self.bsdf.eval(ctx, si, mi.Vector3f(wi), self.active)
+
+        def pdf(self, wo: Any, wi: Any) -> Any:
+            ctx, si = self._at(wo, "radiance")
+            return self.bsdf.pdf(ctx, si, mi.Vector3f(wi), self.active)
+
+        def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+            ctx, si = self._at(wo, mode)
+            bs, weight = self.bsdf.sample(ctx, si, u.x, mi.Point2f(u.y, u.z), self.active)
+            return Sample(bs.wo, weight, bs.pdf, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), bs.eta)
+
+        def tint(self, wo: Any) -> Any:
+            return self.bsdf.eval_diffuse_reflectance(self.si, self.active)
+
+    def transport_mode(mode: str) -> Any:
+        return mi.TransportMode.Radiance if mode == "radiance" else mi.TransportMode.Importance
+
+    def mode_of(ctx: Any) -> str:
+        return "radiance" if ctx.mode == mi.TransportMode.Radiance else "importance"
+
+    class GonioBSDF(mi.BSDF):  # type: ignore[misc, name-defined]
+        """A Gonio model in a Mitsuba scene."""
+
+        def __init__(self, props: Any, model: type[BSDF]) -> None:
+            mi.BSDF.__init__(self, props)
+            self.model_class = model
+            preset = None
+            if hasattr(model, "preset") and props.has_property("preset"):
+                preset = model.preset(props["preset"])  # type: ignore[attr-defined]
+            two_sided = bool(props.get("two_sided", False))
+            self.slots: dict[str, _Slot] = {}
+            self.inner: dict[str, Any] = {}
+            plain: dict[str, Any] = {}
+            for name, parameter in model.parameters().items():
+                if parameter.kind in ("choice", "flag"):
+                    plain[name] = props.get(name, parameter.default)
+                    parameter.check(plain[name], f"{plugin_name(model.name)}.{name}")
+                elif parameter.kind == "bsdf":
+                    self.inner[name] = self._child(props, name)
+                elif parameter.numeric:
+                    self.slots[name], plain[name] = read(props, model, preset, parameter)
+            unknown = [name for name in props.unqueried()]
+            if unknown:
+                known = [*model.parameters(), "two_sided"]
+                hint = did_you_mean(unknown[0], known)
+                raise InputError(f"unknown property '{unknown[0]}'", plugin_name(model.name), hint)
+            for name, child in self.inner.items():
+                plain[name] = child.model if isinstance(child, GonioBSDF) else _stand_in(child)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the slots have warned
+                self.model = model(**{name: _summary(value) for name, value in plain.items()})
+            self.two_sided = two_sided and not self.model.transmits
+            if self.two_sided:
+                TwoSided(self.model)
+            self._set_flags(self.model.delta)
+
+        def _child(self, props: Any, name: str) -> Any:
+            child = props[name] if props.has_property(name) else None
+            if not isinstance(child, mi.BSDF):
+                raise InputError(f"no material '{name}' given", plugin_name(self.model_class.name))
+            return child
+
+        def _set_flags(self, delta: str) -> None:
+            F = mi.BSDFFlags
+            sides = F.FrontSide | F.BackSide if self.two_sided or self.model.transmits else F.FrontSide
+            kinds = []
+            if delta != "always":
+                kinds.append(F.GlossyReflection)
+                if self.model.transmits:
+                    kinds.append(F.GlossyTransmission)
+            if delta != "never":
+                kinds.append(F.DeltaReflection)
+                if self.model.transmits:
+                    kinds.append(F.DeltaTransmission)
+            if any(slot.textures for slot in self.slots.values()):
+                sides = sides | F.SpatiallyVarying
+            self.m_components = [kind | sides for kind in kinds]
+            flags = self.m_components[0]
+            for component in self.m_components[1:]:
+                flags = flags | component
+            self.m_flags = flags
+
+        def traverse(self, cb: Any) -> None:
+            for slot in self.slots.values():
+                for name, value in slot.values.items():
+                    cb.put(name, value, mi.ParamFlags.Differentiable)
+                for name, texture in slot.textures.items():
+                    cb.put(name, texture, mi.ParamFlags.Differentiable)
+            for name, child in self.inner.items():
+                cb.put(name, child, mi.ParamFlags.Differentiable)
+
+        def parameters_changed(self, keys: list[str]) -> None:
+            for slot in self.slots.values():
+                dr.make_opaque(*slot.values.values())
+            # a width that was 0 may be so no longer: both kinds of lobe are possible from now on
+            if self.model.delta == "always" and any(key.startswith("alpha") for key in keys):
+                self._set_flags("maybe")
+
+        # -------------------------------------------------------------- the model at a point
+
+        def at(self, si: Any, active: Any) -> Any:
+            """The model, its parameters bound to their values at a surface interaction."""
+            found: dict[str, Any] = {}
+            for name, slot in self.slots.items():
+                kind = slot.parameter.kind
+                got = dict(slot.values)
+                for key, texture in slot.textures.items():
+                    got[key] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
+                if kind == "alpha":
+                    pair = list(got.values())
+                    found[name] = ops.vec2(pair[0], pair[-1])
+                elif kind == "angle":
+                    found[name] = ops.vec2(*reversed(ops.sincos(got[name]))) if got else None
+                else:
+                    found[name] = got[name]
+            bound = self.model.bind(lambda parameter, value: found.get(parameter.name))
+            for name, child in self.inner.items():
+                inner = child.at(si, active) if isinstance(child, GonioBSDF) else Foreign(child, si, active)
+                bound.__dict__[name] = inner
+            if self.two_sided:
+                wrapped = object.__new__(TwoSided)
+                wrapped.__dict__.update(base=bound, _bound=True)
+                return wrapped
+            return bound
+
+        def _enabled(self, ctx: Any, wo: Any, wi: Any, active: Any) -> Any:
+            """Lanes whose kind of lobe the context asks for."""
+            mask, F = ctx.type_mask, mi.BSDFFlags
+            reflect, transmit = bool(mask & int(F.Reflection)), bool(mask & int(F.Transmission))
+            if reflect and transmit:
+                return active
+            same = wo.z * wi.z > 0.0
+            return active & ((same & reflect) | (~same & transmit))
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            value = self.at(si, active).eval(si.wi, wo, mode_of(ctx))
+            return dr.select(self._enabled(ctx, si.wi, wo, active), mi.Spectrum(value), 0.0)
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return dr.select(self._enabled(ctx, si.wi, wo, active), self.at(si, active).pdf(si.wi, wo), 0.0)
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self._eval_pdf(self.at(si, active), ctx, si, wo, active)
+
+        def _eval_pdf(self, model: Any, ctx: Any, si: Any, wo: Any, active: Any) -> tuple[Any, Any]:
+            enabled = self._enabled(ctx, si.wi, wo, active)
+            value = mi.Spectrum(model.eval(si.wi, wo, mode_of(ctx)))
+            return dr.select(enabled, value, 0.0), dr.select(enabled, model.pdf(si.wi, wo), 0.0)
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            return self._sample(self.at(si, active), ctx, si, sample1, sample2, active)
+
+        def _sample(self, model: Any, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+            s = model.sample(si.wi, mi.Point3f(sample1, sample2.x, sample2.y), mode_of(ctx))
+            F = mi.BSDFFlags
+            bs = dr.zeros(mi.BSDFSample3f)
+            bs.wo = mi.Vector3f(s.wi)
+            active = self._enabled(ctx, si.wi, bs.wo, active) & (s.pdf > 0.0)
+            bs.pdf = dr.select(active, s.pdf, 0.0)
+            bs.eta = s.eta
+            through = si.wi.z * bs.wo.z < 0.0
+            glossy = dr.select(through, mi.UInt32(+F.GlossyTransmission), mi.UInt32(+F.GlossyReflection))
+            ideal = dr.select(through, mi.UInt32(+F.DeltaTransmission), mi.UInt32(+F.DeltaReflection))
+            bs.sampled_type = dr.select(s.delta, ideal, glossy)
+            bs.sampled_component = mi.UInt32(0)
+            return bs, dr.select(active, mi.Spectrum(s.weight), 0.0)
+
+        def eval_pdf_sample(
+            self, ctx: Any, si: Any, wo: Any, sample1: Any, sample2: Any, active: Any = True
+        ) -> Any:
+            model = self.at(si, active)
+            return *self._eval_pdf(model, ctx, si, wo, active), *self._sample(model, ctx, si, sample1, sample2, active)
+
+        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+            return mi.Spectrum(self.at(si, active).tint(si.wi)) & active
+
+        def has_attribute(self, name: str, active: Any = True) -> Any:
+            return mi.Bool(name == "ambient" and hasattr(type(self.model), "ambient"))
+
+        def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
+            if name != "ambient" or not hasattr(type(self.model), "ambient"):
+                return mi.Color3f(0.0)
+            return mi.Color3f(self.at(si, active).ambient) & active
+
+        def to_string(self) -> str:
+            return f"{plugin_name(self.model_class.name)}[{', '.join([*self.slots, *self.inner])}]"
+
+    return GonioBSDF
+
+
+def _summary(value: Any) -> Any:
+    """A parameter's plain value as a constructor takes it."""
+    return tuple(_summary(v) for v in value) if isinstance(value, tuple) else value
+
+
+def _stand_in(bsdf: Any) -> BSDF:
+    """A model that answers for another plugin's BSDF when its lobes are asked for, before anything is evaluated."""
+    transmits, delta = False, "maybe"
+    flags = int(bsdf.flags())
+    import mitsuba as mi
+
+    transmits = bool(flags & int(mi.BSDFFlags.Transmission))
+    smooth, ideal = bool(flags & int(mi.BSDFFlags.Smooth)), bool(flags & int(mi.BSDFFlags.Delta))
+    delta = "maybe" if smooth and ideal else "always" if ideal else "never"
+    return _Foreign(transmits, delta)
+
+
+class _Foreign(BSDF):
+    """Facts about a BSDF that is not Gonio's."""
+
+    def __init__(self, transmits: bool, delta: str) -> None:
+        self.__dict__.update(facts=(transmits, delta))
+
+    @property
+    def transmits(self) -> bool:
+        return self.__dict__["facts"][0]
+
+    @property
+    def delta(self) -> str:
+        return self.__dict__["facts"][1]
+
