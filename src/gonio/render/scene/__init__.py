@@ -7,7 +7,8 @@
 
 from __future__ import annotations
 
+from .build import build
 from .reader import read
 from .schema import SceneDescription, json_schema
 
-__all__ = ["SceneDescription", "json_schema", "read"]
+__all__ = ["SceneDescription", "build", "json_schema", "read"]

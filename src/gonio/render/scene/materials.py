@@ -105,11 +105,6 @@ class MaterialPart(Part):
     def preset(self) -> str | None:
         return getattr(self, _attribute("preset"), None)
 
-    def children(self) -> Iterator[tuple[str, MaterialPart]]:
-        for key in self.declared:
-            if isinstance(value := self.get(key), MaterialPart):
-                yield key, value
-
     def instance(self) -> BSDF:
         """The model with this material's values; a textured parameter keeps its default.
 
@@ -131,11 +126,6 @@ class MaterialPart(Part):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", GonioWarning)  # `reader` has its own, with their place in the file
             return self.model(**values)
-
-    @property
-    def transmits(self) -> bool:
-        """Whether light passes through to the other side."""
-        return bool(self.instance().transmits)
 
     @model_validator(mode="after")
     def _one_spelling(self) -> MaterialPart:
@@ -286,10 +276,3 @@ else:
     for _cls in MATERIALS:
         _cls.model_rebuild(_types_namespace={"Material": Material})
 
-
-def textures_in(material: MaterialPart) -> Iterator[tuple[str, ImageTexture]]:
-    """The images that a material names itself (not those of its children), by key."""
-    for key in type(material).keys():
-        value = material.get(key) if _attribute(key) in type(material).model_fields else None
-        if isinstance(value, ImageTexture):
-            yield key, value

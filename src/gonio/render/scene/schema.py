@@ -14,11 +14,11 @@ import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from ...errors import InputError, did_you_mean
+from ..images import SUFFIXES
 from .materials import Material
 from .values import Light, Number, NonNegative, Part, Positive, Radiance, Sky, Vector, Whole, invalid
 
 MAX_SAMPLES = 2**30  # samples per pixel; a picture of one pixel could still be counted in 32 bits
-PICTURES = (".hdr", ".png", ".exr")
 
 
 class Output(Part):
@@ -29,14 +29,14 @@ class Output(Part):
 
     @model_validator(mode="after")
     def _known_format(self) -> Output:
-        if Path(self.filename).suffix.lower() not in PICTURES:
-            raise invalid(f"'{self.filename}' is no known kind of picture", "end it in " + ", ".join(PICTURES), "filename")
+        if Path(self.filename).suffix.lower() not in SUFFIXES:
+            raise invalid(f"'{self.filename}' is no known kind of picture", "end it in " + ", ".join(SUFFIXES), "filename")
         return self
 
 
 def samplers() -> list[str]:
     """The sampler names the integrators know."""
-    from ..integrators import SAMPLERS
+    from ..sampler import SAMPLERS
 
     return list(SAMPLERS)
 
@@ -128,30 +128,13 @@ class Film(Part):
         width, height = self.size
         if min(self.size) < 1:
             raise invalid(f"a picture of {width} x {height} pixels is empty", "give at least 1 x 1", "size")
-        limit = max_pixels()
-        if width * height > limit:
-            raise invalid(
-                f"{width} x {height} = {width * height / 1e6:.1f} million pixels do not fit this machine's memory",
-                f"up to {limit / 1e6:.1f} million pixels ({BYTES_PER_PIXEL} bytes each, half of the memory)",
-                "size",
-            )
+        from ..run import check_film  # the same limit as `--size`
+
+        try:
+            check_film(self.size, "size")
+        except InputError as error:
+            raise invalid(error.what, error.hint, "size") from None
         return self
-
-
-# Three channels of sum and weight for the pass and the picture so far, the developed copy and what the denoiser
-# takes: 16 floats.
-BYTES_PER_PIXEL = 64
-
-
-def max_pixels() -> int:
-    """The largest film: half of this machine's memory, and one that 32 bits can count."""
-    try:
-        import os
-
-        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        memory = 8 * 2**30  # where the system does not say
-    return min(memory // 2 // BYTES_PER_PIXEL, 2**31 - 1)
 
 
 class Camera(Part):

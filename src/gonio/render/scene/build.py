@@ -1,0 +1,217 @@
+"""From a validated description to a Mitsuba scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from . import meshes, schema, textures
+from .materials import BY_TYPE, MaterialPart
+from .text import pointer
+from .values import ImageTexture, NormalMap, rgb
+
+# Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
+# format's +y, +z, +x: u about y from z toward x, v from +y.
+_SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+def build(description: schema.SceneDescription, mi: Any) -> Any:
+    """The `mi.Scene`: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
+
+    Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
+    """
+    return _Builder(description, mi).scene()
+
+
+class _Builder:
+    def __init__(self, description: schema.SceneDescription, mi: Any) -> None:
+        import gonio.mitsuba  # noqa: F401 - registers the models
+
+        from .. import lights
+
+        lights.register(mi)
+        self.description, self.mi = description, mi
+        self.bsdfs: dict[MaterialPart, Any] = {}
+        self.images: dict[tuple[Any, ...], np.ndarray] = {}
+
+    def scene(self) -> Any:
+        scene: dict[str, Any] = {"type": "scene", "sensor": self.sensor()}
+        for index, shape in enumerate(self.description.shapes):
+            scene[f"shape{index}"] = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
+        for index, light in enumerate(self.description.lights):
+            scene[f"light{index}"] = self.light(light, pointer("scene", "lights", index), f"light{index}")
+        return self.load(scene, "/scene")
+
+    def load(self, plugin: dict[str, Any], where: str) -> Any:
+        """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
+        try:
+            return self.mi.load_dict(plugin)
+        except InputError as error:
+            raise InputError(error.what, self.description.where(where), error.hint) from None
+        except RuntimeError as error:
+            raise InputError(
+                f"Mitsuba refuses it: {str(error).strip().splitlines()[-1][:200]}",
+                self.description.where(where),
+                "simplify this part, and report it if it should work",
+            ) from error
+
+    def sensor(self) -> dict[str, Any]:
+        camera = self.description.camera
+        placed = camera.transform
+        width, height = camera.film.size
+        return {
+            "type": "perspective",
+            "fov": camera.vertical_fov,
+            "fov_axis": "y",
+            "near_clip": camera.t_near,
+            "far_clip": camera.t_far,
+            "to_world": self.mi.ScalarTransform4f().look_at(
+                list(placed.position), list(placed.look_at), list(placed.up)
+            ),
+            "film": {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "rfilter": {"type": "box"},  # the lab's pixel is the mean of its samples
+                "pixel_format": "rgb",
+                "component_format": "float32",
+            },
+            "sampler": {"type": "independent", "sample_count": min(self.description.spp, 2**16)},
+        }
+
+    # ------------------------------------------------------------------ lights
+
+    def light(self, light: Any, where: str, name: str) -> Any:
+        if isinstance(light, schema.AreaLight):
+            emitter = {"type": "gonio_area", "radiance": {"type": "rgb", "value": rgb(light.energy)}}
+            return self.shape(light.shape, f"{where}/shape", name, emitter)
+        if isinstance(light, schema.SpotLight):
+            intensity = {"type": "rgb", "value": rgb(light.energy)}
+            return {"type": "point", "position": list(light.position), "intensity": intensity}
+        source = light.texture if light.texture is not None else light.radiance
+        if isinstance(source, ImageTexture):
+            return textures.environment(self.mi, self.image(source, f"{where}/texture"))
+        return {"type": "constant", "radiance": {"type": "rgb", "value": rgb(source)}}
+
+    # ------------------------------------------------------------------ shapes
+
+    def shape(self, shape: Any, where: str, name: str, emitter: dict[str, Any] | None = None) -> Any:
+        matrix = shape.transform.matrix()
+        bsdf = self.bsdf(shape.material or BY_TYPE["matte"](type="matte"), f"{where}/material")
+        native = self.native_shape(shape, matrix)
+        if native is not None:
+            native["bsdf"] = bsdf
+            if emitter is not None:
+                native["emitter"] = emitter
+            return native
+        mesh = self.triangles(shape, where).transformed(matrix)
+        return mesh.to_mitsuba(self.mi, name, bsdf, None if emitter is None else self.load(emitter, where))
+
+    def native_shape(self, shape: Any, matrix: np.ndarray) -> dict[str, Any] | None:
+        """Mitsuba's own exact shape, where it has one."""
+        to_world = np.eye(4)
+        if isinstance(shape, schema.Sphere):
+            rotation = shape.transform.rotate.matrix() if shape.transform.rotate else np.eye(3)
+            to_world[:3, :3] = shape.radius * rotation @ _SPHERE_AXES
+            to_world[:3, 3] = (matrix @ [*shape.center, 1.0])[:3]
+            return {"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world)}
+        if isinstance(shape, schema.Parallelogram):
+            edge0, edge1 = matrix[:3, :3] @ shape.edge0, matrix[:3, :3] @ shape.edge1
+            normal = np.cross(edge0, edge1)
+            # Mitsuba's rectangle is [-1, 1]^2; it stays exact when its edges are sheared.
+            to_world[:3, 0], to_world[:3, 1] = edge0 / 2, edge1 / 2
+            to_world[:3, 2] = normal / np.linalg.norm(normal)
+            to_world[:3, 3] = (matrix @ [*shape.base, 1.0])[:3] + (edge0 + edge1) / 2
+            return {"type": "rectangle", "to_world": self.mi.ScalarTransform4f(to_world)}
+        return None
+
+    def triangles(self, shape: Any, where: str) -> meshes.Triangles:
+        if isinstance(shape, schema.Disk):
+            return meshes.disk(shape.radius, shape.inner_radius, shape.phi_max)
+        if isinstance(shape, schema.Cylinder):
+            return meshes.cylinder(shape.radius, shape.height, shape.phi_max)
+        if isinstance(shape, schema.Cone):
+            return meshes.cone(shape.radius, shape.height, shape.phi_max)
+        if isinstance(shape, schema.Cube):
+            return meshes.cube()
+        path = self.description.locate(shape.file, f"{where}/file")
+        return meshes.read_mesh(path, self.description.where(f"{where}/file"))
+
+    # ------------------------------------------------------------------ materials
+
+    def bsdf(self, material: MaterialPart, where: str) -> Any:
+        if material not in self.bsdfs:
+            self.bsdfs[material] = self.load(self.plugin(material, where), where)
+        return self.bsdfs[material]
+
+    def plugin(self, material: MaterialPart, where: str) -> dict[str, Any]:
+        """The material as a Mitsuba dict."""
+        plugin: dict[str, Any] = {"type": "gonio_" + material.model.name.replace("-", "_")}
+        # Seen from behind nothing is black, as in the lab; a material that transmits has two sides of its own.
+        plugin["two_sided"] = material.two_sided is not False
+        if material.preset is not None:
+            plugin["preset"] = material.preset
+        parameters = material.model.parameters()
+        for name, (value, key, squared) in material.arguments().items():
+            here = where + pointer(key)
+            if isinstance(value, MaterialPart):
+                plugin[name] = self.plugin(value, here)
+            elif isinstance(value, (bool, str)):
+                plugin[name] = value
+            elif parameters[name].kind == "spectrum":
+                plugin[name] = self.colour(value, parameters[name], here)
+            elif isinstance(value, tuple):
+                for axis, item in zip("xy", value, strict=True):
+                    plugin[f"{name}_{axis}"] = self.scalar(item, parameters[name], here, squared)
+            else:
+                plugin[name] = self.scalar(value, parameters[name], here, squared)
+        if material.normalmap is not None:
+            plugin = self.normal_mapped(plugin, material.normalmap, f"{where}/normalmap")
+        return plugin
+
+    def colour(self, value: Any, parameter: Any, where: str) -> Any:
+        if isinstance(value, ImageTexture):
+            pixels = self.image(value, where)
+            self.check_range(pixels, parameter, value, where)
+            return textures.bitmap(self.mi, np.broadcast_to(pixels, (*pixels.shape[:2], 3)), value.filter, value.wrap)
+        return {"type": "rgb", "value": rgb(value)}
+
+    def scalar(self, value: Any, parameter: Any, where: str, squared: bool) -> Any:
+        if isinstance(value, ImageTexture):
+            pixels = self.image(value, where).mean(axis=2, keepdims=True)
+            pixels = pixels**2 if squared else pixels
+            self.check_range(pixels, parameter, value, where)
+            return textures.bitmap(self.mi, pixels, value.filter, value.wrap)
+        return float(value) ** 2 if squared else float(value)
+
+    def normal_mapped(self, plugin: dict[str, Any], texture: NormalMap, where: str) -> dict[str, Any]:
+        pixels = self.image(texture, where)
+        if pixels.shape[2] != 3:
+            raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
+        bitmap = textures.bitmap(self.mi, pixels, "bilinear", "repeat") | {"raw": True}
+        return {"type": "normalmap", "normalmap": bitmap, "bsdf": plugin}
+
+    def image(self, texture: ImageTexture | NormalMap, where: str) -> np.ndarray:
+        srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
+        path = self.description.locate(texture.file, f"{where}/file")
+        if (path, srgb) not in self.images:
+            here = self.description.where(f"{where}/file")
+            self.images[path, srgb] = textures.load_image(self.mi, path, here, srgb=srgb)
+        return self.images[path, srgb]
+
+    def check_range(self, pixels: np.ndarray, parameter: Any, texture: ImageTexture, where: str) -> None:
+        low, high = float(pixels.min()), float(pixels.max())
+        if low < parameter.low or (high > parameter.high and not parameter.soft_high):
+            wrong = low if low < parameter.low else high
+            raise InputError(
+                f"'{texture.file}' holds {wrong:g}, out of range: {parameter.name} is {parameter.range}",
+                self.description.where(where),
+                "scale the image's values",
+            )
+        if high > parameter.high:
+            self.description._warnings.append(
+                f"{self.description.where(where)}: '{texture.file}' holds {high:g}, over {parameter.high:g}: "
+                "the material gives back more light than it receives"
+            )
