@@ -100,7 +100,12 @@ def count_non_finite(millions: int) -> None:
     metal = {"type": "gonio_conductor", "preset": "Au"}
     glass = {"type": "gonio_dielectric"}
     cases = [{**metal, "alpha": a, "ndf": n} for n in ("ggx", "beckmann", "student-t") for a in (0.001, 0.1, 1.0)]
-    cases += [{**glass, "alpha": a, "eta": e, "ndf": n} for n in ("ggx", "beckmann") for a in (0.001, 0.3) for e in (1.01, 1.5)]
+    cases += [
+        {**glass, "alpha": a, "eta": e, "ndf": n}
+        for n in ("ggx", "beckmann")
+        for a in (0.001, 0.3)
+        for e in (1.01, 1.5)
+    ]
     cases += [{"type": f"gonio_{name}"} for name in ("phong", "blinn_phong", "oren_nayar")]
     chunk, total, bad = 1 << 22, 0, 0
     for number in range(max(1, round(millions * 1e6 / chunk / len(cases)))):
@@ -128,7 +133,9 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--check-samples", type=int, default=0, metavar="MILLIONS")
     options = parser.parse_args()
-    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Mitsuba {mi.__version__}, {mi.variant()}")
+    print(
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Mitsuba {mi.__version__}, {mi.variant()}"
+    )
     print(f"{options.pairs:g} M pairs, {options.rounds} turns; rates in M/s, ratio = Gonio's rate over Mitsuba's")
     print(f"{'material':20} {'what':8} {'Mitsuba':>9} {'Gonio':>9} {'ratio':>7}")
     for name in PAIRS:

@@ -128,7 +128,9 @@ class Parameter:
                 raise InputError(f"{array.max():g} given, {self.range} expected", where)
             import warnings
 
-            text = f"{where}: {array.max():g} is over {self.high:g}: the material gives back more light than it receives"
+            text = (
+                f"{where}: {array.max():g} is over {self.high:g}: the material gives back more light than it receives"
+            )
             warnings.warn(text, GonioWarning, stacklevel=5)
 
 
@@ -185,7 +187,9 @@ class BSDF:
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if not cls.__name__.startswith("_"):
-            cls.name = "".join("-" + c.lower() if c.isupper() else c for c in cls.__name__).lstrip("-").replace("_", "-")
+            cls.name = (
+                "".join("-" + c.lower() if c.isupper() else c for c in cls.__name__).lstrip("-").replace("_", "-")
+            )
         for method in ("eval", "pdf", "sample"):
             if method in cls.__dict__:
                 setattr(cls, method, _doorway(cls.__dict__[method]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..ops import abs, dot, function, safe_div, where
-from ..optics import fresnel, frame, indices
+from ..optics import frame, fresnel, indices
 from . import microfacet
 from .base import BSDF, Sample, Value, angle, choice, spectrum, width
 
@@ -84,5 +84,3 @@ class Conductor(BSDF):
 
 def _above(wo: Any, wi: Any) -> Any:
     return (wo.z > 0.0) & (wi.z > 0.0)
-
-

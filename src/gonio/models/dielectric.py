@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..ops import abs, backend, dot, function, maximum, norm, safe_div, sqr, where
-from ..optics import fresnel, frame, indices, masking
+from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet
 from .base import BSDF, Sample, Value, angle, choice, flag, number, spectrum, width
@@ -60,23 +60,20 @@ class Dielectric(BSDF):
         return where(h.z < 0.0, -h, h)
 
     def _terms(self, wo: Any, wi: Any, m: Any, eta: Any, alpha: Any) -> tuple[Any, Any, Any]:
-        """(D G over the cosines, the Jacobian dm/dwi, F) for the pair: what eval, pdf and the weight are made of."""
+        """(D G / |o.n|, |o.m| times the Jacobian dm/dwi, F) for the pair: what eval, pdf and the weight are made of."""
         ndf = distribution(self.ndf)
         reflects = wo.z * wi.z > 0.0
         dot_o, dot_i = dot(wo, m), dot(wi, m)
         cos_t = fresnel.cos_transmitted(abs(dot_o), eta)
         f = self.reflectance(abs(dot_o), cos_t, eta)
-        d = ndf.D(m, alpha)
         g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
-        jacobian = safe_div(1.0, 4.0 * abs(dot_o))
+        spread = 0.25 + 0.0 * dot_o
         if self.transmission:
             g_through = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha, transmits=True)
-            # eta^2 |i.m| / (o.m + eta i.m)^2 (Walter2007, eq. 17)
-            through = safe_div(sqr(eta) * abs(dot_i), sqr(dot_o + eta * dot_i))
             g = where(reflects, g, g_through)
-            jacobian = where(reflects, jacobian, through)
-        facets = safe_div(d * g * abs(dot_o), abs(wo.z)) * jacobian
-        return facets, jacobian, f
+            # Walter2007, eq. 17 (eq. 14 for reflection), times |o.m|
+            spread = where(reflects, spread, safe_div(sqr(eta) * abs(dot_i * dot_o), sqr(dot_o + eta * dot_i)))
+        return safe_div(ndf.D(m, alpha) * g, abs(wo.z)), spread, f
 
     def _share(self, f: Any) -> Any:
         """Probability of choosing reflection."""
@@ -97,10 +94,10 @@ class Dielectric(BSDF):
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        facets, _, f = self._terms(wo, wi, m, eta, alpha)
+        facets, spread, f = self._terms(wo, wi, m, eta, alpha)
         reflects = wo.z * wi.z > 0.0
         share = where(reflects, f, 1.0 - f) * self._radiance_scale(reflects, eta, mode)
-        return self.albedo * where(self._live(wo, wi) & ~smooth, facets * share, 0.0)
+        return self.albedo * where(self._live(wo, wi) & ~smooth, facets * spread * share, 0.0)
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         """Probability of the lobe, times the density of the normal, times dm/dwi."""
@@ -108,12 +105,12 @@ class Dielectric(BSDF):
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        _, jacobian, f = self._terms(wo, wi, m, eta, alpha)
+        _, spread, f = self._terms(wo, wi, m, eta, alpha)
         reflects = wo.z * wi.z > 0.0
         share = where(reflects, self._share(f), 1.0 - self._share(f))
         # a facet seen from its back, or one that would refract into the wrong side, is never sampled
         seen = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
-        density = share * microfacet.normal_pdf(self, wo, m, alpha) * jacobian
+        density = safe_div(share * microfacet.normal_pdf(self, wo, m, alpha) * spread, abs(dot(wo, m)))
         return where(self._live(wo, wi) & seen & ~smooth, density, 0.0)
 
     def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
@@ -131,12 +128,13 @@ class Dielectric(BSDF):
         share = self._share(f)
         reflects = u.x < share
         wi = where(reflects, frame.reflect(wo, facing), frame.refract(wo, facing, cos_t, eta))
-        facets, jacobian, _ = self._terms(wo, wi, m, eta, alpha)
+        facets, spread, _ = self._terms(wo, wi, m, eta, alpha)
         chance = where(reflects, share, 1.0 - share)
         right_side = where(reflects, wo.z * wi.z > 0.0, wo.z * wi.z < 0.0) & (dot(wo, facing) > 0.0)
-        pdf = where(smooth, chance, chance * microfacet.normal_pdf(self, wo, m, alpha) * jacobian)
+        density = safe_div(microfacet.normal_pdf(self, wo, m, alpha) * spread, cos_o)
+        pdf = chance * where(smooth, 1.0, density)
         pdf = where(right_side, pdf, 0.0)
-        value = where(smooth, 1.0, facets) * where(reflects, f, 1.0 - f)
+        value = where(smooth, 1.0, facets * spread) * where(reflects, f, 1.0 - f)
         value = value * self._radiance_scale(reflects, eta, mode)
         weight = self.albedo * where(pdf > 0.0, safe_div(value, pdf), 0.0)
         relative = where(reflects, 1.0, eta)

@@ -45,8 +45,7 @@ def get_precision() -> str:
 @lru_cache
 def drjit() -> ModuleType:
     """Dr.Jit, with a working LLVM handed over before its first use."""
-    if "drjit" not in sys.modules:
-        llvm.use()
+    llvm.use()
     import drjit as dr
 
     return dr
@@ -55,7 +54,7 @@ def drjit() -> ModuleType:
 @lru_cache
 def _types(backend: str, double: bool) -> Types:
     dr = drjit()
-    module: ModuleType = getattr(getattr(dr, backend), "ad")
+    module: ModuleType = getattr(dr, backend).ad
     end = "64" if double else ""
     return Types(
         getattr(module, "Float" + end),

@@ -92,12 +92,33 @@ def libraries() -> list[Library]:
     return sorted(seen.values(), key=rank)
 
 
+def _loaded() -> Library | None:
+    """The libLLVM that this process has loaded (Linux; elsewhere None)."""
+    try:
+        lines = Path("/proc/self/maps").read_text().splitlines()
+    except OSError:
+        return None
+    for line in lines:
+        path = line.split()[-1]
+        if "/libLLVM" in path:
+            return Library(Path(path), read_version(Path(path)), "loaded")
+    return None
+
+
 def use() -> Library:
     """Choose the first usable libLLVM and hand it to Dr.Jit; call before Dr.Jit starts its LLVM backend.
 
+    Dr.Jit loads its libLLVM when it is imported, so a program that imports it before Gonio has chosen already: that
+    choice is checked, for an LLVM that is too old would abort the process later.
     A library that the environment names is never replaced in silence: an unusable one is an error.
     Raises MachineError where nothing fits.
     """
+    loaded = _loaded() if "drjit" in sys.modules else None
+    if loaded is not None:
+        if loaded.usable:
+            return loaded
+        what = f"Dr.Jit was imported before Gonio and loaded LLVM {loaded.version}, which aborts the process"
+        raise MachineError(what, "LLVM", f"import gonio before drjit and mitsuba, or set {VARIABLE}")
     found = libraries()
     install = "pip install karellen-llvm-core (Linux x86-64), or apt-get install libllvm19, or any LLVM >= 17"
     for library in found:

@@ -164,7 +164,7 @@ def _adapter_class(mi: ModuleType) -> type:
                     self.inner[name] = self._child(props, name)
                 elif parameter.numeric:
                     self.slots[name], plain[name] = read(props, model, preset, parameter)
-            unknown = [name for name in props.unqueried()]
+            unknown = list(props.unqueried())
             if unknown:
                 known = [*model.parameters(), "two_sided"]
                 hint = did_you_mean(unknown[0], known)
@@ -290,9 +290,7 @@ def _adapter_class(mi: ModuleType) -> type:
             bs.sampled_component = mi.UInt32(0)
             return bs, dr.select(active, mi.Spectrum(s.weight), 0.0)
 
-        def eval_pdf_sample(
-            self, ctx: Any, si: Any, wo: Any, sample1: Any, sample2: Any, active: Any = True
-        ) -> Any:
+        def eval_pdf_sample(self, ctx: Any, si: Any, wo: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             model = self.at(si, active)
             return *self._eval_pdf(model, ctx, si, wo, active), *self._sample(model, ctx, si, sample1, sample2, active)
 
@@ -343,4 +341,3 @@ class _Foreign(BSDF):
     @property
     def delta(self) -> str:
         return self.__dict__["facts"][1]
-

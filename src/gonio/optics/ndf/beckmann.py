@@ -5,7 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from ... import ops
-from ...ops import abs, atan2, clamp, erf, exp, function, log, maximum, minimum, normalize, pow, safe_sqrt, sincos, sqr, sqrt, vec3, where
+from ...ops import (
+    abs,
+    atan2,
+    clamp,
+    erf,
+    exp,
+    function,
+    log,
+    maximum,
+    minimum,
+    normalize,
+    pow,
+    safe_sqrt,
+    sincos,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
 from ..special import erfinv
 from .base import NDF
 from .ggx import slant2

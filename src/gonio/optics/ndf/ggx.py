@@ -5,7 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from ... import ops
-from ...ops import abs, clamp, dot, function, maximum, minimum, normalize, safe_div, safe_sqrt, sincos, sqr, sqrt, vec3, where
+from ...ops import (
+    abs,
+    clamp,
+    dot,
+    function,
+    maximum,
+    minimum,
+    normalize,
+    safe_div,
+    safe_sqrt,
+    sincos,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
 from ..frame import sin2
 from .base import NDF
 
@@ -84,5 +99,3 @@ class GGX(NDF):
         a2 = sqr(clamp(minimum(alpha.x, alpha.y), 0.0, 1.0))
         s2 = sqr(1.0 + sqrt(sin2(v)))
         return (1.0 - a2) * s2 / (s2 + a2 * sqr(v.z))
-
-
