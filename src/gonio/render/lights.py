@@ -1,0 +1,360 @@
+"""Lights: the two-sided area light, and how the integrators choose a light and a point on it.
+
+Three parts:
+
+- `SphericalRectangle`: uniform sampling of the solid angle of a rectangle (Urena2013), the least noisy cheap way
+  to sample the lab's lights;
+- `register(mi)`: the Mitsuba plugin `gonio_area`, a light that shines from both sides of any shape;
+- `Lights`: what the integrators ask: a light sample, the light met by a ray, and the density of both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import drjit as dr
+
+# Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
+# 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing
+# from the solid angle. Above: the point lies all but in the rectangle (2 pi = 6.283), where 1/z0 loses its digits.
+SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
+
+
+@dataclass
+class Rectangle:
+    """A rectangle in space: corner, two perpendicular unit axes, their lengths, the normal axis0 x axis1."""
+
+    corner: Any
+    axis0: Any
+    axis1: Any
+    length0: Any
+    length1: Any
+
+    @staticmethod
+    def of(mi: ModuleType, shape: Any) -> Rectangle:
+        """The rectangle of a Mitsuba `rectangle` shape as the kernel sees it, so that moving it recompiles nothing."""
+        zero, one = mi.Float(0), mi.Float(1)
+        corner = shape.sample_position(zero, mi.Point2f(zero, zero)).p
+        edge0 = shape.sample_position(zero, mi.Point2f(one, zero)).p - corner
+        edge1 = shape.sample_position(zero, mi.Point2f(zero, one)).p - corner
+        length0, length1 = dr.norm(edge0), dr.norm(edge1)
+        return Rectangle(corner, edge0 / length0, edge1 / length1, length0, length1)
+
+    @property
+    def normal(self) -> Any:
+        return dr.cross(self.axis0, self.axis1)
+
+    @property
+    def area(self) -> Any:
+        return self.length0 * self.length1
+
+    def hit(self, origin: Any, direction: Any) -> tuple[Any, Any, Any]:
+        """Where a ray meets the rectangle: (distance, (u, v) in [0, 1]^2, whether it does)."""
+        normal = self.normal
+        distance = dr.dot(self.corner - origin, normal) / dr.dot(direction, normal)
+        offset = dr.fma(direction, distance, origin) - self.corner
+        u, v = dr.dot(offset, self.axis0) / self.length0, dr.dot(offset, self.axis1) / self.length1
+        return distance, (u, v), (distance > 0) & (dr.minimum(u, v) >= 0) & (dr.maximum(u, v) <= 1)
+
+
+class SphericalRectangle:
+    """A rectangle seen from a point: its solid angle, and directions uniform in it.
+
+    Urena2013, sec. 3: in the frame of the rectangle, with the point at the origin and the rectangle at z0 < 0, the
+    u-coordinate is found by inverting the solid angle of a sub-rectangle, the v-coordinate by inverting the height
+    on the sphere. Where the solid angle is too small or too large for float32 the area is sampled instead.
+
+    `solid_angle` is exact for small ones too: twice the sum of the two triangles' (Van Oosterom and Strackee 1983),
+    whose numerator is a product and cancels nothing, unlike the sum of four angles less 2 pi.
+    """
+
+    def __init__(self, rectangle: Rectangle, origin: Any):
+        self.rectangle, self.origin = rectangle, origin
+        offset = rectangle.corner - origin
+        self.x0, self.y0 = dr.dot(offset, rectangle.axis0), dr.dot(offset, rectangle.axis1)
+        self.x1, self.y1 = self.x0 + rectangle.length0, self.y0 + rectangle.length1
+        self.z0 = -dr.abs(dr.dot(offset, rectangle.normal))
+        zz = dr.square(self.z0)
+        xx0, xx1, yy0, yy1 = dr.square(self.x0), dr.square(self.x1), dr.square(self.y0), dr.square(self.y1)
+        # z components of the normals of the four planes through the origin and an edge.
+        self.n0 = -self.y0 * dr.rsqrt(yy0 + zz)
+        n1 = self.x1 * dr.rsqrt(xx1 + zz)
+        self.n2 = self.y1 * dr.rsqrt(yy1 + zz)
+        n3 = -self.x0 * dr.rsqrt(xx0 + zz)
+        self.k = 2 * dr.pi - dr.acos(-self.n2 * n3) - dr.acos(-n3 * self.n0)
+        self.solid_angle = self._solid_angle(zz, xx0, xx1, yy0, yy1)
+        self.uniform = (self.solid_angle > SMALLEST_SOLID_ANGLE) & (self.solid_angle < LARGEST_SOLID_ANGLE)
+
+    def _solid_angle(self, zz: Any, xx0: Any, xx1: Any, yy0: Any, yy1: Any) -> Any:
+        r00, r10 = dr.sqrt(xx0 + yy0 + zz), dr.sqrt(xx1 + yy0 + zz)
+        r01, r11 = dr.sqrt(xx0 + yy1 + zz), dr.sqrt(xx1 + yy1 + zz)
+        volume = -self.z0 * self.rectangle.area
+        # dot products of corner vectors: along an edge, and across the diagonal 10-01 that both triangles share
+        across = self.x0 * self.x1 + self.y0 * self.y1 + zz
+        along_x0, along_x1 = self.x0 * self.x1 + yy0 + zz, self.x0 * self.x1 + yy1 + zz
+        along_y0, along_y1 = xx0 + self.y0 * self.y1 + zz, xx1 + self.y0 * self.y1 + zz
+        lower = r00 * r10 * r01 + along_x0 * r01 + along_y0 * r10 + across * r00
+        upper = r11 * r10 * r01 + along_x1 * r10 + along_y1 * r01 + across * r11
+        # The two half angles a and b add as complex numbers, (lower + i volume)(upper + i volume): one atan2, not two.
+        # Each half angle is below pi/2 in sum with the other <= pi, so the sum stays inside atan2's branch.
+        return 2 * dr.atan2(volume * (lower + upper), lower * upper - dr.square(volume))
+
+    def pdf(self, distance: Any, cosine: Any) -> Any:
+        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
+        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.rectangle.area, 1e-30))
+        return dr.select(self.uniform, dr.rcp(self.solid_angle), by_area)
+
+    def sample(self, u: Any, v: Any) -> tuple[Any, Any, Any]:
+        """A point of the rectangle from two numbers in [0, 1): (point, (u, v) on it in [0, 1]^2, pdf in 1/sr)."""
+        sine, cosine = dr.sincos(dr.fma(u, self.solid_angle, self.k))
+        fu = (cosine * self.n0 - self.n2) / sine
+        cu = dr.clip(dr.copysign(dr.rsqrt(dr.square(fu) + dr.square(self.n0)), fu), -1, 1)
+        x = -(cu * self.z0) * dr.rsqrt(dr.maximum(1 - dr.square(cu), 1e-12))
+        x = dr.clip(x, self.x0, self.x1)
+        dd = dr.square(x) + dr.square(self.z0)
+        h0 = self.y0 * dr.rsqrt(dd + dr.square(self.y0))
+        h1 = self.y1 * dr.rsqrt(dd + dr.square(self.y1))
+        h = dr.fma(v, h1 - h0, h0)
+        y = dr.clip(h * dr.sqrt(dd) * dr.rsqrt(dr.maximum(1 - dr.square(h), 1e-12)), self.y0, self.y1)
+        x = dr.select(self.uniform, x, dr.fma(u, self.rectangle.length0, self.x0))
+        y = dr.select(self.uniform, y, dr.fma(v, self.rectangle.length1, self.y0))
+        x, y = x - self.x0, y - self.y0
+        point = self.rectangle.corner + self.rectangle.axis0 * x + self.rectangle.axis1 * y
+        away = point - self.origin
+        distance = dr.norm(away)
+        cosine = dr.abs(self.z0) / distance
+        return point, (x / self.rectangle.length0, y / self.rectangle.length1), self.pdf(distance, cosine)
+
+
+def is_rectangle(mi: ModuleType, shape: Any) -> bool:
+    """Whether a shape is a `rectangle` whose edges are perpendicular (a sheared one is not)."""
+    if shape is None or shape.shape_type() != mi.ShapeType.Rectangle.value:
+        return False
+    rectangle = Rectangle.of(mi, shape)
+    # 1e-4: the lean of edges that float32 transforms of a true rectangle stay far below; it bounds the error.
+    return abs(float(dr.dot(rectangle.axis0, rectangle.axis1)[0])) < 1e-4
+
+
+def register(mi: ModuleType) -> None:
+    """Make `gonio_area` known to the current variant of Mitsuba. Calling it again does nothing.
+
+    The plugin nests as `emitter` in any shape:
+
+        {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": {"type": "rgb", "value": [50, 50, 50]}}}
+
+    radiance  emitted radiance, W/(m^2 sr), the same in every direction on **both** sides; rgb, spectrum or texture
+
+    It is sampled by solid angle on rectangles, by the shape's own method on others. Not for light tracing
+    (`sample_ray` is not offered).
+    """
+    if mi.variant() in _registered:
+        return
+    _registered.add(mi.variant())
+
+    class TwoSidedAreaLight(mi.Emitter):
+        two_sided = True
+
+        def __init__(self, properties: Any):
+            mi.Emitter.__init__(self, properties)
+            self.radiance = properties.get_emissive_texture("radiance")
+            self.m_flags = mi.EmitterFlags.Surface
+
+        def eval(self, si: Any, active: Any = True) -> Any:
+            return dr.select(active, self.radiance.eval(si, active), 0)
+
+        def _rectangle(self) -> Rectangle | None:
+            shape = self.get_shape()
+            return Rectangle.of(mi, shape) if is_rectangle(mi, shape) else None
+
+        def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
+            if rectangle := self._rectangle():
+                ds = _rectangle_sample(mi, SphericalRectangle(rectangle, it.p), sample, it)
+            else:
+                ds = self.get_shape().sample_direction(it, sample, active)
+            active = mi.Bool(active) & (ds.pdf > 0)
+            ds.emitter = mi.EmitterPtr(self)
+            si = mi.SurfaceInteraction3f(ds, it.wavelengths)
+            return ds, dr.select(active, self.radiance.eval(si, active) / ds.pdf, 0)
+
+        def pdf_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
+            if rectangle := self._rectangle():
+                pdf = SphericalRectangle(rectangle, it.p).pdf(ds.dist, dr.abs(dr.dot(ds.d, ds.n)))
+                return dr.select(active, pdf, 0)
+            return self.get_shape().pdf_direction(it, ds, active)
+
+        def eval_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
+            return self.radiance.eval(mi.SurfaceInteraction3f(ds, it.wavelengths), active)
+
+        def bbox(self) -> Any:
+            return self.get_shape().bbox()
+
+        def traverse(self, callback: Any) -> None:
+            callback.put("radiance", self.radiance, mi.ParamFlags.Differentiable)
+
+        def to_string(self) -> str:
+            return f"TwoSidedAreaLight[radiance = {self.radiance}]"
+
+    mi.register_emitter("gonio_area", TwoSidedAreaLight)
+
+
+_registered: set[str] = set()
+
+
+def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Any, it: Any) -> Any:
+    """A Mitsuba direction sample from a spherical rectangle."""
+    point, uv, pdf = seen.sample(sample.x, sample.y)
+    ds = dr.zeros(mi.DirectionSample3f, dr.width(point))
+    ds.p, ds.n, ds.uv, ds.pdf = point, mi.Normal3f(seen.rectangle.normal), mi.Point2f(*uv), pdf
+    ds.time, ds.delta = it.time, False
+    away = point - it.p
+    ds.dist = dr.norm(away)
+    ds.d = away / ds.dist
+    return ds
+
+
+class Lights:
+    """The lights of a scene, as an integrator uses them.
+
+    A scene lit by one rectangle, as most of the lab's are, takes a short way: no choice of light, no virtual call,
+    solid-angle sampling whether the emitter is `gonio_area` or Mitsuba's one-sided `area`, and for a path's last
+    ray a hit test of one rectangle. Any other scene asks the emitters themselves (point, environment, ...); one of
+    several is chosen with a probability half uniform, half proportional to the light it sends into the scene.
+    """
+
+    def __init__(self, mi: ModuleType, scene: Any):
+        self.mi, self.scene = mi, scene
+        self.emitters = scene.emitters()
+        self.count = len(self.emitters)
+        self.rectangle: Rectangle | None = None
+        self.has_environment = scene.environment() is not None
+        if self.count == 1 and self._is_rectangle_light(self.emitters[0]):
+            self.rectangle = Rectangle.of(mi, self.emitters[0].get_shape())
+            dr.make_opaque(self.rectangle)
+        elif self.count > 1:
+            self.probability = self._probabilities()
+            self.choice = mi.DiscreteDistribution(self.probability)
+            self.by_pointer = self._by_pointer(self.probability)
+
+    def _is_rectangle_light(self, emitter: Any) -> bool:
+        known = getattr(emitter, "two_sided", False) or emitter.class_name() == "AreaLight"
+        return known and is_rectangle(self.mi, emitter.get_shape())
+
+    def _probabilities(self) -> Any:
+        """Half uniform, half by the mean unoccluded light at 256 points spread in the scene's bounding box.
+
+        The uniform half keeps every light's weight below 2 n: a dim lamp beside an object may matter most there.
+        """
+        mi = self.mi
+        index = dr.arange(mi.UInt32, 256)
+        it = dr.zeros(mi.SurfaceInteraction3f, 256)
+        box = self.scene.bbox()
+        if box.valid():
+            # Multiples of the plastic number's kin mod 1 (R3 sequence, M. Roberts): even, and the same every time.
+            spread = mi.Point3f([dr.mulsign(1, 1.0) * (mi.Float(index) * a % 1) for a in (0.8191725, 0.6710436, 0.5497005)])
+            it.p = mi.Point3f(box.min) + spread * mi.Vector3f(box.extents())
+        it.wavelengths = dr.zeros(type(it.wavelengths)) + 550
+        sample = mi.Point2f(mi.Float(index) * 0.7548777 % 1, mi.Float(index) * 0.5698403 % 1)
+        flux = []
+        for emitter in self.emitters:
+            _, weight = emitter.sample_direction(it, sample, True)
+            mean = float(dr.mean(dr.mean(weight, axis=0))[0])
+            flux.append(mean if 0 <= mean < float("inf") else 0.0)
+        total = sum(flux)
+        share = [f / total if total > 0 else 1 / self.count for f in flux]
+        return mi.Float([0.5 / self.count + 0.5 * s for s in share])
+
+    def _by_pointer(self, probability: Any) -> Any:
+        """The probabilities again, indexed by Dr.Jit's number of the emitter (what an EmitterPtr holds)."""
+        mi = self.mi
+        number = dr.reinterpret_array(mi.UInt32, self.scene.emitters_dr())
+        table = dr.zeros(mi.Float, int(dr.max(number)[0]) + 1)
+        dr.scatter(table, probability, number)
+        dr.eval(table)
+        return table
+
+    def emitted(self, si: Any, active: Any) -> Any:
+        """Radiance that the surface (or, where the ray left the scene, the environment) at `si` sends along the ray."""
+        if self.count == 0:
+            return dr.zeros(self.mi.Spectrum)
+        return si.emitter(self.scene).eval(si, active)
+
+    def sample(self, si: Any, u: Any, pick: Any, active: Any) -> LightSample:
+        """A direction toward a light; `u` chooses the point on it, `pick` in [0, 1) the light."""
+        mi = self.mi
+        if self.rectangle is not None:
+            seen = SphericalRectangle(self.rectangle, si.p)
+            ds = _rectangle_sample(mi, seen, u, si)
+            at_light = mi.SurfaceInteraction3f(ds, si.wavelengths)
+            at_light.wi = at_light.to_local(-ds.d)
+            weight = dr.select(ds.pdf > 0, self.emitters[0].eval(at_light, active) / ds.pdf, 0)
+            return LightSample(ds, weight, mi.Bool(False), dr.select(seen.uniform, seen.solid_angle, 0))
+        if self.count == 1:
+            ds, weight = self.emitters[0].sample_direction(si, u, active)
+            return LightSample(ds, weight, mi.Bool(ds.delta), mi.Float(0))
+        index, probability = self.choice.sample_pmf(pick, active)
+        emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), index, active)
+        ds, weight = emitter.sample_direction(si, u, active)
+        ds.pdf *= probability
+        return LightSample(ds, weight / probability, mi.Bool(ds.delta), mi.Float(0))
+
+    def pdf(self, origin: Any, solid_angle: Any, si: Any, active: Any) -> Any:
+        """Density with which `sample`, asked at `origin`, would have chosen the direction in which light `si` was met.
+
+        solid_angle  `LightSample.solid_angle` at that origin, so that it is not computed twice
+        """
+        mi = self.mi
+        if self.count == 0:
+            return mi.Float(0)
+        if self.rectangle is not None:
+            away = si.p - origin
+            distance = dr.norm(away)
+            return self._rectangle_pdf(solid_angle, distance, dr.abs(dr.dot(away, si.n)) / distance)
+        it = dr.zeros(mi.SurfaceInteraction3f)
+        it.p = origin
+        ds = mi.DirectionSample3f(self.scene, si, it)
+        if self.count == 1:
+            return self.emitters[0].pdf_direction(it, ds, active)
+        number = dr.reinterpret_array(mi.UInt32, ds.emitter)
+        return ds.emitter.pdf_direction(it, ds, active) * dr.gather(mi.Float, self.by_pointer, number, active)
+
+    def _rectangle_pdf(self, solid_angle: Any, distance: Any, cosine: Any) -> Any:
+        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.rectangle.area, 1e-30))
+        return dr.select(solid_angle > 0, dr.rcp(solid_angle), by_area)
+
+    def last_hit(self, ray: Any, origin: Any, solid_angle: Any, active: Any) -> tuple[Any, Any]:
+        """What a path's last ray adds: (radiance that arrives along it, density as in `pdf`).
+
+        All that this ray can still find is a light; with one rectangle the ray is traced only where it points at it.
+        """
+        mi = self.mi
+        if self.rectangle is None:
+            si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+            radiance = self.emitted(si, active)
+            return radiance, self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
+        distance, uv, hit = self.rectangle.hit(ray.o, ray.d)
+        active = active & hit & (distance < ray.maxt)
+        ds = dr.zeros(mi.DirectionSample3f)
+        ds.n, ds.d, ds.uv = mi.Normal3f(self.rectangle.normal), ray.d, mi.Point2f(*uv)
+        at_light = mi.SurfaceInteraction3f(ds, ray.wavelengths)
+        at_light.wi = at_light.to_local(-ray.d)
+        radiance = self.emitters[0].eval(at_light, active)
+        shadow = mi.Ray3f(ray)
+        # Stops short of the light by the same relative distance as Interaction::spawn_ray_to.
+        shadow.maxt = distance * (1 - mi.math.ShadowEpsilon)
+        active &= dr.any(radiance != 0)
+        active &= ~self.scene.ray_test(shadow, active)
+        pdf = self._rectangle_pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
+        return dr.select(active, radiance, 0), pdf
+
+
+@dataclass
+class LightSample:
+    """A direction sample `ds`, radiance over pdf `weight`, whether the light is a point (no BSDF sample can meet it),
+    and the solid angle of a rectangle sampled uniformly in it (0 where it was not)."""
+
+    ds: Any
+    weight: Any
+    delta: Any
+    solid_angle: Any
