@@ -60,7 +60,7 @@ class Dielectric(BSDF):
         return where(h.z < 0.0, -h, h)
 
     def _terms(self, wo: Any, wi: Any, m: Any, eta: Any, alpha: Any) -> tuple[Any, Any, Any]:
-        """(D G / |o.n|, |o.m| times the Jacobian dm/dwi, F) for the pair: what eval, pdf and the weight are made of."""
+        """(D G / |o.n|, |o.m| dm/dwi over `_squeeze`, F) for the pair: what eval, pdf and the weight are made of."""
         ndf = distribution(self.ndf)
         reflects = wo.z * wi.z > 0.0
         dot_o, dot_i = dot(wo, m), dot(wi, m)
@@ -71,18 +71,21 @@ class Dielectric(BSDF):
         if self.transmission:
             g_through = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha, transmits=True)
             g = where(reflects, g, g_through)
-            # Walter2007, eq. 17 (eq. 14 for reflection), times |o.m|
-            spread = where(reflects, spread, safe_div(sqr(eta) * abs(dot_i * dot_o), sqr(dot_o + eta * dot_i)))
+            # Walter2007, eq. 17 (eq. 14 for reflection), times |o.m| / eta^2
+            spread = where(reflects, spread, safe_div(abs(dot_i * dot_o), sqr(dot_o + eta * dot_i)))
         return safe_div(ndf.D(m, alpha) * g, abs(wo.z)), spread, f
 
     def _share(self, f: Any) -> Any:
         """Probability of choosing reflection."""
         return f if self.transmission else 1.0 + 0.0 * f
 
-    def _radiance_scale(self, reflects: Any, eta: Any, mode: str) -> Any:
-        if mode == "importance":
-            return 1.0 + 0.0 * eta
-        return where(reflects, 1.0, 1.0 / sqr(eta))
+    def _squeeze(self, reflects: Any, eta: Any) -> Any:
+        """eta^2 for transmission: by how much solid angle shrinks on its way in, and radiance grows."""
+        return where(reflects, 1.0, sqr(eta))
+
+    def _carried(self, reflects: Any, eta: Any, mode: str) -> Any:
+        """Factor of the quantity that is carried: the eta^2 of the Jacobian cancels for radiance."""
+        return self._squeeze(reflects, eta) if mode == "importance" else 1.0
 
     def _live(self, wo: Any, wi: Any) -> Any:
         """Whether the pair can be joined by a rough lobe at all."""
@@ -96,7 +99,7 @@ class Dielectric(BSDF):
         m = self._normal(wo, wi, eta)
         facets, spread, f = self._terms(wo, wi, m, eta, alpha)
         reflects = wo.z * wi.z > 0.0
-        share = where(reflects, f, 1.0 - f) * self._radiance_scale(reflects, eta, mode)
+        share = where(reflects, f, 1.0 - f) * self._carried(reflects, eta, mode)
         return self.albedo * where(self._live(wo, wi) & ~smooth, facets * spread * share, 0.0)
 
     def pdf(self, wo: Any, wi: Any) -> Any:
@@ -107,7 +110,7 @@ class Dielectric(BSDF):
         m = self._normal(wo, wi, eta)
         _, spread, f = self._terms(wo, wi, m, eta, alpha)
         reflects = wo.z * wi.z > 0.0
-        share = where(reflects, self._share(f), 1.0 - self._share(f))
+        share = where(reflects, self._share(f), 1.0 - self._share(f)) * self._squeeze(reflects, eta)
         # a facet seen from its back, or one that would refract into the wrong side, is never sampled
         seen = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
         density = safe_div(share * microfacet.normal_pdf(self, wo, m, alpha) * spread, abs(dot(wo, m)))
@@ -131,11 +134,11 @@ class Dielectric(BSDF):
         facets, spread, _ = self._terms(wo, wi, m, eta, alpha)
         chance = where(reflects, share, 1.0 - share)
         right_side = where(reflects, wo.z * wi.z > 0.0, wo.z * wi.z < 0.0) & (dot(wo, facing) > 0.0)
-        density = safe_div(microfacet.normal_pdf(self, wo, m, alpha) * spread, cos_o)
+        density = safe_div(microfacet.normal_pdf(self, wo, m, alpha) * spread * self._squeeze(reflects, eta), cos_o)
         pdf = chance * where(smooth, 1.0, density)
         pdf = where(right_side, pdf, 0.0)
-        value = where(smooth, 1.0, facets * spread) * where(reflects, f, 1.0 - f)
-        value = value * self._radiance_scale(reflects, eta, mode)
+        ideal = 1.0 if mode == "importance" else 1.0 / self._squeeze(reflects, eta)
+        value = where(smooth, ideal, facets * spread * self._carried(reflects, eta, mode)) * where(reflects, f, 1.0 - f)
         weight = self.albedo * where(pdf > 0.0, safe_div(value, pdf), 0.0)
         relative = where(reflects, 1.0, eta)
         return Sample(frame.rotate_back(wi, self.rotation), weight, pdf, smooth & right_side, relative)

@@ -37,9 +37,13 @@ class GGX(NDF):
 
     @function
     def D(self, m: Any, alpha: Any) -> Any:
-        """GGX density of normals, 1/sr. Written in m_x, m_y: the form in m_z alone cancels at the peak."""
-        stretched = sqr(m.x / alpha.x) + sqr(m.y / alpha.y) + sqr(m.z)
-        return where(m.z > 0.0, 1.0 / (ops.pi * alpha.x * alpha.y * sqr(stretched)), 0.0)
+        """GGX density of normals, 1/sr. Written in m_x, m_y: the form in m_z alone cancels at the peak.
+
+        Multiplied through by (alpha_x alpha_y)^2, so that one division is left.
+        """
+        area = alpha.x * alpha.y
+        stretched = sqr(m.x * alpha.y) + sqr(m.y * alpha.x) + sqr(m.z * area)
+        return where(m.z > 0.0, area * sqr(area) / (ops.pi * sqr(stretched)), 0.0)
 
     @function
     def Lambda(self, v: Any, alpha: Any) -> Any:
