@@ -100,14 +100,15 @@ class _Builder:
     def shape(self, shape: Any, where: str, name: str, emitter: dict[str, Any] | None = None) -> Any:
         matrix = shape.transform.matrix()
         bsdf = self.bsdf(shape.material or BY_TYPE["matte"](type="matte"), f"{where}/material")
+        # An object, not a dict: Mitsuba merges equal dicts, and one emitter cannot belong to two shapes.
+        source = None if emitter is None else self.load(emitter, where)
         native = self.native_shape(shape, matrix)
         if native is not None:
             native["bsdf"] = bsdf
-            if emitter is not None:
-                native["emitter"] = emitter
+            if source is not None:
+                native["emitter"] = source
             return native
-        mesh = self.triangles(shape, where).transformed(matrix)
-        return mesh.to_mitsuba(self.mi, name, bsdf, None if emitter is None else self.load(emitter, where))
+        return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
 
     def native_shape(self, shape: Any, matrix: np.ndarray) -> dict[str, Any] | None:
         """Mitsuba's own exact shape, where it has one."""
@@ -163,8 +164,10 @@ class _Builder:
             elif parameters[name].kind == "spectrum":
                 plugin[name] = self.colour(value, parameters[name], here)
             elif isinstance(value, tuple):
-                for axis, item in zip("xy", value, strict=True):
-                    plugin[f"{name}_{axis}"] = self.scalar(item, parameters[name], here, squared)
+                pair = [self.scalar(item, parameters[name], here, squared) for item in value]
+                if any(isinstance(item, dict) for item in pair):  # the plugin takes two numbers or two textures
+                    pair = [item if isinstance(item, dict) else self.flat(item) for item in pair]
+                plugin[f"{name}_x"], plugin[f"{name}_y"] = pair
             else:
                 plugin[name] = self.scalar(value, parameters[name], here, squared)
         if material.normalmap is not None:
@@ -185,6 +188,10 @@ class _Builder:
             self.check_range(pixels, parameter, value, where)
             return textures.bitmap(self.mi, pixels, value.filter, value.wrap)
         return float(value) ** 2 if squared else float(value)
+
+    def flat(self, value: float) -> dict[str, Any]:
+        """A texture that has one value everywhere."""
+        return textures.bitmap(self.mi, np.full((1, 1, 1), value, np.float32), "nearest", "clamp")
 
     def normal_mapped(self, plugin: dict[str, Any], texture: NormalMap, where: str) -> dict[str, Any]:
         pixels = self.image(texture, where)

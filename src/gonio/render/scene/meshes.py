@@ -2,7 +2,8 @@
 
 Disk, cone and cylinder are tessellated with exact normals and texture coordinates at the vertices. A full turn has
 `SEGMENTS` = 1024 segments: points lie up to radius * (1 - cos(pi/1024)) = 4.7e-6 radius inside the true surface, and
-dp/du, constant over a segment, is off by up to pi/1024 = 0.18 degrees.
+dp/du, constant over a segment, is off by up to pi/1024 = 0.18 degrees, as are normals near a cone's apex; u is off by
+up to half a segment, 1/2048, near the centre of a disk and the apex of a cone.
 """
 
 from __future__ import annotations

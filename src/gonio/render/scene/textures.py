@@ -99,7 +99,7 @@ def bitmap(mi: Any, values: np.ndarray, filter_type: str, wrap: str) -> dict[str
     raw = values.shape[2] == 1 or not mi.variant().endswith("spectral")
     return {
         "type": "bitmap",
-        "bitmap": mi.Bitmap(np.ascontiguousarray(values, np.float32)),
+        "bitmap": mi.Bitmap(np.array(values, np.float32, order="C")),
         "raw": raw,
         "filter_type": filter_type,
         "wrap_mode": wrap,
@@ -109,10 +109,10 @@ def bitmap(mi: Any, values: np.ndarray, filter_type: str, wrap: str) -> dict[str
 def environment(mi: Any, values: np.ndarray) -> dict[str, Any]:
     """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) is u = p/2pi, v = t/pi.
 
-    Mitsuba's `envmap` differs in three ways. It runs the other way round, (sin p, -cos p): mirrored left to right,
-    and turned by half a turn. Its texel 0 lies at u = 0, not half a texel in: turned by that. And its rows
-    lie at v = j/(h - 1), the poles included: the rows are laid out at twice the density, row 2j + 1 being row j, those
-    between them means. A mean lies on the line between its neighbours, so that linear interpolation is unchanged.
+    Mitsuba's `envmap` differs in two ways. It runs the other way round, (sin p, -cos p): mirrored left to right, and
+    turned by half a turn. And its rows lie at v = j/(h - 1), the poles included, not at (j + .5)/h: the rows are laid
+    out at twice the density, row 2j + 1 being row j, those between them means. A mean lies on the line between its
+    neighbours, so that linear interpolation is unchanged.
     """
     values = np.broadcast_to(values, (*values.shape[:2], 3))
     rows = np.empty((2 * values.shape[0] + 1, values.shape[1], 3), np.float32)
@@ -121,6 +121,6 @@ def environment(mi: Any, values: np.ndarray) -> dict[str, Any]:
     rows[0], rows[-1] = values[0], values[-1]
     return {
         "type": "envmap",
-        "bitmap": mi.Bitmap(np.ascontiguousarray(np.maximum(rows[:, ::-1], 0))),
-        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180.0 - 180.0 / values.shape[1]),
+        "bitmap": mi.Bitmap(np.array(np.maximum(rows[:, ::-1], 0), order="C")),
+        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180.0),
     }
