@@ -133,9 +133,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--check-samples", type=int, default=0, metavar="MILLIONS")
     options = parser.parse_args()
-    print(
-        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Mitsuba {mi.__version__}, {mi.variant()}"
-    )
+    machine = f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores"
+    print(f"{machine}, Mitsuba {mi.__version__}, {mi.variant()}")
     print(f"{options.pairs:g} M pairs, {options.rounds} turns; rates in M/s, ratio = Gonio's rate over Mitsuba's")
     print(f"{'material':20} {'what':8} {'Mitsuba':>9} {'Gonio':>9} {'ratio':>7}")
     for name in PAIRS:

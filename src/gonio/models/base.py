@@ -23,7 +23,7 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, dataclass_transform
 
 import numpy as np
 
@@ -173,6 +173,9 @@ def bsdf(doc: str) -> Any:
     return _declare("bsdf", dataclasses.MISSING, doc)
 
 
+@dataclass_transform(
+    frozen_default=True, eq_default=False, field_specifiers=(number, spectrum, width, angle, choice, flag, bsdf)
+)
 class BSDF:
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
 

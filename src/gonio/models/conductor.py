@@ -13,8 +13,8 @@ from .base import BSDF, Sample, Value, angle, choice, spectrum, width
 class Conductor(BSDF):
     """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
 
-    D, G and F are chosen by name. alpha below 1e-4 is a perfect mirror. Light that a second facet would reflect is lost:
-    at alpha = 1 more than half.
+    D, G and F are chosen by name. alpha below 1e-4 is a perfect mirror. Light that a second facet would reflect is
+    lost: at alpha = 1 more than half.
     """
 
     eta: Value = spectrum(0.0, "real part of the refractive index, over the outside's", low=0.0)

@@ -43,7 +43,7 @@ class Dielectric(BSDF):
         if self.fresnel == "one":
             return 1.0 + 0.0 * cos_o
         if self.fresnel == "schlick":
-            # from the denser side Schlick's angle is the transmitted one, where the curve reaches 1 at the critical angle
+            # from the denser side Schlick's angle is the transmitted one: the curve is 1 at the critical angle
             cos_theta = where(eta < 1.0, cos_t, cos_o)
             return where(cos_t > 0.0, fresnel.schlick(cos_theta, fresnel.r0_dielectric(eta)), 1.0)
         return fresnel.dielectric(cos_o, cos_t, eta)
@@ -53,7 +53,7 @@ class Dielectric(BSDF):
         return where(wo.z >= 0.0, self.eta, 1.0 / self.eta)
 
     def _normal(self, wo: Any, wi: Any, eta: Any) -> Any:
-        """Normal of the facet that sends wo to wi, by reflection or refraction (Walter2007, eq. 13 and 16), m.z >= 0."""
+        """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
         h = wo + wi * ratio
         h = h * (1.0 / maximum(norm(h), 1e-15))

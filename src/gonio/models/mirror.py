@@ -10,7 +10,7 @@ from .base import BSDF, Sample, Value, spectrum
 
 
 class Mirror(BSDF):
-    """Ideal reflection: all light leaves at theta_o = theta_i, phi_o = phi_i + pi (course notes, part B). A delta lobe."""
+    """Ideal reflection: all light leaves at theta_o = theta_i, phi_o = phi_i + pi: a delta lobe (course notes, B)."""
 
     albedo: Value = spectrum(1.0, "share of light that is reflected", low=0.0, high=1.0, soft_high=True)
 

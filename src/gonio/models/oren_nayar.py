@@ -11,7 +11,7 @@ from .base import BSDF, Value, number, spectrum
 class OrenNayar(BSDF):
     """Diffuse reflection of a surface of Lambertian V-grooves, in the qualitative form (OrenNayar1994, sec. 4.4).
 
-    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a = max(theta_o, theta_i), b = min(theta_o, theta_i)
+    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a, b = max, min of theta_o, theta_i
     A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
 
     No trigonometry: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and the sines times the

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from .. import ops
 from ..errors import InputError
@@ -25,7 +25,7 @@ class _Empirical(BSDF):
     ka: Value = spectrum(0.0, "ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(False, "require ka + kd + ks = 1")
 
-    breaks = {
+    breaks: ClassVar[dict[str, str]] = {
         "reciprocity": "the specular term has no cosine, so f divides it by cos theta_i alone",
         "energy": "neither term is normalized: kd = 1 reflects pi times what it receives",
     }

@@ -10,7 +10,7 @@ from .base import BSDF, Sample, bsdf
 
 
 class TwoSided(BSDF):
-    """The base material on both sides: a surface seen from behind looks as from the front. The base must not transmit."""
+    """The base material on both sides: from behind it looks as from the front. The base must not transmit."""
 
     base: BSDF = bsdf("the material, which must not transmit")
 

@@ -74,8 +74,7 @@ def types(precision: str | None = None) -> Types:
     return _types("llvm", precision == "float64")
 
 
-@lru_cache
-def types_like(kind: type) -> Types:
+def types_like(kind: Any) -> Types:
     """The types that go with a Dr.Jit array type: same device, same precision."""
     dr = drjit()
     backend = "cuda" if dr.backend_v(kind) == dr.JitBackend.CUDA else "llvm"

@@ -14,6 +14,7 @@ others. A spectrum has as many channels as whoever evaluates the graph gives it.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import math
 import sys
@@ -267,13 +268,17 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Any], 
     try:
         inner = {}
         for argument, value in arguments.items():
-            names = (path for path, _ in _flatten(value, argument))
-            inner[argument] = _rebuild(value, lambda node, names=names: function.parameter(next(names), node.type))
+            replacements = iter([function.parameter(path, node.type) for path, node in _flatten(value, argument)])
+            inner[argument] = _rebuild(value, functools.partial(_next, replacements))
         function.result = _rebuild_constants(python_function(**inner))
     finally:
         _stack.pop()
     graph.functions.append(function)
     return function
+
+
+def _next(replacements: Iterator[Node], _: Node) -> Node:
+    return next(replacements)
 
 
 def _rebuild_constants(result: Any) -> Any:

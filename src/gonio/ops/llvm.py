@@ -69,8 +69,7 @@ def _candidates() -> list[tuple[Path, str]]:
     for folder in _SYSTEM_FOLDERS:
         for pattern in ("libLLVM*.so*", "libLLVM*.dylib"):
             found += [(path, "system") for path in sorted(Path(folder).glob(pattern))]
-    for folder in sorted(Path("/usr/lib").glob("llvm-*/lib"), reverse=True):
-        found += [(path, "system") for path in sorted(folder.glob("libLLVM*.so*"))]
+    found += [(path, "system") for path in sorted(Path("/usr/lib").glob("llvm-*/lib/libLLVM*.so*"))]
     by_linker = ctypes.util.find_library("LLVM")
     if by_linker and os.path.isabs(by_linker):
         found.append((Path(by_linker), "system"))

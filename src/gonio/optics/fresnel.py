@@ -1,7 +1,7 @@
 """Fresnel reflectance of unpolarized light, exact and by Schlick.
 
 `eta` is the index on the far side over the index on the side of the incident direction; for conductors eta and k are
-those of the metal over the index of the dielectric outside. Cosines are of the angle to the (micro)facet's normal, >= 0.
+those of the metal over the index of the dielectric outside. Cosines, >= 0, are to the facet's normal.
 """
 
 from __future__ import annotations

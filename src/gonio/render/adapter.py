@@ -63,7 +63,8 @@ def _adapter_class(mi: ModuleType) -> type:
         plain: list[Any] = []
         for name in names:
             if props.has_property(name):
-                given, value = props.type(name), None
+                given = props.type(name)
+                value: Any = None
                 if given in (mi.Properties.Type.Float, mi.Properties.Type.Integer):
                     value = float(props[name])
                 elif given == mi.Properties.Type.Color:
@@ -145,6 +146,8 @@ def _adapter_class(mi: ModuleType) -> type:
 
     class GonioBSDF(mi.BSDF):  # type: ignore[misc, name-defined]
         """A Gonio model in a Mitsuba scene."""
+
+        model: Any
 
         def __init__(self, props: Any, model: type[BSDF]) -> None:
             mi.BSDF.__init__(self, props)

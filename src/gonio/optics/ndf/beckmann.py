@@ -33,7 +33,10 @@ STEPS = 2  # of Newton's method: the cumulated density is then met to 3e-8
 
 
 class Beckmann(NDF):
-    """D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4) (Heitz2014; isotropic: Walter2007, eq. 25)."""
+    """D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4).
+
+    Heitz2014; isotropic: Walter2007, eq. 25.
+    """
 
     name = "beckmann"
 
@@ -52,7 +55,7 @@ class Beckmann(NDF):
 
     @function
     def Lambda(self, v: Any, alpha: Any) -> Any:
-        """(erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), a = 1 / (alpha tan) (Heitz2014; Walter2007, sec. 5.2, for G1)."""
+        """(erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), a = 1 / (alpha tan) (Heitz2014)."""
         a = maximum(self._cotangent(v, alpha), 1e-15)
         return maximum(0.5 * (erf(a) - 1.0) + exp(-sqr(a)) * (0.5 * _INV_SQRT_PI) / a, 0.0)
 

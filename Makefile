@@ -1,0 +1,46 @@
+# `make demo` renders the shading balls, `make test` passes the tests; both make what they need in .venv first.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test test-all lint bench install clean docs
+
+install: .venv/installed
+
+.venv/installed: pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("Gonio needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else 0'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+# a checkout that is only looked at needs no test tools
+.venv/rendering: pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("Gonio needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else 0'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+demo: .venv/rendering
+	$(BIN)/gonio render examples/shading-balls -o out/shading-balls.png
+
+lint: .venv/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: .venv/installed lint
+	$(BIN)/python -m pytest -m 'not slow'
+
+test-all: .venv/installed lint
+	$(BIN)/python -m pytest
+
+bench: .venv/installed
+	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/bsdf.py
+	$(BIN)/python benchmarks/render.py
+
+docs: .venv/installed
+	$(BIN)/python docs/make_pages.py
+
+clean:
+	rm -rf .venv out build dist
