@@ -6,6 +6,7 @@ Keys are spelled as in the file through their aliases.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -36,6 +37,11 @@ class Output(Part):
 
 def samplers() -> list[str]:
     """The sampler names the integrators know."""
+    from ...errors import MachineError
+    from ...ops import llvm
+
+    with contextlib.suppress(MachineError):  # the import below starts Dr.Jit; without LLVM it can still serve a GPU
+        llvm.use()
     from ..sampler import SAMPLERS
 
     return list(SAMPLERS)
@@ -125,9 +131,6 @@ class Film(Part):
 
     @model_validator(mode="after")
     def _fits(self) -> Film:
-        width, height = self.size
-        if min(self.size) < 1:
-            raise invalid(f"a picture of {width} x {height} pixels is empty", "give at least 1 x 1", "size")
         from ..run import check_film  # the same limit as `--size`
 
         try:
