@@ -9,7 +9,7 @@ from .base import BSDF, Value, spectrum
 
 
 class Lambert(BSDF):
-    """Ideal diffuse reflection: f = albedo / pi, the same in every direction (course sheet B; Lambert1760).
+    """Ideal diffuse reflection: f = albedo / pi, the same in every direction (course notes, part B).
 
     Energy conserving for albedo <= 1, reciprocal. Sampled by the cosine.
     """

@@ -10,7 +10,7 @@ from ..ops import abs, backend, maximum, vec2, vec3, where
 from ..optics import masking
 from ..optics.ndf import distribution, distributions
 
-NDFS = {name: (type(ndf).__doc__ or "").split(" (")[0] for name, ndf in distributions().items()}
+NDFS = {name: ndf.title for name, ndf in distributions().items()}
 MASKINGS = masking.KINDS
 SAMPLINGS = {
     "visible": "normals as wo sees them",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any, ClassVar
 
 from ...ops import abs, dot, maximum, safe_div
@@ -15,6 +16,11 @@ class NDF:
     """
 
     name: ClassVar[str] = ""
+
+    @property
+    def title(self) -> str:
+        """First line of the member's file, for the manual."""
+        return (sys.modules[type(self).__module__].__doc__ or self.name).splitlines()[0].rstrip(".")
 
     def D(self, m: Any, alpha: Any) -> Any:
         """Density of normals, 1/sr: its integral over D(m) m.z is 1."""
