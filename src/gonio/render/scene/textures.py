@@ -14,8 +14,8 @@ from .. import images
 MAX_BYTES = 2**30  # of an image file
 MAX_PIXELS = 2**28  # 3 GiB as float32 RGB
 
-_MAGIC = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"\x76\x2f\x31\x01": ".exr", b"#?": ".hdr", b"BM": ".bmp"}
-_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".exr": "OpenEXR", ".hdr": "RGBE", ".bmp": "BMP"}
+_MAGIC = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"\x76\x2f\x31\x01": ".exr", b"#?": ".hdr"}
+_FORMATS = {".png": "PNG", ".jpg": "JPEG", ".exr": "OpenEXR", ".hdr": "RGBE"}
 
 
 def load_image(mi: Any, path: Path, where: str, *, srgb: bool = False) -> np.ndarray:
@@ -64,9 +64,6 @@ def _size(content: bytes, kind: str) -> tuple[int, int] | None:
     try:
         if kind == ".jpg":
             return _jpeg_size(content)
-        if kind == ".bmp":
-            width, height = struct.unpack("<ii", content[18:26])
-            return width, abs(height)
         return images._claimed_size(content, kind)
     except (struct.error, IndexError):
         return None

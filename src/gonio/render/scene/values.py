@@ -101,7 +101,7 @@ class ImageTexture(Part):
 
     type: Literal["imageTex"]
     file: str = Field(min_length=1)
-    """Image beside the scene: .png, .jpg, .hdr, .exr, .bmp, .pfm, .ppm."""
+    """Image beside the scene: .png, .jpg, .hdr or .exr."""
     color_space: Literal["raw", "srgb"] = Field("raw", alias="colorSpace")
     """"srgb" decodes 8-bit values to linear light; "raw" (the lab's) takes them as they stand."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
