@@ -44,8 +44,9 @@ def get_precision() -> str:
 
 @lru_cache
 def drjit() -> ModuleType:
-    """Dr.Jit, with a working LLVM handed over before its first use."""
-    llvm.use()
+    """Dr.Jit; imported here first, it gets a working LLVM. On a GPU it is there already and needs none."""
+    if "drjit" not in sys.modules:
+        llvm.use()
     import drjit as dr
 
     return dr
@@ -54,6 +55,8 @@ def drjit() -> ModuleType:
 @lru_cache
 def _types(backend: str, double: bool) -> Types:
     dr = drjit()
+    if backend == "llvm":
+        llvm.use()  # whoever imported Dr.Jit: an LLVM that would abort is an error here
     module: ModuleType = getattr(dr, backend).ad
     end = "64" if double else ""
     return Types(
