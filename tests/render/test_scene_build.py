@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from gonio.errors import InputError
 from gonio.render import engine, scene
 
@@ -324,7 +323,12 @@ def test_opaque_materials_are_not_black_from_behind(mi, build):
 
 
 def test_mix_nests_materials(mi, build):
-    mix = {"type": "mix", "a": {"type": "matte", "albedo": 0.2}, "b": {"type": "lambert", "albedo": 0.6}, "weight": 0.25}
+    mix = {
+        "type": "mix",
+        "a": {"type": "matte", "albedo": 0.2},
+        "b": {"type": "lambert", "albedo": 0.6},
+        "weight": 0.25,
+    }
     assert np.allclose(reflected(mi, build(square(mix))), 0.3 / math.pi, rtol=1e-5)
 
 

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-
 from gonio.errors import InputError
 from gonio.render import engine, scene
 from gonio.render.scene import meshes, textures
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 QUAD_OBJ = """# a unit square, facing +z
 v 0 0 0
@@ -114,8 +113,16 @@ def test_zero_normals_are_taken_from_the_faces(tmp_path):
         ("a.obj", b"\x00\xff\xfe" * 100, "no faces"),
         ("a.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "degenerate"),
         ("a.ply", b"solid\n", "no PLY header"),
-        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\nend_header\n1\n", "'vertex' entries"),
-        ("a.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999\nproperty float x\nend_header\n1\n", "'vertex'"),
+        (
+            "a.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\nend_header\n1\n",
+            "'vertex' entries",
+        ),
+        (
+            "a.ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999\nproperty float x\nend_header\n1\n",
+            "'vertex'",
+        ),
         ("a.ply", quad_ply("binary_little_endian", struct.pack("<B4i", 4, 0, 1, 2, 7)), "names vertex 7"),
         ("a.ply", quad_ply("binary_little_endian", struct.pack("<B4i", 4, 0, 1, 2, -1)), "names vertex -1"),
         ("a.ply", quad_ply("binary_little_endian", struct.pack("<B2i", 200, 0, 1)), "'face' entries"),
@@ -132,7 +139,9 @@ def test_bad_mesh_is_one_error(tmp_path, name, content, what):
     assert caught.value.where == "scene.json#/scene/shapes/0/file"
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(st.data(), st.sampled_from(["a.obj", "a.ply", "b.ply"]))
 def test_damaged_mesh_reads_or_is_refused_but_nothing_else(tmp_path, data, name):
     content = {"a.obj": QUAD_OBJ.encode(), "a.ply": quad_ply("ascii"), "b.ply": quad_ply("binary_big_endian")}[name]

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-
 from gonio.errors import InputError
 from gonio.render import scene
 from gonio.render.scene.text import MAX_DEPTH
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -163,7 +162,13 @@ WRONG = [
     (MATERIAL, {"albedo": 1}, None, "key 'type' is missing", "type"),
     (MATERIAL, [], None, "expected an object", "{ }"),
     (MATERIAL, None, None, "got null", "leave the key out"),
-    (MATERIAL, {"type": "gonio-conductor", "alpha": 0.1, "roughness": 0.1}, MATERIAL + "/roughness", "both", "keep one"),
+    (
+        MATERIAL,
+        {"type": "gonio-conductor", "alpha": 0.1, "roughness": 0.1},
+        MATERIAL + "/roughness",
+        "both",
+        "keep one",
+    ),
     (MATERIAL, {"type": "two-sided", "base": {"type": "gonio-dielectric"}}, None, "transmits", "two sides"),
     (MATERIAL, {"type": "mix", "a": {"type": "matte"}, "b": {"type": "mate"}}, MATERIAL + "/b/type", "'mate'", "matte"),
     (MATERIAL, {"type": "conductor", "roughness": 0, "preset": "Au", "k": 1}, MATERIAL + "/preset", "both", "keep one"),
@@ -479,7 +484,9 @@ def test_mutated_scene_reads_or_is_refused_but_nothing_else(tmp_path, data):
         elif action == "delete":
             del holder[steps[-1]]
         elif isinstance(holder, dict):
-            holder[data.draw(st.one_of(st.text(max_size=5), st.sampled_from(["type", "material", "alpha"])))] = data.draw(JUNK)
+            holder[data.draw(st.one_of(st.text(max_size=5), st.sampled_from(["type", "material", "alpha"])))] = (
+                data.draw(JUNK)
+            )
         else:
             holder.append(data.draw(JUNK))
         if len(places(mutated)) == 1:

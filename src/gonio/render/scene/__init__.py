@@ -1,8 +1,8 @@
 """Scenes: the lab's JSON and Gonio's additions to it, validated, and built for Mitsuba.
 
-    from gonio.render import engine, scene
-    description = scene.read("examples/phong")
-    mitsuba_scene = scene.build(description, engine.load())
+from gonio.render import engine, scene
+description = scene.read("examples/phong")
+mitsuba_scene = scene.build(description, engine.load())
 """
 
 from __future__ import annotations

@@ -27,10 +27,9 @@ def build(description: schema.SceneDescription, mi: Any) -> Any:
 
 class _Builder:
     def __init__(self, description: schema.SceneDescription, mi: Any) -> None:
-        import gonio.mitsuba  # noqa: F401 - registers the models
+        from .. import adapter, lights  # here, since they start Dr.Jit
 
-        from .. import lights
-
+        adapter.register(mi)
         lights.register(mi)
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, Any] = {}

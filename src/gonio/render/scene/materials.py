@@ -19,6 +19,8 @@ from ...errors import GonioWarning, InputError
 from ...models import BSDF, Parameter, models
 from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
 
+Model = type[BSDF]
+
 
 @dataclass(frozen=True)
 class LabType:
@@ -80,7 +82,7 @@ class MaterialPart(Part):
     two_sided: Annotated[bool, Strict()] | None = None
     """Whether both sides reflect alike; by default all materials do that let no light through."""
 
-    model: ClassVar[type[BSDF]]
+    model: ClassVar[Model]
     declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
     dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
     lab: ClassVar[LabType | None]
@@ -140,9 +142,9 @@ class MaterialPart(Part):
                 raise invalid(
                     f"both '{given[0]}' and '{given[1]}' are given", f"they set the same {name}; keep one", given[1]
                 )
-            needed = self.lab and any(key in self.lab.required for key in keys)
+            needed = [key for key in keys if self.lab and key in self.lab.required]
             if needed and not given:
-                raise invalid(f"key '{self.lab.required[0]}' is missing", f"give one of {', '.join(keys)}")
+                raise invalid(f"key '{needed[0]}' is missing", f"give one of {', '.join(keys)}")
         self._check_preset()
         return self
 
@@ -242,7 +244,7 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
     for key in lab.ignored if lab else ():
         fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="Accepted and ignored."))
     if hasattr(model, "preset"):
-        doc = "A named refractive index in place of the numbers, e.g. \"Au\"."
+        doc = 'A named refractive index in place of the numbers, e.g. "Au".'
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
     title = "".join(word.capitalize() for word in names[0].split("-"))
     cls = create_model(title, __base__=MaterialPart, __doc__=lab.doc if lab else _summary(model), **fields)
@@ -275,4 +277,3 @@ else:
     Material = Annotated[Union[tuple(MATERIALS)], Field(discriminator="type")]  # noqa: UP007
     for _cls in MATERIALS:
         _cls.model_rebuild(_types_namespace={"Material": Material})
-

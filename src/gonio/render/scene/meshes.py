@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -93,9 +94,7 @@ def cylinder(radius: float, height: float, phi_max: float) -> Triangles:
 def cone(radius: float, height: float, phi_max: float) -> Triangles:
     """Base circle in z = 0, apex at z = height, open below, normals outward; v = z / height."""
     length = math.hypot(radius, height)
-    return _revolved(
-        phi_max, rings=[(radius, 0.0, 0.0), (0.0, height, 1.0)], slope=(height / length, radius / length)
-    )
+    return _revolved(phi_max, rings=[(radius, 0.0, 0.0), (0.0, height, 1.0)], slope=(height / length, radius / length))
 
 
 def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tuple[float, float]) -> Triangles:
@@ -124,15 +123,16 @@ def _revolved(phi_max: float, rings: list[tuple[float, float, float]], slope: tu
     if r1 == 0:
         faces = np.stack([low, low + 1, high], axis=1)
     else:
-        faces = np.concatenate(
-            [np.stack([low, low + 1, high + 1], axis=1), np.stack([low, high + 1, high], axis=1)]
-        )
+        faces = np.concatenate([np.stack([low, low + 1, high + 1], axis=1), np.stack([low, high + 1, high], axis=1)])
     return Triangles(vertices, faces, normals, uv)
 
 
 def cube() -> Triangles:
     """[-1, 1]^3, normals outward. On the face across axis i, u runs along axis i + 1 and v along axis i + 2."""
-    vertices, faces, normals, uv = [], [], [], []
+    vertices: list[np.ndarray] = []
+    normals: list[np.ndarray] = []
+    faces: list[list[int]] = []
+    uv: list[tuple[int, int]] = []
     for axis in range(3):
         along_u, along_v = (axis + 1) % 3, (axis + 2) % 3
         for side in (-1.0, 1.0):
@@ -209,7 +209,7 @@ def _sound(mesh: Triangles, path: Path, where: str) -> Triangles:
 
 
 def read_obj(data: bytes, path: Path, where: str) -> Triangles:
-    """Wavefront OBJ: v, vt, vn and f; polygons become fans; negative numbers count from the end; the rest is skipped."""
+    """Wavefront OBJ: v, vt, vn, f; polygons become fans, negative numbers count from the end, the rest is skipped."""
     columns: dict[bytes, list[list[float]]] = {b"v": [], b"vt": [], b"vn": []}
     corners: list[tuple[int, int, int]] = []
     needed = {b"v": 3, b"vt": 2, b"vn": 3}
@@ -252,7 +252,7 @@ def read_obj(data: bytes, path: Path, where: str) -> Triangles:
             polygon = [corner(word, number) for word in words[1:]]
             if len(polygon) < 3:
                 refuse(number, f"a face of {len(polygon)} vertices, at least 3 expected")
-            for second, third in zip(polygon[1:-1], polygon[2:], strict=True):
+            for second, third in pairwise(polygon[1:]):
                 corners += [polygon[0], second, third]
     if not corners:
         raise InputError(f"'{path.name}' has no faces", where, "is it an OBJ file? expected lines like: f 1 2 3")
@@ -314,11 +314,7 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
             return None
         return np.stack([np.asarray(vertex[name], dtype=float) for name in names], axis=1)
 
-    faces = [
-        (polygon[0], second, third)
-        for polygon in lists[0]
-        for second, third in zip(polygon[1:-1], polygon[2:], strict=True)
-    ]
+    faces = [(polygon[0], second, third) for polygon in lists[0] for second, third in pairwise(polygon[1:])]
     uv = [columns(*names) for names in (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))]
     positions = columns("x", "y", "z")
     assert positions is not None
@@ -332,7 +328,8 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
 
 def _ply_header(header: bytes, refuse: Any) -> tuple[str, list[tuple[str, int, list[tuple[str, ...]]]]]:
     """The byte order ("ascii", "<" or ">") and the elements: name, count, properties."""
-    order, elements = "", []
+    order = ""
+    elements: list[tuple[str, int, list[tuple[str, ...]]]] = []
     for line in header.decode("ascii", "replace").splitlines()[1:]:
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):

@@ -69,7 +69,8 @@ def _below(holder: Any, step: str, path: str, before: list[str], steps: list[str
             return [holder[step]]
         if "*" in before:
             return []
-        known = list(holder) + (list(holder["scene"]) if "scene" in holder and isinstance(holder["scene"], dict) else [])
+        inner = holder.get("scene")  # its keys may stand first in a dotted path
+        known = [*holder, *(inner if isinstance(inner, dict) else ())]
         raise InputError(f"no key '{step}'", f"path {path}", did_you_mean(step, [str(key) for key in known]))
     if isinstance(holder, list):
         return [holder[_index(holder, step, path)]]
@@ -93,4 +94,4 @@ def _that_take(holders: list[Any], key: str) -> list[Any]:
     if with_key:
         return with_key
     types = [(h, BY_TYPE.get(str(h.get("type")))) for h in holders if isinstance(h, dict)]
-    return [holder for holder, cls in types if cls and key in cls.keys()]
+    return [holder for holder, cls in types if cls is not None and key in cls.known_keys()]

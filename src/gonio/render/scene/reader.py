@@ -56,7 +56,8 @@ def _scene_file(path: Path) -> Path:
             file = path / "scene.json"
             if not file.is_file():
                 others = sorted(p.name for p in path.glob("*.json"))
-                hint = f"name the file: {path / others[0]}" if others else "give a folder with a scene.json, or a .json file"
+                hint = "give a folder with a scene.json, or a .json file"
+                hint = f"name the file: {path / others[0]}" if others else hint
                 raise InputError("the folder has no scene.json", str(path), hint)
             return file
         if path.is_file():
@@ -90,10 +91,8 @@ def _check_material(description: SceneDescription, where: str, material: Materia
             )
     for key in material.lab.ignored if material.lab else ():
         if material.get(key) is not None:
-            description._warnings.append(
-                f"{description.where(f'{where}/{key}')}: ignored, as in the lab; "
-                f"a 'gonio-{material.lab.model}' uses it"  # type: ignore[union-attr]
-            )
+            place = description.where(f"{where}/{key}")
+            description._warnings.append(f"{place}: ignored, as in the lab; 'gonio-{material.model.name}' uses it")
     try:
         material.instance()
     except InputError as error:
@@ -147,7 +146,7 @@ def _one(detail: Any, raw: Any) -> tuple[str, str, str]:
     elif kind == "missing":
         *steps, last = steps
         what = f"key '{last}' is missing"
-        hint = f"add \"{last}\""
+        hint = f'add "{last}"'
     elif kind == "expected":
         what, hint = f"expected {detail['msg']}, got {got}", _unquote(value) or f"give {detail['msg']}"
     elif kind == "union_tag_invalid":
@@ -193,9 +192,10 @@ def _place(location: tuple[str | int, ...], raw: Any, keep_last: bool) -> tuple[
     steps: list[str | int] = []
     value = raw
     for index, step in enumerate(location):
-        if isinstance(value, dict) and step in value and not (step == value.get("type") and step != "type"):
-            value = value[step]
-        elif isinstance(value, list) and isinstance(step, int) and step < len(value):
+        # A tag is the object's own `type`, and no key is called like a type.
+        in_object = isinstance(value, dict) and step in value and step != value.get("type")
+        in_list = isinstance(value, list) and isinstance(step, int) and step < len(value)
+        if in_object or in_list:
             value = value[step]
         elif not (keep_last and index == len(location) - 1):
             continue

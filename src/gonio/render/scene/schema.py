@@ -17,7 +17,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 from ...errors import InputError, did_you_mean
 from ..images import SUFFIXES
 from .materials import Material
-from .values import Light, Number, NonNegative, Part, Positive, Radiance, Sky, Vector, Whole, invalid
+from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
 
 MAX_SAMPLES = 2**30  # samples per pixel; a picture of one pixel could still be counted in 32 bits
 
@@ -31,7 +31,8 @@ class Output(Part):
     @model_validator(mode="after")
     def _known_format(self) -> Output:
         if Path(self.filename).suffix.lower() not in SUFFIXES:
-            raise invalid(f"'{self.filename}' is no known kind of picture", "end it in " + ", ".join(SUFFIXES), "filename")
+            known = ", ".join(SUFFIXES)
+            raise invalid(f"'{self.filename}' is no known kind of picture", f"end it in {known}", "filename")
         return self
 
 
@@ -110,7 +111,7 @@ class CameraTransform(Part):
             raise invalid("position and lookAt are the same point", "move one of them", "lookAt")
         if height == 0:
             raise invalid("up has length 0", "give a direction, e.g. [0, 1, 0]", "up")
-        if np.linalg.norm(np.cross(forward / distance, self.up / height)) < 1e-5:
+        if np.linalg.norm(np.cross(forward / distance, np.divide(self.up, height))) < 1e-5:
             raise invalid("up is parallel to the view", "tilt one of them; which way is up cannot be told", "up")
         return self
 
@@ -374,8 +375,8 @@ class Contents(Part):
 
     acceleration: Literal["embree", "linear", "bvh", "octree"] = "embree"
     """Without effect: there is one, and it is fast."""
-    shapes: list[Shape] = []
-    lights: list[LightSource] = []
+    shapes: list[Shape] = Field(default_factory=list)
+    lights: list[LightSource] = Field(default_factory=list)
     ambient: Light | None = None
     """Radiance Ia of the ambient light of the lab sheet's eq. 1, for materials with `ka`."""
 
@@ -493,8 +494,6 @@ def json_schema() -> dict[str, Any]:
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "Gonio scene"
     return schema
-
-
 
 
 def _without_null(schema: Any) -> Any:

@@ -40,7 +40,7 @@ class Part(BaseModel):
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
-            known = cls.keys()
+            known = cls.known_keys()
             for key in data:
                 if key not in known:
                     raise PydanticCustomError(
@@ -49,7 +49,7 @@ class Part(BaseModel):
         return data
 
     @classmethod
-    def keys(cls) -> list[str]:
+    def known_keys(cls) -> list[str]:
         """The keys of this object as the file spells them."""
         return [field.alias or name for name, field in cls.model_fields.items()]
 
@@ -156,6 +156,7 @@ Sky = Annotated[
     Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Texture,
     _either("a texture {type: imageTex, file} or [r, g, b]"),
 ]
+
 
 def rgb(value: float | tuple[float, float, float]) -> list[float]:
     """A colour as three values; a number is grey."""
