@@ -1,0 +1,549 @@
+"""The command line: thin verbs over the rooms below, no logic of its own.
+
+Nothing heavy is imported here at the top, so that `gonio --help` stays under a quarter of a second: each verb
+imports what it needs when it runs. Errors are printed in one place, `main`.
+
+Exit codes: 0 done, 1 a verdict of "fails", 2 bad usage or input, 3 a fault of the machine, 130 ended by Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .errors import GonioError, GonioWarning, InputError
+
+if TYPE_CHECKING:
+    from .render.run import Progress, Request, Result
+
+app = typer.Typer(
+    name="gonio",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 done, 1 verdict fails, 2 bad usage or input, 3 fault of the machine, 130 Ctrl-C.",
+)
+
+PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Size = Annotated[str | None, typer.Option(metavar="WxH", help="Film size in pixels, such as 640x480.")]
+Spp = Annotated[int | None, typer.Option(metavar="N", help="Samples per pixel.")]
+Exposure = Annotated[float, typer.Option(metavar="EV", help="Stops of brightness, for .png.")]
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene's folder or .json; or a Mitsuba .xml.")]
+Integrator = Annotated[str | None, typer.Option(metavar="NAME", help="direct, path, whitted, normal, ...")]
+MaxDepth = Annotated[int | None, typer.Option(metavar="N", help="Longest path, for the integrator path.")]
+Sampler = Annotated[str | None, typer.Option(metavar="NAME", help="Where random numbers come from.")]
+Seed = Annotated[int | None, typer.Option(metavar="N", help="Same seed, same picture, to the bit.")]
+Device = Annotated[str, typer.Option(metavar="cpu|cuda|auto", help="Where to compute.")]
+Threads = Annotated[int | None, typer.Option(metavar="N", help="CPU cores to use; all if not given.")]
+Denoise = Annotated[bool, typer.Option("--denoise", help="Remove noise with Open Image Denoise.")]
+Outside = Annotated[bool, typer.Option("--allow-outside", help="Let the scene read files outside its folder.")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from . import __version__
+
+        print(f"gonio {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def gonio(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback where Gonio fails.")] = False,
+) -> None:
+    """A laboratory for the scattering of light by materials."""
+    if debug:
+        os.environ["GONIO_DEBUG"] = "1"
+
+
+# --- pictures ------------------------------------------------------------------------------------------
+
+
+@app.command(rich_help_panel=PICTURES)
+def render(
+    scene: SceneFile,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help=".exr, .hdr, .png or .npz.")
+    ] = None,
+    spp: Spp = None,
+    size: Size = None,
+    integrator: Integrator = None,
+    max_depth: MaxDepth = None,
+    sampler: Sampler = None,
+    seed: Seed = None,
+    device: Device = "cpu",
+    threads: Threads = None,
+    timeout: Annotated[
+        float | None, typer.Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
+    ] = None,
+    denoise: Denoise = False,
+    exposure: Exposure = 0.0,
+    allow_outside: Outside = False,
+    as_json: Json = False,
+) -> None:
+    """Render a scene to a picture.
+
+    Without -o the picture gets the name that the scene gives it, in the current folder.
+    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once.
+
+    \b
+    Examples:
+      gonio render scenes/phong
+      gonio render scenes/phong -o phong.exr --spp 256 --size 640x480
+      gonio render scene.xml --integrator path --max-depth 5 --denoise
+    """
+    from .render import run
+
+    request = run.Request(
+        scene=scene,
+        output=output,
+        spp=spp,
+        size=run.parse_size(size) if size is not None else None,
+        integrator=integrator,
+        max_depth=max_depth,
+        sampler=sampler,
+        seed=seed,
+        device=device,
+        threads=threads,
+        timeout=timeout,
+        denoise=denoise,
+        exposure=exposure,
+        allow_outside=allow_outside,
+    )
+    result = _render_with_bar(request)
+    if as_json:
+        print(json.dumps(result.as_dict()))
+    else:
+        _print_result(result)
+    if result.stopped == "interrupt":
+        raise typer.Exit(run.INTERRUPTED)
+
+
+def _render_with_bar(request: Request) -> Result:
+    from .render import run
+
+    with _Bar(request.scene.name) as bar:
+        return run.render(request, report=bar.update, notice=bar.stopping)
+
+
+def _print_result(result: Result) -> None:
+    width, height = result.size
+    text = f"{result.output}  {width}x{height}, {result.spp} spp, {result.seconds:.1f} s"
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    if result.stopped:
+        why = "stopped by Ctrl-C" if result.stopped == "interrupt" else "stopped at the time limit"
+        text += f"; {why}, {result.wanted_spp} spp were asked for"
+    print(text)
+
+
+class _Bar:
+    """A progress bar on stderr: samples done, rate, time left; nothing where stderr is no terminal."""
+
+    def __init__(self, title: str, total: float | None = None) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+        self._console = Console(stderr=True)
+        columns = "[cyan]{task.description}", "{task.fields[state]}"
+        self._bar = Progress(
+            SpinnerColumn(),
+            TextColumn(columns[0]),
+            BarColumn(),
+            TextColumn(columns[1]),
+            console=self._console,
+            transient=True,
+            disable=not self._console.is_terminal,
+        )
+        self._task = self._bar.add_task(title, total=total, state="loading")
+
+    def __enter__(self) -> _Bar:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *exc: Any) -> None:
+        self._bar.__exit__(*exc)
+
+    def update(self, progress: Progress) -> None:
+        minutes, seconds = divmod(round(progress.remaining), 60)
+        state = f"{progress.done}/{progress.wanted} spp  {progress.rate / 1e6:.2f} M samples/s"
+        state += f"  {minutes}:{seconds:02} left" if progress.done < progress.wanted else "  writing"
+        self._bar.update(self._task, total=progress.wanted, completed=progress.done, state=state)
+
+    def step(self, done: int, total: int, state: str) -> None:
+        self._bar.update(self._task, total=total, completed=done, state=state)
+
+    def stopping(self) -> None:
+        self._console.print("Ctrl-C: ending after this pass; again to end at once")
+
+
+@app.command(rich_help_panel=PICTURES)
+def study(
+    scene: SceneFile,
+    vary: Annotated[
+        list[str],
+        typer.Option(metavar="PATH=V1,V2", help="A value in the scene and what it shall be; repeatable."),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="The sheet: .png, .pdf or .svg.")
+    ] = Path("study.png"),
+    spp: Spp = None,
+    size: Size = None,
+    integrator: Integrator = None,
+    max_depth: MaxDepth = None,
+    sampler: Sampler = None,
+    seed: Seed = None,
+    device: Device = "cpu",
+    threads: Threads = None,
+    denoise: Denoise = False,
+    exposure: Exposure = 0.0,
+    title: Annotated[str, typer.Option(metavar="TEXT", help="Heading of the sheet.")] = "",
+    allow_outside: Outside = False,
+    as_json: Json = False,
+) -> None:
+    """Compare parameters: render a scene with each value and lay the pictures on one labelled sheet.
+
+    One --vary gives a row, two a grid (the first goes down, the second across), more give a grid each.
+
+    \b
+    Examples:
+      gonio study scenes/phong --vary scene.shapes.0.material.p=4,16,64
+      gonio study scenes/phong --vary "scene.shapes.*.material.kd=[.1,.1,.1],[.5,.5,.5]" \\
+        --vary "scene.shapes.*.material.p=4,16,64" --size 300x90 -o kd-p.png
+    """
+    from .render import run
+    from .viewer import contact_sheet
+
+    request = run.Request(
+        scene=scene,
+        spp=spp,
+        size=run.parse_size(size) if size is not None else None,
+        integrator=integrator,
+        max_depth=max_depth,
+        sampler=sampler,
+        seed=seed,
+        device=device,
+        threads=threads,
+        denoise=denoise,
+        exposure=exposure,
+        allow_outside=allow_outside,
+    )
+    variations = [contact_sheet.parse_variation(text) for text in vary]
+    with _Bar(scene.name) as bar:
+        sheet = contact_sheet.study(request, variations, output, title, report=bar.step)
+    if as_json:
+        print(json.dumps(sheet.as_dict()))
+    else:
+        print(f"{sheet.output}  {len(sheet.cells)} pictures, {sheet.spp} spp, {sheet.seconds:.1f} s")
+
+
+@app.command(rich_help_panel=PICTURES)
+def compare(
+    test: Annotated[Path, typer.Argument(metavar="A", help="The picture to judge: .exr, .hdr, .png, .npz.")],
+    reference: Annotated[Path, typer.Argument(metavar="B", help="The picture to judge it by.")],
+    tolerance: Annotated[
+        float | None, typer.Option(metavar="X", help="Exit with 1 where the metric is over X.")
+    ] = None,
+    metric: Annotated[str, typer.Option(metavar="relmse|rmse|flip", help="What --tolerance is for.")] = "relmse",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A map of the error, .png.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Say how far picture A is from picture B: RMSE, relMSE, ratio of the means, FLIP.
+
+    FLIP of .exr, .hdr and .npz is HDR-FLIP: the worst of the exposures at which B can be shown.
+
+    \b
+    Examples:
+      gonio compare mine.exr reference.exr
+      gonio compare mine.exr reference.exr --tolerance 0.01 -o error.png
+    """
+    from .errors import did_you_mean
+    from .render import images, metrics
+
+    if metric not in metrics.METRICS:
+        raise InputError(f"unknown metric '{metric}'", "--metric", did_you_mean(metric, tuple(metrics.METRICS)))
+    if tolerance is not None and not tolerance >= 0:
+        raise InputError(f"a tolerance of {tolerance:g}", "--tolerance", "give 0 or more")
+    if output is not None:
+        images.check_writable(output)
+    a, b = images.read(test), images.read(reference)
+    try:
+        result = metrics.compare(a.pixels, b.pixels, hdr=a.hdr and b.hdr)
+    except InputError as error:
+        raise InputError(error.what, f"{test}, {reference}", error.hint) from error
+    if output is not None:
+        from .viewer import error_map
+
+        error_map.write(output, a, b, metric)
+    passed = tolerance is None or result.value(metric) <= tolerance
+    if as_json:
+        verdict = {"metric": metric, "tolerance": tolerance, "passed": passed}
+        print(json.dumps({"test": str(test), "reference": str(reference), **result.as_dict(), **verdict}))
+    else:
+        _print_comparison(result, metric, tolerance, passed)
+        if output is not None:
+            print(f"error map  {output}")
+    if not passed:
+        raise typer.Exit(1)
+
+
+def _print_comparison(result: Any, metric: str, tolerance: float | None, passed: bool) -> None:
+    kind = "LDR" if result.exposures is None else "HDR, {:+.1f} to {:+.1f} EV".format(*result.exposures)
+    print(f"RMSE        {result.rmse:.6g}")
+    print(f"relMSE      {result.relmse:.6g}")
+    print(f"mean ratio  {result.mean_ratio:.6f}")
+    print(f"FLIP        {result.flip:.6f}  ({kind})")
+    if tolerance is not None:
+        relation, verdict = ("<=", "passes") if passed else (">", "fails")
+        print(f"{verdict}: {metric} {result.value(metric):.6g} {relation} {tolerance:g}")
+
+
+# --- materials -----------------------------------------------------------------------------------------
+
+
+@app.command(rich_help_panel=MATERIALS)
+def plot(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="A material's name; see `gonio models`.")],
+    param: Annotated[
+        list[str] | None, typer.Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")
+    ] = None,
+    preset: Annotated[str, typer.Option(metavar="NAME", help="A named preset, such as Au for conductor.")] = "",
+    kind: Annotated[str, typer.Option(metavar="lobe|slice|albedo", help="What to draw.")] = "lobe",
+    angles: Annotated[str, typer.Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = "",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help=".png, .pdf or .svg.")
+    ] = None,
+) -> None:
+    """Draw a material: its lobes (polar), a slice over angle, or its albedo curve.
+
+    The density it is sampled with is drawn dashed over its values.
+
+    \b
+    Examples:
+      gonio plot conductor --preset Au --param alpha=.3
+      gonio plot phong -p p=32 --kind slice -o phong.pdf
+      gonio plot dielectric -p alpha=.2 --kind albedo
+    """
+    from .viewer import plots
+
+    path = plots.plot(model, param or [], preset, kind, angles, output)
+    print(path)
+
+
+@app.command("models", rich_help_panel=MATERIALS)
+def list_models(as_json: Json = False) -> None:
+    """List the materials.
+
+    \b
+    Example:
+      gonio models
+    """
+    from .models import models
+
+    found = models()
+    if as_json:
+        rows = {name: {"doc": _first_line(cls), "parameters": list(cls.parameters())} for name, cls in found.items()}
+        print(json.dumps(rows))
+        return
+    table = _table("material", "what it is", "parameters")
+    for name, cls in found.items():
+        table.add_row(name, _first_line(cls), ", ".join(cls.parameters()))
+    _print_rich(table)
+
+
+@app.command(rich_help_panel=MATERIALS)
+def explain(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="A material's name; see `gonio models`.")],
+    as_json: Json = False,
+) -> None:
+    """Print a material's manual page: formula, parameters, limits, source.
+
+    \b
+    Example:
+      gonio explain conductor
+    """
+    import inspect
+
+    from .models import model as find
+
+    cls = find(model)
+    rows = [_parameter_row(parameter) for parameter in cls.parameters().values()]
+    text = inspect.cleandoc(cls.__doc__ or "")
+    if as_json:
+        print(json.dumps({"name": cls.name, "doc": text, "parameters": rows}))
+        return
+    print(f"{cls.name}\n{'=' * len(cls.name)}\n{text}\n")
+    if rows:
+        table = _table("parameter", "kind", "range", "unit", "default", "what it is")
+        for row in rows:
+            table.add_row(*(row[key] for key in ("name", "kind", "range", "unit", "default", "doc")))
+        _print_rich(table)
+
+
+def _parameter_row(parameter: Any) -> dict[str, str]:
+    return {
+        "name": parameter.name,
+        "kind": parameter.kind,
+        "range": parameter.range,
+        "unit": parameter.unit,
+        "default": "required" if parameter.required else str(parameter.default),
+        "doc": parameter.doc,
+    }
+
+
+def _first_line(cls: type) -> str:
+    return (cls.__doc__ or "").strip().split("\n", 1)[0]
+
+
+# --- support -------------------------------------------------------------------------------------------
+
+
+@app.command(rich_help_panel=SUPPORT)
+def schema(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Where to write; else it is printed.")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of scene files, by which editors complete and check them.
+
+    \b
+    Example:
+      gonio schema -o scene.schema.json
+    """
+    from .render import scene
+
+    text = json.dumps(scene.json_schema(), indent=2) + "\n"
+    if output is None:
+        sys.stdout.write(text)
+        return
+    from .render import images
+
+    images.write_whole(output, text.encode())
+    print(output)
+
+
+@app.command(rich_help_panel=SUPPORT)
+def doctor(as_json: Json = False) -> None:
+    """Say what this machine can render with, what is missing, and how to get it.
+
+    Exit code 3 where there is nothing to render with.
+
+    \b
+    Example:
+      gonio doctor
+    """
+    from .render import doctor as examination
+
+    report = examination.examine()
+    if as_json:
+        print(json.dumps(report.as_dict()))
+    else:
+        table = _table("", "", "")
+        marks = {"ok": "[green]ok[/]", "missing": "[yellow]--[/]", "bad": "[red]!![/]"}
+        for finding in report.findings:
+            table.add_row(marks[finding.state], finding.subject, finding.text)
+        _print_rich(table)
+        print(report.verdict)
+    if not report.can_render:
+        raise typer.Exit(3)
+
+
+# --- printing and errors -------------------------------------------------------------------------------
+
+
+def _table(*headings: str) -> Any:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
+    for index, heading in enumerate(headings):
+        table.add_column(heading, no_wrap=index == 0, style="cyan" if index == 0 else "")
+    return table
+
+
+def _print_rich(what: Any) -> None:
+    from rich.console import Console
+
+    Console().print(what)
+
+
+def _fail(error: GonioError, as_json: bool) -> int:
+    """Print an error in three lines at most (what, where, hint), or as JSON; its exit code."""
+    if as_json:
+        parts = {"what": error.what, "where": error.where, "hint": error.hint, "code": error.code}
+        print(json.dumps({"error": parts}))
+        return error.code
+    from rich.console import Console
+    from rich.text import Text
+
+    text = Text("error: ", style="bold red").append(" ".join(error.what.split()), style="default not bold")
+    for name, line in (("   in: ", error.where), (" hint: ", error.hint)):
+        if line:
+            text.append(f"\n{name}", style="bold cyan").append(" ".join(line.split()), style="default not bold")
+    Console(stderr=True, highlight=False, soft_wrap=True).print(text)
+    return error.code
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+    """Our own warnings are for the user, in one line; those of libraries are for their authors."""
+    if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
+        print(f"warning: {message}", file=sys.stderr)
+
+
+def _run(arguments: list[str] | None) -> int:
+    as_json = "--json" in (sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(arguments, standalone_mode=False)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else 0
+    except GonioError as error:
+        return _fail(error, as_json)
+    except (KeyboardInterrupt, typer.Abort):
+        print("ended by Ctrl-C; nothing was written", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # `gonio schema | head`: whoever read us has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if hasattr(error, "format_message"):  # a usage error of the argument parser
+            if not error.format_message():  # `gonio` alone: the help has been printed
+                return 2
+            return _fail(_usage_error(error), as_json)
+        if os.environ.get("GONIO_DEBUG"):
+            raise
+        what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
+        failure = GonioError(what, "", "this is a fault of Gonio; run `gonio --debug ...` and report what it prints")
+        failure.code = 3
+        return _fail(failure, as_json)
+
+
+def _usage_error(error: Any) -> InputError:
+    command = error.ctx.command_path if getattr(error, "ctx", None) else "gonio"
+    message = error.format_message()
+    return InputError(message, "", "" if "Did you mean" in message else f"see `{command} --help`")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The `gonio` command."""
+    import warnings
+
+    warnings.showwarning = _show_warning
+    warnings.simplefilter("always", GonioWarning)
+    sys.exit(_run(arguments))
+
+
+if __name__ == "__main__":
+    main()
