@@ -29,7 +29,7 @@ _PLACES = {
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
-    from . import models
+    from . import models, render
     from .errors import GonioError, GonioWarning, InputError, MachineError
     from .models import BSDF, Sample, model
     from .ops import get_precision, set_precision
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(name)
-    if name == "models":  # the module itself, which can be called: go.models()
-        return import_module(".models", __name__)
+    if name in ("models", "render"):  # packages that can be called: go.models(), go.render(scene)
+        return import_module("." + name, __name__)
     if name in _PLACES:
         return getattr(import_module("." + _PLACES[name], __name__), name)
     wanted = _ALIASES.get(name, name)
@@ -64,5 +64,6 @@ __all__ = [
     "get_precision",
     "model",
     "models",
+    "render",
     "set_precision",
 ]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-import sys
 from functools import lru_cache
-from types import ModuleType
 
+from .._callable import make_callable
 from ..errors import InputError, did_you_mean
 from .base import BSDF, Parameter, Sample
 
@@ -37,11 +36,4 @@ def model(name: str) -> type[BSDF]:
     return known[key]
 
 
-class _CallableModule(ModuleType):
-    """`import gonio as go; go.models()`: a package's submodule hides a function of the same name, so it is callable."""
-
-    def __call__(self) -> dict[str, type[BSDF]]:
-        return models()
-
-
-sys.modules[__name__].__class__ = _CallableModule
+make_callable(__name__, models)

@@ -1,0 +1,20 @@
+"""Packages that can be called: in `gonio`, a subpackage hides a function of the same name, so it stands in for it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+
+def make_callable(module: str, function: Callable[..., Any]) -> None:
+    """Let the named module be called like `function`: go.models(), go.render(scene)."""
+
+    class CallableModule(ModuleType):
+        __doc__ = sys.modules[module].__doc__
+
+        def __call__(self, *args: Any, **kwargs: Any) -> Any:
+            return function(*args, **kwargs)
+
+    sys.modules[module].__class__ = CallableModule
