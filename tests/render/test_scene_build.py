@@ -376,3 +376,22 @@ def test_rendering_the_same_scene_twice_compiles_nothing_new(mi, build):
         render(0.7)
         kernels = [kernel for kernel in dr.kernel_history() if kernel["type"] == dr.KernelType.JIT]
     assert kernels and all(kernel["cache_hit"] for kernel in kernels)
+
+
+@pytest.mark.shared
+def test_picture_agrees_with_the_course_framework_s_and_is_not_mirrored(mi):
+    shared = Path(__file__).parents[3] / "shared"
+    if not (shared / "reference").is_dir():
+        pytest.skip("the shared folder with the course's scenes is not beside this checkout")
+
+    def blocks(picture: np.ndarray) -> np.ndarray:
+        return picture[:390].reshape(39, 10, 60, 10, 3).mean(axis=(1, 3))
+
+    built = scene.build(scene.read(shared / "scenes" / "lab2-test" / "phong"), mi)
+    picture = np.array(mi.render(built, integrator=mi.load_dict({"type": "direct"}), spp=16))[:-1]
+    with np.load(shared / "reference" / "lab2" / "phong.npz") as file:
+        reference = blocks(file["radiance"].astype(np.float32)[1:])  # the framework's picture sits one row too low
+    error = np.abs(blocks(picture) - reference) / np.maximum(reference, 1e-2)
+    assert np.median(error) < 0.005
+    mirrored = np.abs(blocks(picture[:, ::-1]) - reference) / np.maximum(reference, 1e-2)
+    assert np.median(mirrored) > 0.1
