@@ -64,7 +64,8 @@ class Dielectric(BSDF):
         ndf = distribution(self.ndf)
         reflects = wo.z * wi.z > 0.0
         dot_o, dot_i = dot(wo, m), dot(wi, m)
-        cos_t = fresnel.cos_transmitted(abs(dot_o), eta)
+        # the far direction of a refraction is known: Snell's root would lose its cosine near the critical angle
+        cos_t = where(reflects, fresnel.cos_transmitted(abs(dot_o), eta), abs(dot_i))
         f = self.reflectance(abs(dot_o), cos_t, eta)
         g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
         spread = 0.25 + 0.0 * dot_o

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..ops import abs, backend, maximum, vec2, vec3, where
+from ..ops import abs, backend, maximum, vec2, where
 from ..optics import masking
 from ..optics.ndf import distribution, distributions
 
@@ -14,7 +14,7 @@ NDFS = {name: ndf.title for name, ndf in distributions().items()}
 MASKINGS = masking.KINDS
 SAMPLINGS = {
     "visible": "normals as wo sees them",
-    "bounded": "visible normals whose reflection can lie above the surface (GGX)",
+    "bounded": "visible normals whose reflection can lie above the surface (GGX; glass that transmits: as visible)",
     "normals": "all normals, by D cos",
 }
 
@@ -39,16 +39,21 @@ def delta(alpha: Any) -> str:
 
 
 def upper(w: Any) -> Any:
-    """w turned to the upper side."""
-    return vec3(w.x, w.y, abs(w.z))
+    """w above the surface, -w below: a facet seen from behind at -w looks as from the front at w."""
+    return where(w.z < 0.0, -w, w)
+
+
+def _bounded(model: Any) -> bool:
+    """Whether the bound on reflections may be used: a facet that it leaves out could still transmit."""
+    return model.sampling == "bounded" and not model.transmits
 
 
 def sample_normal(model: Any, wo: Any, u1: Any, u2: Any, alpha: Any) -> Any:
-    """A normal (m.z > 0) by the model's `sampling`; for wo below the surface, as its mirror image above sees it."""
+    """A normal (m.z > 0) by the model's `sampling`; its back faces a wo below the surface."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
         return ndf.sample(u1, u2, alpha)
-    if model.sampling == "bounded":
+    if _bounded(model):
         return ndf.sample_bounded(upper(wo), u1, u2, alpha)
     return ndf.sample_visible(upper(wo), u1, u2, alpha)
 
@@ -58,7 +63,7 @@ def normal_pdf(model: Any, wo: Any, m: Any, alpha: Any) -> Any:
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
         return ndf.pdf(m, alpha)
-    if model.sampling == "bounded":
+    if _bounded(model):
         return ndf.pdf_bounded(upper(wo), m, alpha)
     return ndf.pdf_visible(wo, m, alpha)
 

@@ -1,0 +1,69 @@
+"""The materials that the laws are tested on: every model, every choice of its parts.
+
+`SMALL` has each kind once, `ALL` every distribution with every masking, both Fresnel forms, every way of sampling,
+widths from .01 to 1, two widths with a rotation, and glass thin and dense.
+"""
+
+from __future__ import annotations
+
+import gonio as go
+
+NDFS = ("ggx", "beckmann", "student-t")
+MASKINGS = ("smith-correlated", "smith-separable", "smith-separable-exact", "schlick-direct", "schlick-ibl")
+
+DIFFUSE = {
+    "lambert": go.Lambert((0.2, 0.5, 0.9)),
+    "oren-nayar": go.OrenNayar(0.8, 0.4),
+    "phong": go.Phong((0.3, 0.4, 0.5), 0.3, 20.0),
+    "blinn-phong": go.BlinnPhong(0.2, (0.4, 0.5, 0.6), 60.0),
+}
+IDEAL = {
+    "mirror": go.Mirror(0.9),
+    "smooth-metal": go.Conductor.preset("Cu", alpha=0.0),
+    "smooth-glass": go.Dielectric(1.5, 0.0),
+    "matched-glass": go.Dielectric(1.0, 0.3),
+}
+NESTED = {
+    "mix": go.mix(go.Lambert(0.5), go.Conductor.preset("Au", alpha=0.3), 0.3),
+    "mix-with-mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
+    "mix-with-glass": go.mix(go.Dielectric(1.4, 0.3), go.Lambert(0.5), 0.4),
+    "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=(0.2, 0.5), rotation=0.4)),
+}
+
+
+def _rough() -> dict[str, go.BSDF]:
+    found: dict[str, go.BSDF] = {}
+    for ndf in NDFS:
+        for masking in MASKINGS:
+            found[f"metal-{ndf}-{masking}"] = go.Conductor.preset(
+                "Au", alpha=(0.15, 0.4), rotation=0.5, ndf=ndf, masking=masking
+            )
+            found[f"glass-{ndf}-{masking}"] = go.Dielectric(1.5, 0.3, ndf=ndf, masking=masking)
+        for alpha in (0.01, 0.1, 0.5, 1.0):
+            found[f"metal-{ndf}-alpha-{alpha}"] = go.Conductor.preset("Ag", alpha=alpha, ndf=ndf)
+            found[f"glass-{ndf}-alpha-{alpha}"] = go.Dielectric(1.5, alpha, ndf=ndf)
+        for sampling in ("bounded", "normals"):
+            found[f"metal-{ndf}-{sampling}"] = go.Conductor(alpha=0.4, ndf=ndf, sampling=sampling)
+            found[f"glass-{ndf}-{sampling}"] = go.Dielectric(1.5, 0.4, ndf=ndf, sampling=sampling)
+        found[f"metal-{ndf}-schlick"] = go.Conductor.preset("Cu", alpha=0.3, ndf=ndf, fresnel="schlick")
+        found[f"glass-{ndf}-schlick"] = go.Dielectric(1.5, 0.3, ndf=ndf, fresnel="schlick")
+        found[f"metal-{ndf}-one"] = go.Conductor(alpha=0.6, ndf=ndf, fresnel="one")
+    found["glass-turned"] = go.Dielectric(1.33, (0.1, 0.5), rotation=-0.7)
+    found["glass-dense"] = go.Dielectric(2.42, 0.2)
+    found["glass-bubble"] = go.Dielectric(0.7, 0.2)
+    found["glass-reflects-only"] = go.Dielectric(1.5, 0.2, transmission=False)
+    found["glass-tinted"] = go.Dielectric(1.5, 0.2, albedo=(0.9, 0.5, 0.2))
+    found["metal-bounded-turned"] = go.Conductor.preset("Al", alpha=(0.1, 0.6), rotation=1.0, sampling="bounded")
+    return found
+
+
+ROUGH = _rough()
+ALL = {**DIFFUSE, **IDEAL, **NESTED, **ROUGH}
+FINITE = {**DIFFUSE, **NESTED, **ROUGH}  # those that have a density somewhere
+SMALL = {
+    **DIFFUSE,
+    **IDEAL,
+    **NESTED,
+    **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned")},
+    **{f"{kind}-{ndf}-smith-correlated": ROUGH[f"{kind}-{ndf}-smith-correlated"] for kind in ("metal", "glass") for ndf in NDFS},
+}
