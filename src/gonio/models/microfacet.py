@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,10 @@ def delta(alpha: Any) -> str:
     """Whether widths, as the user gave them, make a delta lobe: "never", "always" or "maybe"."""
     if backend.is_drjit(alpha):
         return "maybe"
-    values = np.asarray(alpha, dtype=float)
-    smooth = np.max(values, axis=-1) < SMOOTH if isinstance(alpha, tuple | list) else values < SMOOTH
+    pair = alpha if isinstance(alpha, tuple | list) else (alpha,)
+    if any(backend.is_drjit(width) for width in pair):
+        return "maybe"
+    smooth = functools.reduce(np.maximum, (np.asarray(width, dtype=float) for width in pair)) < SMOOTH
     return "always" if np.all(smooth) else "maybe" if np.any(smooth) else "never"
 
 

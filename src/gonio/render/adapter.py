@@ -82,7 +82,7 @@ def _adapter_class(mi: ModuleType) -> type:
             elif preset is not None and hasattr(preset, name):
                 value = np.asarray(getattr(preset, name), dtype=float)
                 if value.ndim and mi.is_spectral:
-                    textures[name] = mi.load_dict({"type": "rgb", "value": value.tolist(), "unbounded": True})
+                    textures[name] = mi.load_dict({"type": "srgb", "color": value.tolist(), "unbounded": True})
                     plain.append(value)
                     continue
                 value = value if value.ndim else float(value)
