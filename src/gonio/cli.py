@@ -30,6 +30,8 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 verdict fails, 2 bad usage or input, 3 fault of the machine, 130 Ctrl-C.",
 )
 
+INTERRUPTED = 130  # what a shell reports of a program that Ctrl-C ended: 128 + SIGINT
+
 PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
@@ -127,7 +129,7 @@ def render(
     else:
         _print_result(result)
     if result.stopped == "interrupt":
-        raise typer.Exit(run.INTERRUPTED)
+        sys.exit(INTERRUPTED)
 
 
 def _render_with_bar(request: Request) -> Result:
@@ -140,12 +142,16 @@ def _render_with_bar(request: Request) -> Result:
 def _print_result(result: Result) -> None:
     width, height = result.size
     text = f"{result.output}  {width}x{height}, {result.spp} spp, {result.seconds:.1f} s"
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+    _print_warnings(result.warnings)
     if result.stopped:
         why = "stopped by Ctrl-C" if result.stopped == "interrupt" else "stopped at the time limit"
         text += f"; {why}, {result.wanted_spp} spp were asked for"
     print(text)
+
+
+def _print_warnings(warnings: tuple[str, ...]) -> None:
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
 
 
 class _Bar:
@@ -185,7 +191,7 @@ class _Bar:
         self._bar.update(self._task, total=total, completed=done, state=state)
 
     def stopping(self) -> None:
-        self._console.print("Ctrl-C: ending after this pass; again to end at once")
+        self._console.print("Ctrl-C: ending in a moment; again to end at once")
 
 
 @app.command(rich_help_panel=PICTURES)
@@ -245,6 +251,7 @@ def study(
     if as_json:
         print(json.dumps(sheet.as_dict()))
     else:
+        _print_warnings(sheet.warnings)
         print(f"{sheet.output}  {len(sheet.cells)} pictures, {sheet.spp} spp, {sheet.seconds:.1f} s")
 
 
@@ -257,7 +264,7 @@ def compare(
     ] = None,
     metric: Annotated[str, typer.Option(metavar="relmse|rmse|flip", help="What --tolerance is for.")] = "relmse",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A map of the error, .png.")
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="A map of the error: .png, .pdf, .svg.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -278,7 +285,9 @@ def compare(
     if tolerance is not None and not tolerance >= 0:
         raise InputError(f"a tolerance of {tolerance:g}", "--tolerance", "give 0 or more")
     if output is not None:
-        images.check_writable(output)
+        from .viewer import figures
+
+        figures.check_output(output)
     a, b = images.read(test), images.read(reference)
     try:
         result = metrics.compare(a.pixels, b.pixels, hdr=a.hdr and b.hdr)
@@ -323,9 +332,7 @@ def plot(
     preset: Annotated[str, typer.Option(metavar="NAME", help="A named preset, such as Au for conductor.")] = "",
     kind: Annotated[str, typer.Option(metavar="lobe|slice|albedo", help="What to draw.")] = "lobe",
     angles: Annotated[str, typer.Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = "",
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help=".png, .pdf or .svg.")
-    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help=".png, .pdf, .svg.")] = None,
 ) -> None:
     """Draw a material: its lobes (polar), a slice over angle, or its albedo curve.
 
@@ -508,12 +515,11 @@ def _run(arguments: list[str] | None) -> int:
     try:
         code = app(arguments, standalone_mode=False)
         sys.stdout.flush()
+        if code == INTERRUPTED:  # Typer's answer to a KeyboardInterrupt; a render that kept its picture exits itself
+            print("ended by Ctrl-C; nothing was written", file=sys.stderr)
         return code if isinstance(code, int) else 0
     except GonioError as error:
         return _fail(error, as_json)
-    except (KeyboardInterrupt, typer.Abort):
-        print("ended by Ctrl-C; nothing was written", file=sys.stderr)
-        return 130
     except BrokenPipeError:  # `gonio schema | head`: whoever read us has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

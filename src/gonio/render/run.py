@@ -152,6 +152,11 @@ class Interrupts:
             threading.Thread(target=self._watch, daemon=True).start()
         return self
 
+    def check(self) -> None:
+        """Raise KeyboardInterrupt where it was asked for: for work that has nothing to keep yet."""
+        if self.asked:
+            raise KeyboardInterrupt
+
     def __exit__(self, *exc: object) -> None:
         if self._active:
             signal.set_wakeup_fd(self._old_wake)
@@ -543,9 +548,10 @@ def render(
     notice  called at the first Ctrl-C, from another thread
     """
     started = time.perf_counter()
-    prepared = prepare(request)
-    width, height = prepared.size
-    with Interrupts(notice) as interrupts:
+    with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
+        prepared = prepare(request)
+        interrupts.check()
+        width, height = prepared.size
         stopped = run(
             prepared.render,
             prepared.spp,

@@ -1,0 +1,141 @@
+"""What this machine can render with: found, missing, and how to get it.
+
+Dr.Jit ends the whole process where an LLVM or a driver disagrees with it, and no program survives to say so.
+So every trial runs in a process of its own.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .. import __version__
+from ..ops import llvm
+from . import denoise, engine
+
+# Rays through Embree or OptiX, a Gonio material by its plugin, a compiled kernel: all that a render needs.
+_TRIAL = """
+from gonio.render import engine
+mi = engine.load({device!r})
+import drjit as dr
+import gonio.mitsuba
+scene = mi.load_dict({{"type": "scene", "ball": {{"type": "sphere", "bsdf": {{"type": "gonio_lambert"}}}}}})
+ray = mi.Ray3f(mi.Point3f(0, 0, 5), dr.normalize(mi.Vector3f(dr.linspace(mi.Float, -0.1, 0.1, 64), 0, -1)))
+si = scene.ray_intersect(ray)
+value = si.bsdf().eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(0.1, 0.1, 1)))
+total = float(dr.sum(value[0])[0])
+assert 5 < total < 25, total
+print("variant", mi.variant())
+print("threads", dr.thread_count())
+"""
+_TRIAL_SECONDS = 120  # a cold start compiles for some seconds; a machine that needs longer cannot render either
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report; `state` is "ok", "missing" (can be lived without) or "bad"."""
+
+    state: str
+    subject: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """All findings, what a trial on each device said, and whether anything can be rendered with."""
+
+    findings: tuple[Finding, ...]
+    devices: dict[str, str]  # device -> "" where it works, else what went wrong
+
+    @property
+    def can_render(self) -> bool:
+        return "" in self.devices.values()
+
+    @property
+    def verdict(self) -> str:
+        working = [device for device, problem in self.devices.items() if not problem]
+        return "can render on: " + ", ".join(working) if working else "nothing to render with: see !! above"
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"can_render": self.can_render, **asdict(self)}
+
+
+def examine() -> Report:
+    """Look at everything; takes a few seconds, most of them in the trials."""
+    findings = [
+        Finding("ok", "Gonio", f"{__version__}, Python {platform.python_version()}, {platform.platform(terse=True)}"),
+        _package("mitsuba", "Mitsuba", "pip install mitsuba"),
+        _package("drjit", "Dr.Jit", "pip install drjit"),
+        *_libraries(),
+        Finding("ok", "threads", f"{os.cpu_count()} CPU cores"),
+    ]
+    devices = {}
+    for device in ("cpu", "cuda"):
+        problem, notes = _try(device)
+        devices[device] = problem
+        if not problem:
+            findings.append(Finding("ok", f"render on {device}", f"a trial kernel ran ({notes})"))
+        elif device == "cuda" and not engine.cuda_available():
+            hint = "for --device cuda: an NVIDIA GPU and its driver"
+            findings.append(Finding("missing", "render on cuda", f"no CUDA device answers; {hint}"))
+        else:
+            findings.append(Finding("bad", f"render on {device}", problem))
+    found = denoise.available()
+    if found:
+        findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {found}"))
+    else:
+        findings.append(Finding("missing", "denoiser", "for --denoise: pip install 'gonio[denoise]'"))
+    return Report(tuple(findings), devices)
+
+
+def _package(name: str, subject: str, install: str) -> Finding:
+    try:
+        return Finding("ok", subject, importlib.metadata.version(name))
+    except importlib.metadata.PackageNotFoundError:
+        return Finding("bad", subject, f"not installed: {install}")
+
+
+def _libraries() -> list[Finding]:
+    """Every LLVM in reach, the one that will be used first, and why the others are not."""
+    found = []
+    chosen = False
+    for library in llvm.libraries():
+        subject = f"LLVM {library.version or '?'}"
+        place = f"{library.path} ({library.source})"
+        if not library.usable:
+            why = f"older than {llvm.OLDEST_USABLE}, it would abort the process" if library.version else "no libLLVM"
+            forced = library.source == "environment"
+            text = f"{place}: {why}" + (f"; unset {llvm.VARIABLE}, which names it" if forced else "; not used")
+            found.append(Finding("bad" if forced else "missing", subject, text))
+            chosen = chosen or forced
+        else:
+            found.append(Finding("ok", subject, place + (": spare" if chosen else ": used for --device cpu")))
+            chosen = True
+    if not any(finding.state == "ok" for finding in found):
+        hint = f"pip install karellen-llvm-core (Linux x86-64), or any LLVM >= {llvm.OLDEST_USABLE} of the system"
+        found.append(Finding("bad", "LLVM", f"none that can be used; {hint}"))
+    return found
+
+
+def _try(device: str) -> tuple[str, str]:
+    """Run the trial on a device in a process of its own: what went wrong ("" if nothing), and what it printed."""
+    command = [sys.executable, "-c", _TRIAL.format(device=device)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_TRIAL_SECONDS)
+    except subprocess.TimeoutExpired:
+        return f"the trial did not end within {_TRIAL_SECONDS} s", ""
+    except OSError as error:
+        return f"the trial could not start: {error}", ""
+    if done.returncode == 0:
+        return "", ", ".join(done.stdout.split("\n")).strip(", ")
+    if done.returncode < 0:
+        return f"the trial was ended by signal {-done.returncode}: this LLVM or driver does not fit", ""
+    lines = [line for line in done.stderr.strip().splitlines() if line.strip()]
+    told = [line for line in lines if "Error: " in line]
+    text = " ".join(line.strip() for line in lines[lines.index(told[-1]) :]) if told else (lines or ["no reason"])[-1]
+    return text.removeprefix("gonio.errors.MachineError: "), ""

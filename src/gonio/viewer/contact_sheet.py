@@ -1,0 +1,268 @@
+"""`gonio study`: one scene rendered with every combination of values, on one labelled sheet.
+
+The values go into the scene before it is validated, and kernels do not depend on them, so the first picture
+compiles and the others only render.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..render import images, run
+from . import figures
+
+MOST_CELLS = 256  # a sheet of more is no longer looked at, and is a typing error more often than not
+WIDEST = 3200  # pixels; larger sheets are drawn at less than one picture pixel per sheet pixel
+GAP, MARGIN = 8, 20
+_DPI = 100
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One --vary: a path into the scene, or a $parameter of a Mitsuba XML, and its values."""
+
+    path: str
+    values: tuple[Any, ...]
+
+    @property
+    def name(self) -> str:
+        """The last step of the path that is a word: "p" of "scene.shapes.0.material.p", "eta[0]" of "...eta.0"."""
+        steps = [step for step in self.path.replace("/", ".").split(".") if step]
+        for back, step in enumerate(reversed(steps)):
+            if not step.isdigit() and step != "*":
+                return step + "".join(f"[{index}]" for index in steps[len(steps) - back :])
+        return self.path
+
+
+class _FullyNamed(Variation):
+    @property
+    def name(self) -> str:
+        return self.path
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What came of a study; `cells` are the values of each picture, in the order of `itertools.product`."""
+
+    output: Path
+    cells: tuple[dict[str, Any], ...]
+    spp: int
+    size: tuple[int, int]
+    seconds: float
+    warnings: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "output": str(self.output),
+            "cells": list(self.cells),
+            "spp": self.spp,
+            "size": list(self.size),
+            "seconds": self.seconds,
+            "warnings": list(self.warnings),
+        }
+
+
+def parse_variation(text: str) -> Variation:
+    """A `Variation` of "shapes.0.material.p=4,16,64"; values are JSON, commas in brackets do not separate."""
+    path, values = figures.parse_assignment(text, "--vary")
+    return Variation(path, tuple(figures.split_values(values)))
+
+
+def study(
+    request: run.Request,
+    variations: list[Variation],
+    output: Path,
+    title: str = "",
+    report: Callable[[int, int, str], None] = lambda done, total, state: None,
+) -> Sheet:
+    """Render every combination and write the sheet; raises InputError before rendering where it can."""
+    started = time.perf_counter()
+    figures.check_output(output)
+    names = [variation.path for variation in variations]
+    if len(set(names)) < len(names):
+        raise InputError("the same path is varied twice", "--vary", "give all its values in one --vary")
+    combinations = list(itertools.product(*(variation.values for variation in variations)))
+    if len(combinations) > MOST_CELLS:
+        what = f"{len(combinations)} pictures are more than a sheet holds ({MOST_CELLS})"
+        raise InputError(what, "--vary", "give fewer values")
+    cells = tuple(dict(zip(names, combination, strict=True)) for combination in combinations)
+    pictures: list[np.ndarray] = []
+    warnings: dict[str, None] = {}
+    with run.Interrupts() as interrupts:
+        for index, cell in enumerate(cells):
+            state = f"{index + 1}/{len(cells)}  " + ", ".join(map(figures.show_value, cell.values()))
+            report(index, len(cells), state)
+            # Each picture has the same seed, so that what differs is the parameter, not the noise.
+            prepared = run.prepare(replace(request, overrides={**request.overrides, **cell}))
+            warnings |= dict.fromkeys(prepared.warnings)
+            width, height = prepared.size
+            run.run(prepared.render, prepared.spp, width * height, interrupted=lambda: interrupts.asked)
+            interrupts.check()
+            pictures.append(images.to_screen(run.finished(prepared.render, request.denoise), request.exposure))
+    report(len(cells), len(cells), "drawing")
+    heading = title or _scene_name(request.scene)
+    settings = prepared.settings
+    subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {settings['integrator']}"  # noqa: RUF001
+    draw(pictures, variations, heading, subtitle, output)
+    seconds = round(time.perf_counter() - started, 2)
+    return Sheet(output, cells, prepared.spp, prepared.size, seconds, tuple(warnings))
+
+
+def _scene_name(scene: Path) -> str:
+    resolved = scene.resolve()
+    return resolved.parent.name if resolved.name == "scene.json" else resolved.stem
+
+
+# --- the drawing ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A grid of pictures under one heading."""
+
+    heading: str
+    rows: list[str]
+    columns: list[str]
+    pictures: list[list[np.ndarray]]
+    row_name: str = ""
+    column_name: str = ""
+
+
+def draw(
+    pictures: list[np.ndarray], variations: list[Variation], title: str, subtitle: str, output: Path
+) -> Path:
+    """Lay out 8-bit pictures (in the order of `itertools.product`) with labels, and write the sheet.
+
+    One variation: a row, wrapped where it gets long. Two: the first goes down, the second across. More: a grid
+    of the last two for every combination of the others.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    with matplotlib.rc_context(figures.STYLE):
+        return _draw(_blocks(pictures, variations), title, subtitle, output)
+
+
+def _blocks(pictures: list[np.ndarray], variations: list[Variation]) -> list[_Block]:
+    names = [variation.name for variation in variations]
+    if len(set(names)) < len(names):  # p of one shape and p of another
+        variations = [_FullyNamed(variation.path, variation.values) for variation in variations]
+    if len(variations) == 1:
+        (only,) = variations
+        labels = [f"{only.name} = {figures.show_value(value)}" for value in only.values]
+        across = _columns_of_a_row(len(pictures), pictures[0].shape[1] / pictures[0].shape[0])
+        if across == 1:
+            values = [figures.show_value(value) for value in only.values]
+            return [_Block("", values, [""], [[picture] for picture in pictures], only.name)]
+        return [
+            _Block("", [], labels[at : at + across], [pictures[at : at + across]])
+            for at in range(0, len(pictures), across)
+        ]
+    *outer, down, across_ = variations
+    rows, columns = ([figures.show_value(v) for v in x.values] for x in (down, across_))
+    blocks = []
+    each = len(rows) * len(columns)
+    for index, values in enumerate(itertools.product(*(variation.values for variation in outer))):
+        of_block = pictures[index * each : (index + 1) * each]
+        grid = [of_block[at : at + len(columns)] for at in range(0, each, len(columns))]
+        named = zip(outer, values, strict=True)
+        heading = ",   ".join(f"{variation.name} = {figures.show_value(value)}" for variation, value in named)
+        blocks.append(_Block(heading, rows, columns, grid, down.name, across_.name))
+    return blocks
+
+
+def _columns_of_a_row(count: int, aspect: float) -> int:
+    """As many columns as make the sheet's shape nearest to 16 by 10, without a nearly empty last row."""
+
+    def badness(columns: int) -> float:
+        rows = math.ceil(count / columns)
+        empty = rows * columns - count
+        return abs(math.log(columns * aspect / rows / 1.6)) + 2 * empty / columns
+
+    return min(range(1, count + 1), key=badness)
+
+
+def _draw(blocks: list[_Block], title: str, subtitle: str, output: Path) -> Path:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+    measuring = Figure(dpi=_DPI)
+    renderer = FigureCanvasAgg(measuring).get_renderer()
+
+    def width_of(text: str, size: float, weight: str = "normal") -> float:
+        label = Text(0, 0, text, fontsize=size, fontweight=weight, figure=measuring)
+        return label.get_window_extent(renderer).width
+
+    height, width = blocks[0].pictures[0][0].shape[:2]
+    columns = max(len(block.columns) for block in blocks)
+    labels = max((width_of(row, 11) for block in blocks for row in block.rows), default=0)
+    names = any(block.row_name for block in blocks)
+    left = MARGIN + (math.ceil(labels) + 10 if labels else 0) + (24 if names else 0)
+    # Labels must fit over their pictures; small pictures are then set wider apart.
+    widest_label = max(width_of(label, 11) for block in blocks for label in block.columns)
+    scale = min(1.0, (WIDEST - left - MARGIN) / (columns * (width + GAP)))
+    if max(width, height) < 160:  # tiny pictures are shown larger, by whole pixels
+        scale = float(max(1, 160 // max(width, height)))
+    cell_width, cell_height = max(1, round(width * scale)), max(1, round(height * scale))
+    pitch = max(cell_width, math.ceil(widest_label) + 4) + GAP
+    heading_width = max(width_of(title, 15, "bold"), width_of(subtitle, 10))
+    total_width = math.ceil(max(left + columns * pitch - GAP, MARGIN + heading_width) + MARGIN)
+
+    # From the top, in pixels: title, then for each block its heading, names, labels and rows.
+    title_height = 62
+    label_height, name_height, heading_height, between = 22, 20, 28, 14
+    heights = []
+    for block in blocks:
+        rows = len(block.pictures)
+        extra = (heading_height if block.heading else 0) + (name_height if block.column_name else 0)
+        extra += label_height if any(block.columns) else 0
+        heights.append(extra + rows * cell_height + (rows - 1) * GAP)
+    total_height = title_height + sum(heights) + (len(blocks) - 1) * between + MARGIN
+
+    figure = Figure(figsize=(total_width / _DPI, total_height / _DPI), dpi=_DPI)
+    FigureCanvasAgg(figure)
+
+    def text(x: float, y: float, content: str, **style: Any) -> None:
+        figure.text(x / total_width, 1 - y / total_height, content, **style)
+
+    text(MARGIN, 30, title, fontsize=15, fontweight="bold", va="baseline")
+    text(MARGIN, 49, subtitle, fontsize=10, color=figures.SOFT, va="baseline")
+    y = float(title_height)
+    for block, block_height in zip(blocks, heights, strict=True):
+        bottom = y + block_height
+        block_width = len(block.columns) * pitch - GAP
+        if block.heading:
+            text(MARGIN, y + 19, block.heading, fontsize=12, fontweight="bold", va="baseline")
+            y += heading_height
+        if block.column_name:
+            text(left + block_width / 2, y + 13, block.column_name, color=figures.SOFT, ha="center", va="baseline")
+            y += name_height
+        for index, label in enumerate(block.columns):
+            x = left + index * pitch + cell_width / 2
+            text(x, y + 14, label, fontsize=11, ha="center", va="baseline")
+        y += label_height if any(block.columns) else 0
+        if block.row_name:
+            middle = (y + bottom) / 2
+            text(MARGIN + 6, middle, block.row_name, color=figures.SOFT, rotation=90, ha="center", va="center")
+        for row, pictures in enumerate(block.pictures):
+            if block.rows:
+                text(left - 10, y + cell_height / 2, block.rows[row], fontsize=11, ha="right", va="center")
+            for column, picture in enumerate(pictures):
+                x = left + column * pitch
+                place = (x / total_width, 1 - (y + cell_height) / total_height)
+                axes = figure.add_axes((*place, cell_width / total_width, cell_height / total_height))
+                axes.imshow(picture, interpolation="antialiased", aspect="auto")
+                axes.set_axis_off()
+            y += cell_height + GAP
+        y = bottom + between
+    return figures.save(figure, output, _DPI, f"{title}: {subtitle}")

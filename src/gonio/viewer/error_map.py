@@ -1,0 +1,66 @@
+"""`gonio compare -o`: the error of each pixel as a colour, beside a bar that names its range."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..render import images, metrics
+from . import figures
+
+_DPI = 100
+_TITLES = {
+    "rmse": "root of the squared difference, mean over channels",
+    "relmse": "(x − r)² / (r² + 0.01), mean over channels",  # noqa: RUF001
+    "flip": "FLIP",
+}
+
+
+def error_of(test: images.Picture, reference: images.Picture, metric: str) -> np.ndarray:
+    """The (H, W) map whose mean (rmse: root of the mean of squares) is the metric."""
+    if metric == "flip":
+        return metrics.flip_map(test.pixels, reference.pixels, test.hdr and reference.hdr)
+    if metric == "relmse":
+        return metrics.relmse_map(test.pixels, reference.pixels)
+    difference = test.pixels.astype(np.float64) - reference.pixels
+    return np.sqrt((difference**2).mean(axis=2))
+
+
+def write(path: Path, test: images.Picture, reference: images.Picture, metric: str) -> Path:
+    """Draw the map. The range is 0 to 1 for FLIP, else 0 to the 99.5th percentile, so that a few fireflies do
+    not turn the rest black; the bar shows by its arrow that there is more above."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    error = error_of(test, reference, metric)
+    highest = 1.0 if metric == "flip" else float(np.percentile(error, 99.5)) or float(error.max()) or 1.0
+    height, width = error.shape
+    scale = min(1.0, 3000 / width) if width >= 480 else max(1, 480 // width)
+    shown_width, shown_height = width * scale, height * scale
+    # The bar lies below: pictures are wide more often than high.
+    left, top, bottom = 16, 58, 62
+    total_width, total_height = shown_width + 2 * left, shown_height + top + bottom
+    with matplotlib.rc_context(figures.STYLE):
+        figure = Figure(figsize=(total_width / _DPI, total_height / _DPI), dpi=_DPI)
+        FigureCanvasAgg(figure)
+        box = (left / total_width, bottom / total_height, shown_width / total_width, shown_height / total_height)
+        axes = figure.add_axes(box)
+        # Magma: its lightness grows evenly, so that steps of error look like steps, also in grey print.
+        shown = axes.imshow(error, cmap="magma", vmin=0, vmax=highest, interpolation="antialiased", aspect="auto")
+        axes.set_axis_off()
+        bar_width = min(shown_width, 420)
+        place = (left / total_width, 36 / total_height, bar_width / total_width, 12 / total_height)
+        more = "max" if error.max() > highest else "neither"
+        bar = figure.colorbar(shown, cax=figure.add_axes(place), orientation="horizontal", extend=more)
+        bar.outline.set_linewidth(0.5)
+        bar.ax.tick_params(labelsize=8, length=2)
+        x = left / total_width
+        names = f"{test.path.name} against {reference.path.name}"
+        figure.text(x, 1 - 26 / total_height, names, fontsize=12, fontweight="bold", va="baseline")
+        about = f"{_TITLES[metric]}; mean {error.mean():.4g}, largest {error.max():.4g}"
+        figure.text(x, 1 - 45 / total_height, about, fontsize=9, color=figures.SOFT, va="baseline")
+        return figures.save(figure, path, _DPI, about)

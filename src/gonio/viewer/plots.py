@@ -1,0 +1,380 @@
+"""`gonio plot`: what a material does with light, drawn from its own `eval`, `pdf` and `sample`.
+
+Everything lies in the plane of incidence. `wo`, toward the viewer, leans to the left by theta_o; angles to the
+right of the normal, where a mirror would send the light, count positive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from ..models import BSDF, model
+from . import figures
+
+KINDS = ("lobe", "slice", "albedo")
+ANGLES = {"lobe": (0.0, 30.0, 60.0, 80.0), "slice": (0.0, 30.0, 60.0, 80.0), "albedo": ()}
+
+STEP = 0.05  # degrees between directions: a GGX lobe of alpha 0.01 is 0.6 degrees wide at half its height
+SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, about 0.2 % of noise
+
+
+def plot(
+    name: str,
+    parameters: list[str],
+    preset: str = "",
+    kind: str = "lobe",
+    angles: str = "",
+    output: Path | None = None,
+) -> Path:
+    """Draw a material by name, with parameters as typed ("alpha=.3"); the file's path.
+
+    kind    "lobe" (polar), "slice" (over the angle of wi) or "albedo" (over the angle of wo)
+    angles  of wo, degrees, such as "0,45"; not for "albedo"
+    Raises InputError for a material, parameter or angle that cannot be.
+    """
+    if kind not in KINDS:
+        raise InputError(f"unknown kind of plot '{kind}'", "--kind", did_you_mean(kind, KINDS))
+    path = figures.check_output(output or Path(f"{name.lower().replace('_', '-')}-{kind}.png"))
+    views = parse_angles(angles) if angles else ANGLES[kind]
+    bsdf, title = make(name, parameters, preset)
+    draw(bsdf, title, kind, views, path)
+    return path
+
+
+def parse_angles(text: str) -> tuple[float, ...]:
+    """Degrees from the normal, 0 to below 90, at most 8."""
+    angles = figures.split_values(text)
+    for angle in angles:
+        if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 <= angle < 90:
+            raise InputError(f"'{angle}' is no angle of view", "--angles", "give degrees from 0 to below 90")
+    if len(angles) > 8:
+        raise InputError(f"{len(angles)} angles are too many to tell apart", "--angles", "give up to 8")
+    return tuple(float(angle) for angle in angles)
+
+
+def make(name: str, assignments: list[str], preset: str = "") -> tuple[BSDF, str]:
+    """The material, and its name with the parameters given."""
+    cls = model(name)
+    values = {}
+    for text in assignments:
+        key, value = figures.parse_assignment(text, "--param")
+        values[key] = figures.parse_value(value)
+    shown = [preset] * bool(preset) + [f"{key} = {figures.show_value(value)}" for key, value in values.items()]
+    given = {key: _parameter(cls, key, value) for key, value in values.items()}
+    if preset:
+        if not hasattr(cls, "preset"):
+            raise InputError(f"{cls.name} has no presets", "--preset", "give its parameters by --param")
+        bsdf: BSDF = cls.preset(preset, **given)
+    else:
+        _check_complete(cls, given)
+        bsdf = cls(**given)
+    return bsdf, cls.name + (": " + ", ".join(shown) if shown else "")
+
+
+def _check_complete(cls: type[BSDF], given: dict[str, Any]) -> None:
+    missing = [name for name, parameter in cls.parameters().items() if parameter.required and name not in given]
+    if missing:
+        hint = "give --preset, such as Au, or " if hasattr(cls, "preset") else "give "
+        hint += " ".join(f"--param {name}=..." for name in missing)
+        raise InputError(f"{cls.name} needs {', '.join(missing)}", "--param", hint)
+
+
+def _parameter(cls: type[BSDF], name: str, value: Any) -> Any:
+    """A typed value as the parameter wants it: two widths are a tuple, a material is an object with a type."""
+    known = cls.parameters()
+    if name not in known:
+        raise InputError(f"{cls.name} has no parameter '{name}'", "--param", did_you_mean(name, list(known)))
+    kind = known[name].kind
+    if kind == "alpha" and isinstance(value, list):
+        return tuple(value)
+    if kind == "bsdf":
+        return _inner(name, value)
+    return value
+
+
+def _inner(name: str, value: Any) -> BSDF:
+    fields = dict(value) if isinstance(value, dict) else {"type": value}
+    if not isinstance(fields.get("type"), str):
+        hint = f'write {name}=lambert, or {name}={{"type": "conductor", "preset": "Au"}}'
+        raise InputError(f"'{value}' is no material", f"--param {name}", hint)
+    cls = model(fields.pop("type"))
+    preset = fields.pop("preset", "")
+    given = {key: _parameter(cls, key, inner) for key, inner in fields.items()}
+    if preset and hasattr(cls, "preset"):
+        return cls.preset(preset, **given)
+    _check_complete(cls, given)
+    return cls(**given)
+
+
+# --- numbers -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One view: values and density over the angle of wi (degrees), and what delta lobes reflect where."""
+
+    view: float
+    angles: np.ndarray
+    values: np.ndarray  # eval, (N, channels), 1/sr
+    pdf: np.ndarray  # (N,), 1/sr
+    deltas: tuple[tuple[float, float], ...]  # (angle of wi in degrees, weight)
+
+    @property
+    def mean(self) -> np.ndarray:
+        return self.values.mean(axis=1)
+
+    @property
+    def grey(self) -> bool:
+        spread = np.ptp(self.values, axis=1).max()
+        return bool(spread <= 1e-4 * self.values.max())
+
+
+def curve(bsdf: BSDF, view: float) -> Curve:
+    """Evaluate a material in the plane of incidence, for wo at `view` degrees from the normal."""
+    reach = 180 if bsdf.transmits else 90
+    angles = np.linspace(-reach, reach, round(2 * reach / STEP) + 1)
+    theta = np.radians(angles)
+    wi = np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1)
+    wo = np.broadcast_to(_toward(view), wi.shape)
+    values, pdf = np.asarray(bsdf.eval(wo, wi)), np.asarray(bsdf.pdf(wo, wi))
+    return Curve(view, angles, values, pdf, _deltas(bsdf, view))
+
+
+def _toward(view: float) -> np.ndarray:
+    theta = math.radians(view)
+    return np.array([-math.sin(theta), 0.0, math.cos(theta)])
+
+
+def _deltas(bsdf: BSDF, view: float) -> tuple[tuple[float, float], ...]:
+    u = (np.arange(64) + 0.5) / 64
+    drawn = bsdf.sample(np.broadcast_to(_toward(view), (64, 3)), np.stack([u, np.full(64, 0.5), np.full(64, 0.5)], 1))
+    found: dict[float, float] = {}
+    for index in np.flatnonzero(np.asarray(drawn.delta) & (np.asarray(drawn.pdf) > 0)):
+        x, _, z = np.asarray(drawn.wi)[index]
+        # A delta lobe's reflectance is its weight times the probability with which it is chosen.
+        strength = float(np.mean(np.asarray(drawn.weight)[index]) * np.asarray(drawn.pdf)[index])
+        found[round(math.degrees(math.atan2(x, z)), 2)] = strength
+    return tuple(found.items())
+
+
+def albedo(bsdf: BSDF, views: np.ndarray) -> np.ndarray:
+    """Share of the power that leaves, (views, channels): the mean weight of stratified samples.
+
+    Transmitted radiance carries (eta_o/eta_i)^2; power does not, hence the factor sample.eta^2.
+    """
+    rng = np.random.default_rng(1)
+    count = SAMPLES * SAMPLES
+    x, y = np.meshgrid(np.arange(SAMPLES), np.arange(SAMPLES))
+    cells = np.stack([x.ravel(), y.ravel()], axis=1)
+    # The lobe's number is stratified too, in an order of its own.
+    u = np.concatenate([rng.permutation(count)[:, None] / count, cells / SAMPLES], axis=1)
+    u = u + rng.random(u.shape) * [1 / count, 1 / SAMPLES, 1 / SAMPLES]
+    rows = []
+    for view in views:
+        drawn = bsdf.sample(np.broadcast_to(_toward(view), (count, 3)), np.minimum(u, 1 - 2**-24))
+        rows.append((np.asarray(drawn.weight) * np.asarray(drawn.eta)[:, None] ** 2).mean(axis=0))
+    return np.array(rows)
+
+
+# --- the drawing ---------------------------------------------------------------------------------------
+
+
+def draw(bsdf: BSDF, title: str, kind: str, views: tuple[float, ...], path: Path) -> Path:
+    """Draw one kind of plot into a file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    drawings: dict[str, Callable[[BSDF, str, tuple[float, ...]], Any]] = {
+        "lobe": _lobes,
+        "slice": _slice,
+        "albedo": _albedo,
+    }
+    with matplotlib.rc_context(figures.STYLE):
+        return figures.save(drawings[kind](bsdf, title, views), path, 150, title)
+
+
+def _figure(width: float, height: float, title: str, subtitle: str) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    left = 0.3 / width
+    figure.text(left, 1 - 0.38 / height, title, fontsize=14, fontweight="bold", va="baseline")
+    figure.text(left, 1 - 0.62 / height, subtitle, fontsize=9.5, color=figures.SOFT, va="baseline")
+    return figure
+
+
+def _colour_of_view(index: int, count: int) -> Any:
+    from matplotlib import colormaps
+
+    # Viridis without its yellow end, which is too pale on white.
+    return colormaps["viridis"](0.08 + 0.72 * index / max(count - 1, 1))
+
+
+def _lobes(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
+    """One polar panel a view, each with a scale of its own: peaks differ by orders of magnitude."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    curves = [curve(bsdf, view) for view in views]
+    columns = len(views) if len(views) <= 2 else math.ceil(len(views) / 2)
+    rows = math.ceil(len(views) / columns)
+    full = bsdf.transmits
+    panel_width, panel_height = (3.6, 3.9) if full else (4.2, 2.75)
+    width, height = 0.3 + columns * panel_width, 0.8 + rows * panel_height + 0.45
+    subtitle = "value f |cos θi| and sampling density over wi, 1/sr, linear; wo in the plane, leaning left"
+    figure = _figure(width, height, title, subtitle)
+    for index, one in enumerate(curves):
+        row, column = divmod(index, columns)
+        # A half disc fills the lower half of nothing: its axes are cut to the wedge by Matplotlib.
+        x = (0.15 + column * panel_width + 0.35) / width
+        y = 1 - (0.8 + (row + 1) * panel_height - 0.1) / height
+        box = (x, y, (panel_width - 0.7) / width, (panel_height - 0.65) / height)
+        axes = figure.add_axes(box, projection="polar")
+        _lobe(axes, one, full)
+    grey = all(one.grey for one in curves)
+    handles: list[Any] = (
+        [Patch(facecolor=figures.CHANNELS[2], alpha=0.25, edgecolor=figures.CHANNELS[2], label="value")]
+        if grey
+        else [Line2D([], [], color=c, label=f"value, {n}") for c, n in zip(figures.CHANNELS, ("red", "green", "blue"), strict=True)]
+    )
+    handles.append(Line2D([], [], color=figures.INK, linestyle=(0, (4, 2)), linewidth=1, label="sampling density"))
+    handles.append(Line2D([], [], color=figures.SOFT, marker="o", markersize=4, linewidth=1.4, label="wo"))
+    if any(one.deltas for one in curves):
+        handles.append(Line2D([], [], color="#b5651d", linewidth=2, marker="^", markersize=5, label="delta lobe"))
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize=9, bbox_to_anchor=(0.5, 0.005))
+    return figure
+
+
+def _lobe(axes: Any, one: Curve, full: bool) -> None:
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)  # positive angles to the right
+    if not full:
+        axes.set_thetamin(-90)
+        axes.set_thetamax(90)
+    peak = max(float(one.values.max(initial=0)), float(one.pdf.max(initial=0)))
+    largest = peak * 1.06 if peak > 0 else 1.0
+    theta = np.radians(one.angles)
+    if one.grey:
+        axes.fill(theta, one.mean, color=figures.CHANNELS[2], alpha=0.22, linewidth=0)
+        axes.plot(theta, one.mean, color=figures.CHANNELS[2], linewidth=1.6)
+    else:
+        axes.fill(theta, one.values.min(axis=1), color=figures.SOFT, alpha=0.15, linewidth=0)
+        for channel, colour in zip(one.values.T, figures.CHANNELS, strict=False):
+            axes.plot(theta, channel, color=colour, linewidth=1.5)
+    axes.plot(theta, one.pdf, color=figures.INK, linewidth=1, linestyle=(0, (4, 2)))
+    axes.set_ylim(0, largest)
+    view = -math.radians(one.view)
+    axes.plot([view, view], [0, largest], color=figures.SOFT, linewidth=1.4, clip_on=False)
+    axes.plot([view], [largest], color=figures.SOFT, marker="o", markersize=4, clip_on=False)
+    for angle, strength in one.deltas:
+        at = math.radians(angle)
+        axes.plot([at, at], [0, largest], color="#b5651d", linewidth=2, clip_on=False)
+        axes.plot([at], [largest], color="#b5651d", marker=(3, 0, -angle), markersize=7, clip_on=False)
+        axes.annotate(f"{strength:.2f}", (at, largest * 0.62), fontsize=8.5, color="#b5651d", xytext=(7, 0), textcoords="offset points")
+    if full:
+        axes.plot([-math.pi / 2, math.pi / 2], [largest, largest], color=figures.SOFT, linewidth=0.8)
+    degrees = range(-90, 91, 30) if not full else range(-150, 181, 30)
+    axes.set_xticks([math.radians(angle) for angle in degrees])
+    axes.set_xticklabels([f"{angle}°".replace("-", "−") for angle in degrees], fontsize=8)  # noqa: RUF001
+    axes.tick_params(axis="x", pad=0 if full else 1)
+    ticks = _round_ticks(peak)
+    axes.set_yticks(ticks)
+    axes.set_yticklabels([])
+    axes.grid(True)
+    axes.spines["polar"].set_color(figures.FAINT)
+    scale = f"rings at {', '.join(f'{tick:g}' for tick in ticks)} /sr" if peak > 0 else "delta lobes only"
+    axes.set_title(f"θo = {one.view:g}°", fontsize=11, pad=16 if not full else 14)
+    axes.text(0.5, -0.02 if not full else -0.13, scale, transform=axes.transAxes, fontsize=8, color=figures.SOFT, ha="center", va="top")
+
+
+def _round_ticks(peak: float) -> list[float]:
+    """Two to four round numbers up to the peak."""
+    if not peak > 0:
+        return []
+    step = 10.0 ** math.floor(math.log10(peak))
+    step = next(step * factor for factor in (0.2, 0.5, 1, 2, 5) if peak / (step * factor) < 4.5)
+    return [float(f"{step * n:.6g}") for n in range(1, int(peak / step) + 1)]
+
+
+def _slice(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
+    """All views in one frame over the angle of wi; logarithmic where the peaks differ by more than 30."""
+    from matplotlib.lines import Line2D
+
+    figure = _figure(8.6, 5.0, title, "value f |cos θi|, mean of the channels, over wi in the plane of incidence")
+    axes = figure.add_axes((0.095, 0.115, 0.72, 0.72))
+    curves = [curve(bsdf, view) for view in views]
+    peaks = [max(float(one.mean.max()), float(one.pdf.max())) for one in curves]
+    positive = [peak for peak in peaks if peak > 0]
+    logarithmic = bool(positive) and max(positive) > 30 * min(positive) or max(peaks, default=0) > 30
+    for index, one in enumerate(curves):
+        colour = _colour_of_view(index, len(curves))
+        axes.plot(one.angles, one.mean, color=colour, linewidth=1.8)
+        axes.plot(one.angles, one.pdf, color=colour, linewidth=1, linestyle=(0, (4, 2)))
+        axes.axvline(one.view, color=colour, linewidth=0.8, linestyle=":", zorder=0)
+        for angle, strength in one.deltas:
+            axes.axvline(angle, color=colour, linewidth=2)
+            axes.annotate(f"δ {strength:.2f}", (angle, 0.97 - 0.06 * index), xycoords=("data", "axes fraction"),
+                          fontsize=8.5, color=colour, xytext=(4, 0), textcoords="offset points", va="top")
+    reach = 180 if bsdf.transmits else 90
+    axes.set_xlim(-reach, reach)
+    step = 45 if reach == 180 else 30
+    axes.set_xticks(range(-reach, reach + 1, step))
+    axes.set_xticklabels([f"{angle}°".replace("-", "−") for angle in range(-reach, reach + 1, step)])  # noqa: RUF001
+    axes.set_xlabel("angle θi of wi from the normal (positive: the mirror's side)")
+    axes.set_ylabel("1/sr" + (", logarithmic" if logarithmic else ""))
+    top = max(peaks, default=1) or 1
+    if logarithmic:
+        axes.set_yscale("log")
+        axes.set_ylim(top * 1e-5, top * 2)
+    else:
+        axes.set_ylim(0, top * 1.06)
+    axes.grid(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    handles = [
+        Line2D([], [], color=_colour_of_view(i, len(views)), linewidth=1.8, label=f"θo = {view:g}°")
+        for i, view in enumerate(views)
+    ]
+    handles += [
+        Line2D([], [], color=figures.SOFT, linewidth=1.8, label="value"),
+        Line2D([], [], color=figures.SOFT, linewidth=1, linestyle=(0, (4, 2)), label="sampling density"),
+        Line2D([], [], color=figures.SOFT, linewidth=0.8, linestyle=":", label="mirror direction"),
+    ]
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.825, 0.85), fontsize=9, handlelength=1.8)
+    return figure
+
+
+def _albedo(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
+    """Directional albedo over the angle of wo, and the line of energy conservation."""
+    subtitle = f"share of the power that leaves, over wo; each point {SAMPLES**2} stratified samples"
+    figure = _figure(7.4, 4.6, title, subtitle)
+    axes = figure.add_axes((0.1, 0.125, 0.86, 0.7))
+    angles = np.concatenate([np.linspace(0, 80, 33), np.linspace(81, 89.5, 18)])
+    values = albedo(bsdf, angles)
+    if np.ptp(values, axis=1).max() <= 1e-3:
+        axes.plot(angles, values.mean(axis=1), color=figures.CHANNELS[2], linewidth=2)
+    else:
+        for channel, colour, name in zip(values.T, figures.CHANNELS, ("red", "green", "blue"), strict=False):
+            axes.plot(angles, channel, color=colour, linewidth=2, label=name)
+        axes.legend(loc="lower left", fontsize=9)
+    axes.axhline(1, color=figures.INK, linewidth=1, linestyle=(0, (4, 2)))
+    axes.annotate("all of the light", (1, 1), xytext=(0, 4), textcoords="offset points", fontsize=8.5, color=figures.SOFT)
+    axes.set_xlim(0, 90)
+    axes.set_ylim(0, max(1.1, float(values.max()) * 1.08))
+    axes.set_xticks(range(0, 91, 15))
+    axes.set_xticklabels([f"{angle}°" for angle in range(0, 91, 15)])
+    axes.set_xlabel("angle θo of wo from the normal")
+    axes.set_ylabel("directional albedo")
+    axes.grid(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return figure
