@@ -137,9 +137,7 @@ class _Block:
     column_name: str = ""
 
 
-def draw(
-    pictures: list[np.ndarray], variations: list[Variation], title: str, subtitle: str, output: Path
-) -> Path:
+def draw(pictures: list[np.ndarray], variations: list[Variation], title: str, subtitle: str, output: Path) -> Path:
     """Lay out 8-bit pictures (in the order of `itertools.product`) with labels, and write the sheet.
 
     One variation: a row, wrapped where it gets long. Two: the first goes down, the second across. More: a grid
@@ -161,8 +159,8 @@ def _blocks(pictures: list[np.ndarray], variations: list[Variation]) -> list[_Bl
         labels = [f"{only.name} = {figures.show_value(value)}" for value in only.values]
         across = _columns_of_a_row(len(pictures), pictures[0].shape[1] / pictures[0].shape[0])
         if across == 1:
-            values = [figures.show_value(value) for value in only.values]
-            return [_Block("", values, [""], [[picture] for picture in pictures], only.name)]
+            rows = [figures.show_value(value) for value in only.values]
+            return [_Block("", rows, [""], [[picture] for picture in pictures], only.name)]
         return [
             _Block("", [], labels[at : at + across], [pictures[at : at + across]])
             for at in range(0, len(pictures), across)

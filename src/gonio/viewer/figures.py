@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".pdf", ".svg")
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
 CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of even weight on white
-STYLE = {
+STYLE: Any = {  # Matplotlib types its keys one by one
     "font.family": "sans-serif",
     "font.size": 10,
     "text.color": INK,

@@ -22,6 +22,9 @@ KINDS = ("lobe", "slice", "albedo")
 ANGLES = {"lobe": (0.0, 30.0, 60.0, 80.0), "slice": (0.0, 30.0, 60.0, 80.0), "albedo": ()}
 
 STEP = 0.05  # degrees between directions: a GGX lobe of alpha 0.01 is 0.6 degrees wide at half its height
+_DASHES = (0, (4, 2))
+_DELTA = "#b5651d"
+_HALO = {"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, about 0.2 % of noise
 
 
@@ -158,8 +161,10 @@ def _deltas(bsdf: BSDF, view: float) -> tuple[tuple[float, float], ...]:
     found: dict[float, float] = {}
     for index in np.flatnonzero(np.asarray(drawn.delta) & (np.asarray(drawn.pdf) > 0)):
         x, _, z = np.asarray(drawn.wi)[index]
-        # A delta lobe's reflectance is its weight times the probability with which it is chosen.
-        strength = float(np.mean(np.asarray(drawn.weight)[index]) * np.asarray(drawn.pdf)[index])
+        # A delta lobe's share of the power: its weight times the probability with which it is chosen, without
+        # the (eta_o/eta_i)^2 of transmitted radiance.
+        probability, eta = float(np.asarray(drawn.pdf)[index]), float(np.asarray(drawn.eta)[index])
+        strength = float(np.mean(np.asarray(drawn.weight)[index])) * probability * eta**2
         found[round(math.degrees(math.atan2(x, z)), 2)] = strength
     return tuple(found.items())
 
@@ -225,75 +230,117 @@ def _lobes(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
     from matplotlib.patches import Patch
 
     curves = [curve(bsdf, view) for view in views]
-    columns = len(views) if len(views) <= 2 else math.ceil(len(views) / 2)
+    columns = len(views) if len(views) <= 3 else math.ceil(len(views) / 2)
     rows = math.ceil(len(views) / columns)
     full = bsdf.transmits
-    panel_width, panel_height = (3.6, 3.9) if full else (4.2, 2.75)
-    width, height = 0.3 + columns * panel_width, 0.8 + rows * panel_height + 0.45
-    subtitle = "value f |cos θi| and sampling density over wi, 1/sr, linear; wo in the plane, leaning left"
+    panel_width, panel_height = 3.9, (3.75 if full else 2.45)
+    top, bottom, side = 0.85, 0.5, 0.25
+    width = max(2 * side + columns * panel_width, 7.2)
+    height = top + rows * panel_height + bottom
+    subtitle = "value f |cos θi| and sampling density over wi, in 1/sr"
+    subtitle += "; reflection and transmission have a scale each" if full else "; each panel has its own scale"
     figure = _figure(width, height, title, subtitle)
+    indent = (width - columns * panel_width) / 2
     for index, one in enumerate(curves):
         row, column = divmod(index, columns)
-        # A half disc fills the lower half of nothing: its axes are cut to the wedge by Matplotlib.
-        x = (0.15 + column * panel_width + 0.35) / width
-        y = 1 - (0.8 + (row + 1) * panel_height - 0.1) / height
-        box = (x, y, (panel_width - 0.7) / width, (panel_height - 0.65) / height)
-        axes = figure.add_axes(box, projection="polar")
+        x, y = indent + column * panel_width, bottom + (rows - 1 - row) * panel_height
+        axes = figure.add_axes((x / width, y / height, panel_width / width, panel_height / height))
         _lobe(axes, one, full)
+        # Equal units on both axes: as many as the panel's inches allow for a disc of radius 1.45 inches.
+        axes.set_xlim(-panel_width / 2 / 1.45, panel_width / 2 / 1.45)
+        low = -1.17 if full else -0.32
+        axes.set_ylim(low, low + panel_height / 1.45)
     grey = all(one.grey for one in curves)
-    handles: list[Any] = (
-        [Patch(facecolor=figures.CHANNELS[2], alpha=0.25, edgecolor=figures.CHANNELS[2], label="value")]
-        if grey
-        else [Line2D([], [], color=c, label=f"value, {n}") for c, n in zip(figures.CHANNELS, ("red", "green", "blue"), strict=True)]
-    )
-    handles.append(Line2D([], [], color=figures.INK, linestyle=(0, (4, 2)), linewidth=1, label="sampling density"))
-    handles.append(Line2D([], [], color=figures.SOFT, marker="o", markersize=4, linewidth=1.4, label="wo"))
+    handles: list[Any] = []
+    if grey:
+        face = (*_rgb(figures.CHANNELS[2]), 0.2)
+        handles.append(Patch(facecolor=face, edgecolor=figures.CHANNELS[2], linewidth=1.4, label="value"))
+    else:
+        names = zip(figures.CHANNELS, ("red", "green", "blue"), strict=True)
+        handles += [Line2D([], [], color=colour, label=f"value, {name}") for colour, name in names]
+    handles.append(Line2D([], [], color=figures.INK, linestyle=_DASHES, linewidth=1, label="sampling density"))
     if any(one.deltas for one in curves):
-        handles.append(Line2D([], [], color="#b5651d", linewidth=2, marker="^", markersize=5, label="delta lobe"))
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize=9, bbox_to_anchor=(0.5, 0.005))
+        label = "delta lobe, its share"
+        handles.append(Line2D([], [], color=_DELTA, linewidth=2, marker="^", markersize=6, label=label))
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles), fontsize=9.5, bbox_to_anchor=(0.5, 0.01))
     return figure
 
 
+def _rgb(colour: str) -> tuple[float, float, float]:
+    from matplotlib.colors import to_rgb
+
+    return to_rgb(colour)
+
+
 def _lobe(axes: Any, one: Curve, full: bool) -> None:
-    axes.set_theta_zero_location("N")
-    axes.set_theta_direction(-1)  # positive angles to the right
-    if not full:
-        axes.set_thetamin(-90)
-        axes.set_thetamax(90)
-    peak = max(float(one.values.max(initial=0)), float(one.pdf.max(initial=0)))
-    largest = peak * 1.06 if peak > 0 else 1.0
+    """A polar diagram in plain axes: the disc has radius 1, the normal points up, wi is at (sin, cos)."""
+    axes.set_axis_off()
+    axes.text(0, 1.24, f"θo = {one.view:g}°", fontsize=12, fontweight="bold", ha="center", va="baseline")
     theta = np.radians(one.angles)
-    if one.grey:
-        axes.fill(theta, one.mean, color=figures.CHANNELS[2], alpha=0.22, linewidth=0)
-        axes.plot(theta, one.mean, color=figures.CHANNELS[2], linewidth=1.6)
-    else:
-        axes.fill(theta, one.values.min(axis=1), color=figures.SOFT, alpha=0.15, linewidth=0)
-        for channel, colour in zip(one.values.T, figures.CHANNELS, strict=False):
-            axes.plot(theta, channel, color=colour, linewidth=1.5)
-    axes.plot(theta, one.pdf, color=figures.INK, linewidth=1, linestyle=(0, (4, 2)))
-    axes.set_ylim(0, largest)
+    above = np.abs(one.angles) <= 90
+    for side, inside in ((1, above), (-1, ~above)) if full else ((1, above),):
+        peak = max(float(x[inside].max(initial=0)) for x in (one.values, one.pdf))
+        _grid(axes, side, peak, full)
+        if not peak > 0:
+            continue
+        radius = 1 / (1.06 * peak)
+
+        def place(
+            values: np.ndarray, inside: np.ndarray = inside, radius: float = radius
+        ) -> tuple[np.ndarray, np.ndarray]:
+            # The other side is zero, which puts it at the origin: the outline closes there.
+            r = np.where(inside, values, 0) * radius
+            return r * np.sin(theta), r * np.cos(theta)
+
+        channels = [one.mean] if one.grey else list(one.values.T)
+        colours = figures.CHANNELS[2:] if one.grey else figures.CHANNELS
+        for channel, colour in zip(channels, colours, strict=False):
+            axes.fill(*place(channel), color=colour, alpha=0.2 if one.grey else 0.07, linewidth=0)
+            axes.plot(*place(channel), color=colour, linewidth=1.6)
+        axes.plot(*place(one.pdf), color=figures.INK, linewidth=1, linestyle=_DASHES)
     view = -math.radians(one.view)
-    axes.plot([view, view], [0, largest], color=figures.SOFT, linewidth=1.4, clip_on=False)
-    axes.plot([view], [largest], color=figures.SOFT, marker="o", markersize=4, clip_on=False)
+    x, y = math.sin(view), math.cos(view)
+    arrow = {"arrowstyle": "-|>", "color": figures.SOFT, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (x, y), (0, 0), arrowprops=arrow)
+    # Labels stand beside their arrows, on the upper side; where the arrow is steep, on the left.
+    aside = (y, -x) if one.view > 20 else (-1, 0)
+    x, y = 0.8 * x + 0.08 * aside[0], 0.8 * y + 0.08 * aside[1]
+    axes.text(x, y, "wo", fontsize=9.5, color=figures.SOFT, ha="center", va="center")
     for angle, strength in one.deltas:
-        at = math.radians(angle)
-        axes.plot([at, at], [0, largest], color="#b5651d", linewidth=2, clip_on=False)
-        axes.plot([at], [largest], color="#b5651d", marker=(3, 0, -angle), markersize=7, clip_on=False)
-        axes.annotate(f"{strength:.2f}", (at, largest * 0.62), fontsize=8.5, color="#b5651d", xytext=(7, 0), textcoords="offset points")
-    if full:
-        axes.plot([-math.pi / 2, math.pi / 2], [largest, largest], color=figures.SOFT, linewidth=0.8)
-    degrees = range(-90, 91, 30) if not full else range(-150, 181, 30)
-    axes.set_xticks([math.radians(angle) for angle in degrees])
-    axes.set_xticklabels([f"{angle}°".replace("-", "−") for angle in degrees], fontsize=8)  # noqa: RUF001
-    axes.tick_params(axis="x", pad=0 if full else 1)
+        x, y = math.sin(math.radians(angle)), math.cos(math.radians(angle))
+        axes.annotate("", (x, y), (0, 0), arrowprops=arrow | {"color": _DELTA, "linewidth": 2})
+        x, y = 0.55 * x - 0.12 * y, 0.55 * y + 0.12 * x
+        axes.text(x, y, f"{strength:.2f}", fontsize=9.5, color=_DELTA, ha="center", va="center")
+
+
+def _grid(axes: Any, side: int, peak: float, full: bool) -> None:
+    """Half a polar grid; `side` 1 is above the surface, -1 below.
+
+    Rings carry their value: of a half disc below the surface line, where nothing is drawn; of a full disc in
+    their own half, on the left, where least is.
+    """
     ticks = _round_ticks(peak)
-    axes.set_yticks(ticks)
-    axes.set_yticklabels([])
-    axes.grid(True)
-    axes.spines["polar"].set_color(figures.FAINT)
-    scale = f"rings at {', '.join(f'{tick:g}' for tick in ticks)} /sr" if peak > 0 else "delta lobes only"
-    axes.set_title(f"θo = {one.view:g}°", fontsize=11, pad=16 if not full else 14)
-    axes.text(0.5, -0.02 if not full else -0.13, scale, transform=axes.transAxes, fontsize=8, color=figures.SOFT, ha="center", va="top")
+    arc = np.linspace(-math.pi / 2, math.pi / 2, 181)
+    for tick in ticks:
+        r = tick / (1.06 * peak)
+        axes.plot(r * np.sin(arc), side * r * np.cos(arc), color=figures.FAINT, linewidth=0.7, zorder=0)
+        x, y = (-r, side * 0.07) if full else (r, -0.07)
+        axes.text(x, y, f"{tick:g}", fontsize=7.5, color=figures.SOFT, ha="center", va="center", bbox=_HALO)
+    if ticks:
+        x, y = (-1.12, side * 0.13) if full else (1.12, -0.12)
+        axes.text(x, y, "1/sr", fontsize=7.5, color=figures.SOFT, ha="center", va="center")
+    axes.plot(np.sin(arc), side * np.cos(arc), color=figures.SOFT, linewidth=0.8, zorder=0)
+    for angle in range(-90, 91, 30):
+        x, y = math.sin(math.radians(angle)), side * math.cos(math.radians(angle))
+        if abs(angle) < 90:
+            axes.plot([0, x], [0, y], color=figures.FAINT, linewidth=0.7, zorder=0)
+        if abs(angle) == 90 and side < 0:
+            continue  # written by the upper half
+        shown = angle if side > 0 else (180 if angle == 0 else math.copysign(180 - abs(angle), angle))
+        text = f"{shown:g}°".replace("-", "−")  # noqa: RUF001
+        horizontal = "center" if abs(angle) < 20 else ("right" if angle < 0 else "left")
+        axes.text(1.05 * x, 1.05 * y, text, fontsize=8, color=figures.SOFT, ha=horizontal, va="center")
+    axes.plot([-1, 1], [0, 0], color=figures.INK, linewidth=1.1, zorder=1)
 
 
 def _round_ticks(peak: float) -> list[float]:
@@ -309,21 +356,29 @@ def _slice(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
     """All views in one frame over the angle of wi; logarithmic where the peaks differ by more than 30."""
     from matplotlib.lines import Line2D
 
-    figure = _figure(8.6, 5.0, title, "value f |cos θi|, mean of the channels, over wi in the plane of incidence")
-    axes = figure.add_axes((0.095, 0.115, 0.72, 0.72))
+    figure = _figure(9.2, 5.0, title, "value f |cos θi|, mean of the channels, over wi in the plane of incidence")
+    axes = figure.add_axes((0.085, 0.115, 0.71, 0.72))
     curves = [curve(bsdf, view) for view in views]
     peaks = [max(float(one.mean.max()), float(one.pdf.max())) for one in curves]
     positive = [peak for peak in peaks if peak > 0]
-    logarithmic = bool(positive) and max(positive) > 30 * min(positive) or max(peaks, default=0) > 30
+    logarithmic = (bool(positive) and max(positive) > 30 * min(positive)) or max(peaks, default=0) > 30
     for index, one in enumerate(curves):
         colour = _colour_of_view(index, len(curves))
         axes.plot(one.angles, one.mean, color=colour, linewidth=1.8)
-        axes.plot(one.angles, one.pdf, color=colour, linewidth=1, linestyle=(0, (4, 2)))
+        axes.plot(one.angles, one.pdf, color=colour, linewidth=1, linestyle=_DASHES)
         axes.axvline(one.view, color=colour, linewidth=0.8, linestyle=":", zorder=0)
         for angle, strength in one.deltas:
             axes.axvline(angle, color=colour, linewidth=2)
-            axes.annotate(f"δ {strength:.2f}", (angle, 0.97 - 0.06 * index), xycoords=("data", "axes fraction"),
-                          fontsize=8.5, color=colour, xytext=(4, 0), textcoords="offset points", va="top")
+            axes.annotate(
+                f"δ {strength:.2f}",
+                (angle, 0.97 - 0.06 * index),
+                xycoords=("data", "axes fraction"),
+                fontsize=8.5,
+                color=colour,
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="top",
+            )
     reach = 180 if bsdf.transmits else 90
     axes.set_xlim(-reach, reach)
     step = 45 if reach == 180 else 30
@@ -346,10 +401,10 @@ def _slice(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
     ]
     handles += [
         Line2D([], [], color=figures.SOFT, linewidth=1.8, label="value"),
-        Line2D([], [], color=figures.SOFT, linewidth=1, linestyle=(0, (4, 2)), label="sampling density"),
+        Line2D([], [], color=figures.SOFT, linewidth=1, linestyle=_DASHES, label="sampling density"),
         Line2D([], [], color=figures.SOFT, linewidth=0.8, linestyle=":", label="mirror direction"),
     ]
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.825, 0.85), fontsize=9, handlelength=1.8)
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.805, 0.85), fontsize=9, handlelength=1.8)
     return figure
 
 
@@ -365,9 +420,11 @@ def _albedo(bsdf: BSDF, title: str, views: tuple[float, ...]) -> Any:
     else:
         for channel, colour, name in zip(values.T, figures.CHANNELS, ("red", "green", "blue"), strict=False):
             axes.plot(angles, channel, color=colour, linewidth=2, label=name)
-        axes.legend(loc="lower left", fontsize=9)
-    axes.axhline(1, color=figures.INK, linewidth=1, linestyle=(0, (4, 2)))
-    axes.annotate("all of the light", (1, 1), xytext=(0, 4), textcoords="offset points", fontsize=8.5, color=figures.SOFT)
+        axes.legend(loc="best", fontsize=9)
+    axes.axhline(1, color=figures.INK, linewidth=1, linestyle=_DASHES)
+    axes.annotate(
+        "all of the light", (1, 1), xytext=(0, 4), textcoords="offset points", fontsize=8.5, color=figures.SOFT
+    )
     axes.set_xlim(0, 90)
     axes.set_ylim(0, max(1.1, float(values.max()) * 1.08))
     axes.set_xticks(range(0, 91, 15))
