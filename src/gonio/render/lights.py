@@ -252,10 +252,11 @@ class Lights:
         box = self.scene.bbox()
         if box.valid():
             # Multiples of the plastic number's kin mod 1 (R3 sequence, M. Roberts): even, and the same every time.
-            spread = mi.Point3f([dr.mulsign(1, 1.0) * (mi.Float(index) * a % 1) for a in (0.8191725, 0.6710436, 0.5497005)])
+            spread = mi.Point3f(*(fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
             it.p = mi.Point3f(box.min) + spread * mi.Vector3f(box.extents())
-        it.wavelengths = dr.zeros(type(it.wavelengths)) + 550
-        sample = mi.Point2f(mi.Float(index) * 0.7548777 % 1, mi.Float(index) * 0.5698403 % 1)
+        if mi.is_spectral:
+            it.wavelengths = mi.Wavelength(550)
+        sample = mi.Point2f(fraction(mi.Float(index) * 0.7548777), fraction(mi.Float(index) * 0.5698403))
         flux = []
         for emitter in self.emitters:
             _, weight = emitter.sample_direction(it, sample, True)
@@ -358,3 +359,8 @@ class LightSample:
     weight: Any
     delta: Any
     solid_angle: Any
+
+
+def fraction(x: Any) -> Any:
+    """The part of x >= 0 behind the point."""
+    return x - dr.floor(x)
