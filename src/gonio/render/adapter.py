@@ -54,15 +54,15 @@ def _adapter_class(mi: ModuleType) -> type:
         """A parameter's slot, and a plain value that tells of its range (a texture: the whole range)."""
         where = f"{plugin_name(model.name)}.{parameter.name}"
         names = [parameter.name]
-        if parameter.kind == "alpha" and (props.has_property("alpha_x") or props.has_property("alpha_y")):
+        if parameter.kind == "alpha" and ("alpha_x" in props or "alpha_y" in props):
             names = ["alpha_x", "alpha_y"]
-            if not all(props.has_property(name) for name in names) or props.has_property("alpha"):
+            if not all(name in props for name in names) or "alpha" in props:
                 raise InputError("give alpha, or both alpha_x and alpha_y", where)
         values: dict[str, Any] = {}
         textures: dict[str, Any] = {}
         plain: list[Any] = []
         for name in names:
-            if props.has_property(name):
+            if name in props:
                 given = props.type(name)
                 value: Any = None
                 if given in (mi.Properties.Type.Float, mi.Properties.Type.Integer):
@@ -99,8 +99,6 @@ def _adapter_class(mi: ModuleType) -> type:
             else:
                 values[name] = mi.Float(float(value))
             dr.make_opaque(values[name])
-        for name in textures:
-            props.mark_queried(name) if hasattr(props, "mark_queried") else None
         return _Slot(parameter, values, textures), (tuple(plain) if len(plain) == 2 else plain[0])
 
     def constant_of(texture: Any) -> Any:
@@ -153,7 +151,7 @@ def _adapter_class(mi: ModuleType) -> type:
             mi.BSDF.__init__(self, props)
             self.model_class = model
             preset = None
-            if hasattr(model, "preset") and props.has_property("preset"):
+            if hasattr(model, "preset") and "preset" in props:
                 preset = model.preset(props["preset"])  # type: ignore[attr-defined]
             two_sided = bool(props.get("two_sided", False))
             self.slots: dict[str, _Slot] = {}
@@ -183,7 +181,7 @@ def _adapter_class(mi: ModuleType) -> type:
             self._set_flags(self.model.delta)
 
         def _child(self, props: Any, name: str) -> Any:
-            child = props[name] if props.has_property(name) else None
+            child = props.get(name, None)
             if not isinstance(child, mi.BSDF):
                 raise InputError(f"no material '{name}' given", plugin_name(self.model_class.name))
             return child
