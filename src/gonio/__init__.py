@@ -25,11 +25,14 @@ _PLACES = {
     "BSDF": "models",
     "Sample": "models",
     "model": "models",
+    "Albedo": "energy",
+    "albedo": "energy",
 }
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
     from . import models, render
+    from .energy import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError, MachineError
     from .models import BSDF, Sample, model
     from .ops import get_precision, set_precision
@@ -43,6 +46,8 @@ def __getattr__(name: str) -> Any:
     if name in _PLACES:
         return getattr(import_module("." + _PLACES[name], __name__), name)
     wanted = _ALIASES.get(name, name)
+    if wanted.islower():  # a submodule on its way in, no material
+        raise AttributeError(f"module 'gonio' has no attribute '{name}'")
     for cls in import_module(".models", __name__).models().values():
         if cls.__name__ == wanted:
             return cls
@@ -56,11 +61,13 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BSDF",
+    "Albedo",
     "GonioError",
     "GonioWarning",
     "InputError",
     "MachineError",
     "Sample",
+    "albedo",
     "get_precision",
     "model",
     "models",

@@ -1,9 +1,9 @@
 """E(mu, alpha) by Monte Carlo: what students write, to be compared with the quadrature.
 
-    cosine   wi = cosine-weighted; the weight is f pi. Unbiased, yet a narrow lobe is hardly ever hit: below roughness
-             0.3 most texels of 1024 samples come out far too small
-    ggx, beckmann, ... (the distribution's own name)   normals by D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
-    visible  normals as wo sees them; the weight is G / G1(o), at most 1 (Heitz2014b)
+cosine   wi = cosine-weighted; the weight is f pi. Unbiased, yet a narrow lobe is hardly ever hit: below roughness
+         0.3 most texels of 1024 samples come out far too small
+ggx, beckmann, ... (the distribution's own name)   normals by D(m) m.n; the weight is (o.m) G / ((o.n) (m.n))
+visible  normals as wo sees them; the weight is G / G1(o), at most 1 (Heitz2014b)
 """
 
 from __future__ import annotations

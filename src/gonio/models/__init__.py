@@ -1,10 +1,14 @@
-"""The materials, one file each. A new one is one new file in this folder: discovery finds it."""
+"""The materials, one file each. A new one is one new file in this folder: discovery finds it.
+
+Materials that stand on a later room (compensation on `energy`) live in that room's folder `materials`, and are found there.
+"""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
 from functools import lru_cache
+from pathlib import Path
 
 from .._callable import make_callable
 from ..errors import InputError, did_you_mean
@@ -17,11 +21,15 @@ __all__ = ["BSDF", "Parameter", "Sample", "model", "models"]
 def models() -> dict[str, type[BSDF]]:
     """Every material class by name, in alphabetical order."""
     found: dict[str, type[BSDF]] = {}
-    for module in pkgutil.iter_modules(__path__):
-        members = vars(importlib.import_module(f"{__name__}.{module.name}"))
-        for member in members.values():
-            if isinstance(member, type) and issubclass(member, BSDF) and member.name:
-                found[member.name] = member
+    package = Path(__path__[0]).parent
+    rooms = [Path(__path__[0]), *sorted(package.glob("*/materials"))]
+    for room in rooms:
+        name = ".".join([package.name, *room.relative_to(package).parts])
+        for module in pkgutil.iter_modules([str(room)]):
+            members = vars(importlib.import_module(f"{name}.{module.name}"))
+            for member in members.values():
+                if isinstance(member, type) and issubclass(member, BSDF) and member.name:
+                    found[member.name] = member
     return dict(sorted(found.items()))
 
 

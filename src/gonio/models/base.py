@@ -54,6 +54,20 @@ class Sample(NamedTuple):
     eta: Any
 
 
+class Breach(NamedTuple):
+    """A law that a model breaks by nature.
+
+    reason   why, as a sentence part: the manual and the verifier print it
+    size     how far at most, in the unit of the law's figure: a number, or a function of the model; 0 says that with
+             these parameters it is not broken at all
+    certain  whether it is always there: the verifier fails a model that declares a breach and keeps the law
+    """
+
+    reason: str
+    size: Any
+    certain: bool = True
+
+
 @dataclass(frozen=True)
 class Parameter:
     """Declaration of one parameter.
@@ -179,12 +193,16 @@ def bsdf(doc: str) -> Any:
 class BSDF:
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
 
-    breaks      law -> reason, for laws that the model breaks by nature (Phong: reciprocity, energy)
+    breaks      law -> Breach, for laws that the model breaks by nature (Phong: reciprocity, energy)
+    stochastic  whether eval, pdf and weight are random numbers that only in the mean are what they are called
+    lossless    the greatest loss that a white furnace may find (where F = 1 and every albedo 1); None claims nothing
     transmits   whether light can pass to the other side
     """
 
     name: ClassVar[str] = ""
-    breaks: ClassVar[dict[str, str]] = {}
+    breaks: ClassVar[dict[str, Breach]] = {}
+    stochastic: ClassVar[bool] = False
+    lossless: ClassVar[float | None] = None
     _bound = False
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -249,9 +267,68 @@ class BSDF:
         """Whether the lobes are delta distributions: "never", "always" or "maybe" (it depends on the ray)."""
         return "never"
 
+    @property
+    def isotropic(self) -> bool:
+        """Whether a turn about the normal changes nothing: no two widths differ, here and in inner materials."""
+        for parameter in self.parameters().values():
+            value = getattr(self, parameter.name)
+            if parameter.kind == "bsdf" and not value.isotropic:
+                return False
+            if parameter.kind == "alpha" and isinstance(value, tuple | list):
+                if not np.array_equal(np.asarray(value[0], float), np.asarray(value[1], float)):
+                    return False
+        return True
+
+    def breaches(self) -> dict[str, Breach]:
+        """The laws that it breaks with these parameters, sizes as numbers; those of inner materials may show or not."""
+        found: dict[str, Breach] = {}
+        for name, parameter in self.parameters().items():
+            if parameter.kind == "bsdf":
+                for law, breach in getattr(self, name).breaches().items():
+                    size = max(breach.size, found[law].size if law in found else 0.0)
+                    found[law] = Breach(f"{name}: {breach.reason}", size, certain=False)
+        for law, breach in self.breaks.items():
+            size = float(breach.size(self) if callable(breach.size) else breach.size)
+            if size > 0.0:
+                found[law] = breach._replace(size=size)
+        return found
+
     def tint(self, wo: Any) -> Any:
         """A colour for denoisers to tell materials apart by: near the albedo seen from wo, without noise."""
         return getattr(self, "albedo", 1.0)
+
+    # ------------------------------------------------------------------ what is dear to know
+
+    def derive(self) -> Any:
+        """Values that follow from the parameters alone and are dear to compute for every ray; a dict, or None."""
+        return None
+
+    def derived(self) -> Any:
+        """What `derive` gives: `settle` found it once for all rays, or it is found here for each."""
+        settled = self.__dict__.get("_settled")
+        return self.derive() if settled is None else settled
+
+    def settle(self) -> Any:
+        """On a bound copy: compute `derive` now, once, where no parameter varies from ray to ray and none is being
+        differentiated; never while Dr.Jit records a loop, in which nothing can be computed."""
+        if type(self).derive is BSDF.derive:
+            return None
+        dr = backend.drjit()
+        values = list(self._bound_values())
+        if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) != 1 or dr.grad_enabled(v) for v in values):
+            return None
+        settled = self.derive()
+        dr.make_opaque(settled)
+        self.__dict__["_settled"] = settled
+        return settled
+
+    def _bound_values(self) -> Any:
+        for parameter in self.parameters().values():
+            value = getattr(self, parameter.name)
+            if parameter.kind == "bsdf":
+                yield from value._bound_values()
+            elif parameter.numeric and value is not None:
+                yield value
 
     # ------------------------------------------------------------------ from outside
 
@@ -343,11 +420,13 @@ def _doorway(method: Callable) -> Callable:
             raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{method.__name__}", " or ".join(MODES))
         as_drjit = backend.is_drjit(wo)
         if as_drjit:
-            kind = backend.types_like(type(wo))
-            return inner(self.bind(converter(kind)), wo, other, *args)
+            bound = self.bind(converter(backend.types_like(type(wo))))
+            bound.settle()
+            return inner(bound, wo, other, *args)
         kind = backend.types(precision)
         first, second, count = _rows(wo, other, method.__name__)
         bound = self.bind(converter(kind))
+        bound.settle()
         result = inner(bound, backend.vector_of(first, 3, kind), backend.vector_of(second, 3, kind), *args)
         if isinstance(result, tuple):
             return type(result)(*[backend.to_numpy(value, count) for value in result])  # type: ignore[call-arg]

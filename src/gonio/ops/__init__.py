@@ -24,11 +24,13 @@ from .backend import (
     types_like,
 )
 from .graph import Graph, Node, RecordingError, record
+from .table import Table, inset, lookup
 
 __all__ = [
     "Graph",
     "Node",
     "RecordingError",
+    "Table",
     "abs",
     "atan2",
     "clamp",
@@ -40,8 +42,10 @@ __all__ = [
     "floor",
     "function",
     "get_precision",
+    "inset",
     "isfinite",
     "log",
+    "lookup",
     "max_component",
     "maximum",
     "mean",

@@ -258,7 +258,8 @@ def _static_key(value: Any) -> Any:
         hash(value)
     except TypeError:
         return id(value)
-    return value
+    # with its type: Python takes True, 1 and 1.0 for the same key; and 0.0 for -0.0
+    return (type(value), repr(value) if isinstance(value, float) else value)
 
 
 def _define(graph: Graph, python_function: Callable, arguments: dict[str, Any], name: str) -> Function:
@@ -420,6 +421,11 @@ def _run(function: Function, arguments: list) -> Any:
             values.append(_run(node.static, args))
         elif node.op == "element":
             values.append(list(_leaves(args[0]))[node.static])
+        elif node.op == "lookup":
+            from .table import _numpy_lookup
+
+            table, channel = node.static
+            values.append(_numpy_lookup(table, *args)[channel])
         else:
             values.append(_NUMPY[node.op](*args))
     return _rebuild(function.result, get)
