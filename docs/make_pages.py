@@ -22,8 +22,8 @@ def page(name: str, model: type) -> str:
         default = "required" if p.required else f"`{p.default}`"
         allowed = "<br>".join(f"`{key}`: {text}" for key, text in p.choices.items()) or p.range
         lines.append(f"| `{p.name}` | {p.kind} | {allowed} | {p.unit or '-'} | {default} | {p.doc} |")
-    for law, reason in model.breaks.items():
-        lines += ["", f"Breaks **{law}** by nature: {reason}."]
+    for law, breach in model.breaks.items():
+        lines += ["", f"Breaks **{law}** by nature: {breach.reason}."]
     source = Path(inspect.getsourcefile(model) or "").name
     plugin = "gonio_" + name.replace("-", "_")
     lines += ["", f"Mitsuba plugin `{plugin}`. Source: `src/gonio/models/{source}`.", ""]

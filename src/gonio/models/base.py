@@ -274,9 +274,9 @@ class BSDF:
             value = getattr(self, parameter.name)
             if parameter.kind == "bsdf" and not value.isotropic:
                 return False
-            if parameter.kind == "alpha" and isinstance(value, tuple | list):
-                if not np.array_equal(np.asarray(value[0], float), np.asarray(value[1], float)):
-                    return False
+            pair = parameter.kind == "alpha" and isinstance(value, tuple | list)
+            if pair and not np.array_equal(np.asarray(value[0], float), np.asarray(value[1], float)):
+                return False
         return True
 
     def breaches(self) -> dict[str, Breach]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
 
 from ..ops import dot, function, safe_div
 from ..optics.frame import half_vector, reflect
 from ..optics.warp import square_to_power_lobe, square_to_power_lobe_pdf
+from .base import Breach
 from .phong import _Empirical
 
 
@@ -16,6 +19,16 @@ class BlinnPhong(_Empirical):
     n.h never turns negative where light and viewer are above the surface, so the highlight has no cut-off edge. For a
     highlight as wide as Phong's take about four times the exponent. Neither reciprocal nor energy conserving.
     """
+
+    breaks: ClassVar[dict[str, Breach]] = {
+        **_Empirical.breaks,
+        # the bound below is not met: close under it nothing need be gained
+        "energy": _Empirical.breaks["energy"]._replace(certain=False),
+    }
+
+    def _highlight_power(self) -> Any:
+        """Below int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and below the hemisphere's 2 pi."""
+        return np.minimum(8.0 * np.pi / (np.asarray(self.p) + 1.0), 2.0 * np.pi)
 
     @function
     def _highlight(self, wo: Any, wi: Any) -> Any:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import numpy as np
+
 from .. import ops
 from ..errors import InputError
 from ..ops import dot, function, inv_pi, mean, pow, vec3, where
 from ..optics.frame import mirror
 from ..optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
-from .base import BSDF, Sample, Value, flag, never, number, spectrum
+from .base import BSDF, Breach, Sample, Value, flag, never, number, spectrum
 
 
 class _Empirical(BSDF):
@@ -25,16 +27,20 @@ class _Empirical(BSDF):
     ka: Value = spectrum(0.0, "ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(False, "require ka + kd + ks = 1")
 
-    breaks: ClassVar[dict[str, str]] = {
-        "reciprocity": "the specular term has no cosine, so f divides it by cos theta_i alone",
-        "energy": "neither term is normalized: kd = 1 reflects pi times what it receives",
+    breaks: ClassVar[dict[str, Breach]] = {
+        "reciprocity": Breach(
+            "the specular term has no cosine, so f divides it by cos theta_i alone",
+            lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
+        ),
+        "energy": Breach(
+            "neither term is normalized: kd = 1 reflects pi times what it receives",
+            lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
+        ),
     }
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.check_sum:
-            import numpy as np
-
             total = np.asarray(self.ka) + np.asarray(self.kd) + np.asarray(self.ks)
             if not np.allclose(total, 1.0, atol=1e-6):
                 raise InputError(
@@ -42,6 +48,10 @@ class _Empirical(BSDF):
                     type(self).__name__,
                     "change a coefficient, or leave check_sum out",
                 )
+
+    def _highlight_power(self) -> Any:
+        """The most that int (highlight)^p dwi comes to."""
+        raise NotImplementedError
 
     def _highlight(self, wo: Any, wi: Any) -> Any:
         """Base of the power, the cosine that peaks in the highlight."""
@@ -97,6 +107,10 @@ class Phong(_Empirical):
     the power is cut at 0, or an even p would light the wrong side, and light below the surface gives nothing.
     Neither reciprocal nor energy conserving.
     """
+
+    def _highlight_power(self) -> Any:
+        """2 pi / (p + 1), met at normal incidence."""
+        return 2.0 * np.pi / (np.asarray(self.p) + 1.0)
 
     @function
     def _highlight(self, wo: Any, wi: Any) -> Any:
