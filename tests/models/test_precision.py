@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from materials import ALL, FINITE, NDFS
+from materials import ALL, FINITE, NDFS, SMALL
 from sphere import at, random_directions, random_numbers, relative
 
 import gonio as go
@@ -26,7 +26,8 @@ def test_float32_is_close_to_float64(name: str) -> None:
         # rounding of the half vector, 6e-8, is magnified by at most 1 / alpha in D, and by a cancelled |o.m| or
         # |i.m| in the rays that just graze a facet: one in a thousand
         assert np.percentile(worst, 99.9) < 5e-5
-        assert worst.max() < 2e-3
+        # and 1 - F has an infinite slope at the critical angle: the root of 6e-8, a few times over
+        assert worst.max() < 5e-3
 
 
 def test_transmission_near_the_critical_angle_keeps_its_digits_in_float32() -> None:
@@ -95,7 +96,7 @@ def _finite_everywhere(material: go.BSDF) -> None:
     wo, wi = (x.reshape(-1, 3) for x in np.broadcast_arrays(EDGES[:, None], EDGES[None, :]))
     wide_wo, u = (x.reshape(-1, 3) for x in np.broadcast_arrays(EDGES[:, None], CORNERS[None, :]))
     for precision in ("float32", "float64"):
-        for mode in ("radiance", "importance"):
+        for mode in ("radiance", "importance") if material.transmits else ("radiance",):
             value = material.eval(wo, wi, mode, precision=precision)
             assert np.isfinite(value).all() and (value >= 0).all()
             s = material.sample(wide_wo, u, mode, precision=precision)
@@ -107,7 +108,7 @@ def _finite_everywhere(material: go.BSDF) -> None:
         assert np.isfinite(material.f(wo, wi, precision=precision)).all()
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [*SMALL, *(pytest.param(x, marks=pytest.mark.slow) for x in ALL if x not in SMALL)])
 def test_every_model_is_finite_and_positive_at_the_edges(name: str) -> None:
     _finite_everywhere(ALL[name])
 
