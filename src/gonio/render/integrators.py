@@ -18,8 +18,8 @@ How it is fast:
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, make_dataclass
+from functools import cache
 from typing import Any
 
 import drjit as dr
@@ -54,6 +54,9 @@ LIGHT, LOBE, CHOICE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 # 4 x 4 pixels fill the 16 lanes of AVX-512 and two packets of AVX2: on the five-conductor scene the same rays take
 # 0.21 s in tiles and 0.32 s in scanlines.
 TILE = 4
+
+# Samples whose paths wait for each other, see _Transport.accumulate.
+BATCH = 16
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ class Render:
         self.done = 0
         self._order = _tiles(self.width, self.height)
         self._pixel = mi.UInt32(self._order)
-        self._sums = [dr.zeros(mi.Float64, self.width * self.height) for _ in range(9 if aovs else 3)]
+        self._sums = [dr.zeros(mi.Float64, self.width * self.height) for _ in range(12 if aovs else 6)]
         dr.eval(self._pixel, self._sums)
         with dr.suspend_grad():
             self._transport = _Transport(mi, scene, self.sensor, settings, aovs)
@@ -129,7 +132,7 @@ class Render:
 
     def image(self) -> np.ndarray:
         """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""
-        return self._mean(0)
+        return self._mean(0, -3)
 
     def aov(self) -> dict[str, np.ndarray]:
         """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).
@@ -141,10 +144,10 @@ class Render:
             raise InputError("features were not rendered", "Render.aov", "make the Render with aovs=True")
         return {"albedo": self._mean(3), "normal": self._mean(6)}
 
-    def _mean(self, start: int) -> np.ndarray:
+    def _mean(self, *starts: int) -> np.ndarray:
         pixels = np.empty((self.height * self.width, 3), np.float32)
-        scale = 1.0 / max(self.done, 1)
-        pixels[self._order] = np.stack([np.asarray(s) * scale for s in self._sums[start : start + 3]], axis=1)
+        channels = [sum(np.asarray(self._sums[start + c]) for start in starts) for c in range(3)]
+        pixels[self._order] = np.stack(channels, axis=1) / max(self.done, 1)
         return pixels.reshape(self.height, self.width, 3)
 
 
@@ -155,11 +158,56 @@ def _tiles(width: int, height: int) -> np.ndarray:
     return (row * width + column)[lane].astype(np.uint32)
 
 
+@dataclass
+class _Path:
+    """A path on its way, one a lane."""
+
+    index: Any  # of the sample
+    depth: Any  # segments traced so far
+    ray: Any  # the next segment, and
+    hit: Any  # what it meets
+    throughput: Any
+    pdf: Any  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
+    solid_angle: Any  # LightSample.solid_angle at its origin
+    radiance: Any  # found so far
+    active: Any
+
+
+@cache
+def _waiting_type(variant: str) -> type:
+    """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a _Path.
+
+    A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
+    cannot hold masks (in Dr.Jit 1.5 they do not compile for the CPU), so what an intersection found is kept
+    without its mask `valid`; the distance says the same.
+    """
+    mi = engine.load()
+    found = {name: kind for name, kind in mi.PreliminaryIntersection3f.DRJIT_STRUCT.items() if name != "valid"}
+    kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum, "pdf": mi.Float, "solid_angle": mi.Float}
+
+    def pack(path: _Path) -> Any:
+        hit = {name: getattr(path.hit, name) for name in found}
+        return waiting(**{name: getattr(path, name) for name in kept}, **hit)
+
+    def unpack(rest: Any) -> _Path:
+        hit = dr.zeros(mi.PreliminaryIntersection3f)
+        for name in found:
+            setattr(hit, name, getattr(rest, name))
+        hit.valid = rest.t < dr.inf
+        fields = {name: kind(getattr(rest, name)) for name, kind in kept.items()}
+        return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
+
+    waiting = make_dataclass("Waiting", [*kept.items(), *found.items()])
+    waiting.pack, waiting.unpack = staticmethod(pack), unpack
+    return waiting
+
+
 class _Transport:
     """One integrator, bound to a scene: the program that the kernel runs for each lane."""
 
     def __init__(self, mi: Any, scene: Any, sensor: Any, settings: Settings, aovs: bool):
         self.mi, self.scene, self.sensor, self.settings, self.aovs = mi, scene, sensor, settings, aovs
+        self.Waiting = _waiting_type(mi.variant())
         self.context = mi.BSDFContext()
         self.lights = Lights(mi, scene)
         self.pair = sampler.PAIRS[sampler.DEFAULT if settings.sampler == "default" else settings.sampler]
@@ -169,7 +217,8 @@ class _Transport:
         depth = {"path": settings.max_depth, "whitted": WHITTED_DEPTH}.get(settings.integrator, 2)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
-        self.radiance: Callable[..., Any] = {"normal": self._normal, "uv": self._uv}.get(settings.integrator, self._path)
+        # Whether any path has a second vertex to shade.
+        self.goes_on = settings.integrator == "whitted" or (settings.integrator == "path" and settings.max_depth > 2)
 
     def _ambient(self) -> Any:
         """The ambient light as a texture (so that it works in spectral variants), None where nothing would use it."""
@@ -181,21 +230,84 @@ class _Transport:
         return texture
 
     def accumulate(self, pixel: Any, key: Any, first: Any, last: Any, sums: list[Any]) -> list[Any]:
-        """Add samples [first, last) of every pixel to the sums, one after the other."""
+        """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples.
+
+        Samples go in batches of BATCH. The first vertices of a batch are done one sample after the other: their rays
+        are coherent, every lane is busy. The paths that go on from there are put by, and then followed in a flat
+        loop over vertices: a lane whose path has ended takes its next one at once, instead of idling until the
+        longest of its 16 neighbours' has ended. What comes after the first vertex is summed apart, so that the
+        order of additions, and hence the last bit, does not depend on where passes cut the batches.
+        """
+        mi = self.mi
+        lanes = dr.width(pixel)
+        # Counters of local memory start as full-width opaque arrays: Dr.Jit 1.5 takes a loop variable that starts as
+        # one number to be the same in all lanes, and then writes every lane's entry at one lane's place.
+        none = dr.opaque(mi.UInt32, 0, lanes)
+
+        def batch(index: Any, near: tuple[Any, ...], far: tuple[Any, ...]) -> tuple[Any, ...]:
+            end = dr.minimum(index + BATCH, last)
+            waiting = dr.alloc_local(self.Waiting, BATCH if self.goes_on else 1, value=dr.zeros(self.Waiting))
+
+            def begin(index: Any, near: Any, waiting: Any, count: Any) -> tuple[Any, ...]:
+                path, values = self.begin(pixel, key, index)
+                near = tuple(s + mi.Float64(v) for s, v in zip(near, values, strict=True))
+                if self.goes_on:
+                    waiting.write(self.Waiting.pack(path), count, path.active)
+                    count = count + dr.select(path.active, mi.UInt32(1), mi.UInt32(0))
+                return index + 1, near, waiting, count
+
+            state = (index, near, waiting, none)
+            state = dr.while_loop(state, lambda i, *_: i < end, begin, mode="symbolic", label="first vertices")
+            index, near, waiting, count = state
+            if self.goes_on:
+                far = self.follow(key, waiting, count, none, far)
+            return index, near, far
+
+        start = first + dr.zeros(mi.UInt32, lanes)
+        loop = (start, tuple(sums[:-3]), tuple(sums[-3:]))
+        _, near, far = dr.while_loop(loop, lambda index, *_: index < last, batch, mode="symbolic", label="batches")
+        return [*near, *far]
+
+    def follow(self, key: Any, waiting: Any, count: Any, none: Any, far: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Follow the paths put by in `waiting[0:count]` to their ends and add what they find."""
         mi = self.mi
 
-        def body(index: Any, *sums: Any) -> tuple[Any, ...]:
-            values = self.sample(pixel, key, index)
-            return (index + 1, *(s + mi.Float64(v) for s, v in zip(sums, values, strict=True)))
+        def body(slot: Any, path: Any, waiting: Any, far: tuple[Any, ...]) -> tuple[Any, ...]:
+            path = dr.select(path.active, path, waiting.read(slot).unpack())
+            path = self.extend(path, key)
+            ended = ~path.active
+            values = self.rgb(path.radiance, path.ray.wavelengths)
+            far = tuple(s + mi.Float64(dr.select(ended, v, 0)) for s, v in zip(far, values, strict=True))
+            return slot + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, waiting, far
 
-        start = first + dr.zeros(mi.UInt32, dr.width(pixel))
-        loop = dr.while_loop((start, *sums), lambda index, *_: index < last, body, mode="symbolic", label="samples")
-        return list(loop[1:])
+        idle = dr.zeros(self.Waiting).unpack()
+        idle.active = mi.Bool(False)
+        state = (none, idle, waiting, far)
+        loop = dr.while_loop(state, lambda slot, *_: slot < count, body, mode="symbolic", label="further vertices")
+        return loop[3]
 
-    def sample(self, pixel: Any, key: Any, index: Any) -> list[Any]:
+    def begin(self, pixel: Any, key: Any, index: Any) -> tuple[_Path, list[Any]]:
+        """The first vertex of a sample: (the path that goes on from it, [r, g, b, features of this vertex])."""
+        mi = self.mi
         ray, weight = self.camera_ray(pixel, key, index)
-        radiance, features = self.radiance(ray, key, index)
-        return [*self.rgb(radiance * weight, ray.wavelengths), *features]
+        ray = mi.Ray3f(ray)
+        hit = self.scene.ray_intersect_preliminary(ray, coherent=True)
+        path = _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(0), mi.Float(0),
+                     mi.Spectrum(0), mi.Bool(True))  # fmt: skip
+        if self.settings.integrator in ("normal", "uv"):
+            return path, self.show(hit.compute_surface_interaction(ray))
+        features: list[Any] = []
+        path = self.extend(path, key, features)
+        return path, [*self.rgb(path.radiance, ray.wavelengths), *features]
+
+    def show(self, si: Any) -> list[Any]:
+        """The pictures that need no light: `normal` and `uv`."""
+        if self.settings.integrator == "normal":
+            colour = (si.sh_frame.n + 1) * 0.5
+        else:
+            colour = self.mi.Color3f(si.uv.x, si.uv.y, 0)
+        features = [0, 0, 0, *si.sh_frame.n] if self.aovs else []
+        return [dr.select(si.is_valid(), v, 0) for v in (*colour, *features)]
 
     def camera_ray(self, pixel: Any, key: Any, index: Any) -> tuple[Any, Any]:
         mi = self.mi
@@ -219,81 +331,73 @@ class _Transport:
             return mi.Color3f(radiance[0])
         return radiance
 
-    def _normal(self, ray: Any, key: Any, index: Any) -> tuple[Any, list[Any]]:
-        si = self.scene.ray_intersect(ray, self.mi.RayFlags.All, True)
-        return dr.select(si.is_valid(), (si.sh_frame.n + 1) * 0.5, 0), [0] * (6 if self.aovs else 0)
+    def extend(self, path: _Path, key: Any, features: list[Any] | None = None) -> _Path:
+        """One vertex of a path: meet a surface, take its light, gather light there, choose the next direction.
 
-    def _uv(self, ray: Any, key: Any, index: Any) -> tuple[Any, list[Any]]:
-        si = self.scene.ray_intersect(ray, self.mi.RayFlags.All, True)
-        return dr.select(si.is_valid(), self.mi.Color3f(si.uv.x, si.uv.y, 0), 0), [0] * (6 if self.aovs else 0)
-
-    def _path(self, ray: Any, key: Any, index: Any) -> tuple[Any, list[Any]]:
+        features  given at the first vertex: a list that gets its albedo and normal, if they are wanted
+        """
+        first = features is not None
         mi, scene, lights, context = self.mi, self.scene, self.lights, self.context
         name = self.settings.integrator
         sample_lights = name != "directSampleBSDF"
         sample_bsdf = name in ("path", "direct", "directSampleBSDF")  # its smooth lobes; delta lobes are always
 
-        def body(depth, ray, throughput, radiance, pdf, origin, solid_angle, features, active):
-            si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
-            emitted = lights.emitted(si, active)
-            if sample_lights:
-                found = dr.any(emitted != 0)
-                weight = mis(pdf, lights.pdf(origin, solid_angle, si, active & found & (pdf > 0)))
-                emitted = dr.select(pdf > 0, emitted * weight, emitted)
-            radiance = radiance + throughput * dr.select(active, emitted, 0)
+        index, ray, throughput, radiance, active = path.index, path.ray, path.throughput, path.radiance, path.active
+        depth = mi.UInt32(0) if first else path.depth
+        si = path.hit.compute_surface_interaction(ray, mi.RayFlags.All, active)
+        emitted = lights.emitted(si, active)
+        if sample_lights and not first:
+            found = dr.any(emitted != 0)
+            weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, active & found & (path.pdf > 0)))
+            emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
+        radiance = radiance + throughput * dr.select(active, emitted, 0)
 
-            active = active & si.is_valid() & (depth + 1 < self.max_depth)
-            last = depth + 2 >= self.max_depth
-            dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
-            lobe, pick = self.pair(key, index, dimension + CHOICE)
-            u = mi.Point2f(*self.pair(key, index, dimension + LOBE))
-            bsdf = si.bsdf(ray)
-            if sample_lights and lights.count > 0:
-                light = lights.sample(si, mi.Point2f(*self.pair(key, index, dimension + LIGHT)), pick, active)
-                toward = si.to_local(light.ds.d)
-                value, value_pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
-                light_weight = value * light.weight
-                if sample_bsdf:
-                    light_weight *= dr.select(light.delta, 1, mis(light.ds.pdf, value_pdf))
-                visible = active & dr.any(light_weight != 0)
-                visible &= ~scene.ray_test(si.spawn_ray_to(light.ds.p), visible)
-                radiance = radiance + throughput * dr.select(visible, light_weight, 0)
-                solid_angle = light.solid_angle
-            else:
-                bs, weight = bsdf.sample(context, si, lobe, u, active)
-            if self.ambient is not None:
-                radiance = radiance + throughput * self._ambient_light(bsdf, si, active)
+        active = active & si.is_valid() & (depth + 1 < self.max_depth)
+        last = depth + 2 >= self.max_depth
+        dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
+        lobe, pick = self.pair(key, index, dimension + CHOICE)
+        u = mi.Point2f(*self.pair(key, index, dimension + LOBE))
+        bsdf = si.bsdf(ray)
+        solid_angle = mi.Float(0)
+        if sample_lights and lights.count > 0:
+            light = lights.sample(si, mi.Point2f(*self.pair(key, index, dimension + LIGHT)), pick, active)
+            toward = si.to_local(light.ds.d)
+            value, value_pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
+            light_weight = value * light.weight
+            if sample_bsdf:
+                light_weight *= dr.select(light.delta, 1, mis(light.ds.pdf, value_pdf))
+            visible = active & dr.any(light_weight != 0)
+            visible &= ~scene.ray_test(si.spawn_ray_to(light.ds.p), visible)
+            radiance = radiance + throughput * dr.select(visible, light_weight, 0)
+            solid_angle = light.solid_angle
+        else:
+            bs, weight = bsdf.sample(context, si, lobe, u, active)
+        if self.ambient is not None:
+            radiance = radiance + throughput * self._ambient_light(bsdf, si, active)
 
-            if self.aovs:
-                first = active & (depth == 0)
-                features = tuple(
-                    dr.select(first, f, old) for f, old in zip((*self.rgb(weight, ray.wavelengths), *si.sh_frame.n), features)
-                )
-            throughput = throughput * weight
-            delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            origin = si.p
-            pdf = dr.select(delta, 0, bs.pdf) if sample_lights else mi.Float(0)
-            active = active & dr.any(throughput != 0)
-            if not sample_bsdf:
-                active = active & delta
-            ray = si.spawn_ray(si.to_world(bs.wo))
-            if name == "path":
-                throughput, active = self._roulette(depth, throughput, active, key, index)
+        if first and self.aovs:
+            features += [dr.select(active, f, 0) for f in (*self.rgb(weight, ray.wavelengths), *si.sh_frame.n)]
+        throughput = throughput * weight
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        pdf = dr.select(delta, 0, bs.pdf) if sample_lights else mi.Float(0)
+        active = active & dr.any(throughput != 0)
+        if not sample_bsdf:
+            active = active & delta
+        ray = si.spawn_ray(si.to_world(bs.wo))
+        if name == "path":
+            throughput, active = self._roulette(depth, throughput, active, key, index)
 
-            # The last ray can only find light: no surface beyond it is shaded.
-            end = active & last
-            found, found_pdf = lights.last_hit(ray, origin, solid_angle, end)
-            if sample_lights:
-                found = dr.select(pdf > 0, found * mis(pdf, found_pdf), found)
-            radiance = radiance + throughput * dr.select(end, found, 0)
-            return depth + 1, ray, throughput, radiance, pdf, origin, solid_angle, features, active & ~last
-
-        state = (
-            mi.UInt32(0), mi.Ray3f(ray), mi.Spectrum(1), mi.Spectrum(0), mi.Float(0), mi.Point3f(0), mi.Float(0),
-            tuple(mi.Float(0) for _ in range(6 if self.aovs else 0)), mi.Bool(True),
-        )  # fmt: skip
-        state = dr.while_loop(state, lambda *s: s[-1], body, mode="symbolic", label="path")
-        return state[3], list(state[7])
+        # The last ray can only find light: no surface beyond it is shaded.
+        end = active & last
+        found, found_pdf = lights.last_hit(ray, ray.o, solid_angle, end)
+        if sample_lights:
+            found = dr.select(pdf > 0, found * mis(pdf, found_pdf), found)
+        radiance = radiance + throughput * dr.select(end, found, 0)
+        active = active & ~last
+        hit = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        if not lights.has_environment:
+            active = active & hit.is_valid()
+        return _Path(index, depth + 1, ray, hit, throughput, pdf, solid_angle, radiance, active)
 
     def _roulette(self, depth, throughput, active, key, index):
         """End dim paths by chance: survive with the throughput's largest channel, at most 0.95, and weigh by it."""
