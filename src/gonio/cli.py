@@ -513,7 +513,7 @@ def _show_warning(message: Warning | str, category: type[Warning], *place: Any, 
 def _run(arguments: list[str] | None) -> int:
     as_json = "--json" in (sys.argv[1:] if arguments is None else arguments)
     try:
-        code = app(arguments, standalone_mode=False)
+        code = app(arguments, prog_name="gonio", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # Typer's answer to a KeyboardInterrupt; a render that kept its picture exits itself
             print("ended by Ctrl-C; nothing was written", file=sys.stderr)

@@ -32,9 +32,7 @@ ERRORS = [(".exr", 0), (".npz", 0), (".hdr", 4 / 256), (".png", 2.28 / 510)]
 
 
 @pytest.mark.parametrize(("suffix", "error"), ERRORS)
-def test_pixels_and_settings_come_back(
-    tmp_path: Path, picture: np.ndarray, suffix: str, error: float
-) -> None:
+def test_pixels_and_settings_come_back(tmp_path: Path, picture: np.ndarray, suffix: str, error: float) -> None:
     path = images.write(tmp_path / f"picture{suffix}", picture, SETTINGS)
     back = images.read(path)
     expected = picture.clip(0, 1) if suffix == ".png" else picture
@@ -122,9 +120,7 @@ def test_a_link_is_followed_and_stays_a_link(tmp_path: Path, picture: np.ndarray
 
 @pytest.mark.parametrize("suffix", images.SUFFIXES)
 @pytest.mark.parametrize("keep", [0, 7, 40, -100])
-def test_damaged_files_are_one_clear_error(
-    tmp_path: Path, picture: np.ndarray, suffix: str, keep: int
-) -> None:
+def test_damaged_files_are_one_clear_error(tmp_path: Path, picture: np.ndarray, suffix: str, keep: int) -> None:
     path = images.write(tmp_path / f"a{suffix}", picture)
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(InputError) as caught:

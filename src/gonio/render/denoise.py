@@ -25,9 +25,7 @@ def require() -> None:
         raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _INSTALL)
 
 
-def denoise(
-    image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndarray | None = None
-) -> np.ndarray:
+def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndarray | None = None) -> np.ndarray:
     """The picture without noise: (H, W, 3) float32, linear, unbounded above.
 
     albedo  surface colour in [0, 1], noisy or not; keeps texture edges sharp

@@ -52,9 +52,7 @@ def check_writable(path: str | Path) -> Path:
     """The file `path` will become (links followed), or an InputError before hours are spent on it."""
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
-        hint = (
-            did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
-        )
+        hint = did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
         raise InputError(f"unknown picture format '{target.suffix}'", str(path), hint)
     return check_folder(target)
 
@@ -105,9 +103,7 @@ def write_whole(path: str | Path, content: bytes | Callable[[Path], None]) -> Pa
     return target
 
 
-def write(
-    path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None, exposure: float = 0.0
-) -> Path:
+def write(path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format its suffix names, whole or not at all.
 
     exposure  stops; PNG only, since the other formats keep radiance as it is
@@ -237,9 +233,7 @@ def _nearby(source: Path) -> str:
 def _check_claimed_size(content: bytes, suffix: str, path: str | Path) -> None:
     size = _claimed_size(content, suffix)
     if size is None:
-        raise InputError(
-            f"this is no {suffix[1:].upper()} picture", str(path), "check the file or its suffix"
-        )
+        raise InputError(f"this is no {suffix[1:].upper()} picture", str(path), "check the file or its suffix")
     width, height = size
     if width <= 0 or height <= 0 or width * height > min(_MOST_PIXELS, _MOST_PIXELS_PER_BYTE * len(content)):
         what = f"the header claims {width}x{height} pixels, which a file of {len(content)} bytes cannot hold"
@@ -279,9 +273,7 @@ def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[np.ndarray,
         else:
             pixels = _three_channels(np.array(bitmap).astype(np.float32), path)
     except RuntimeError as error:
-        raise InputError(
-            f"this picture is damaged: {_reason(error)}", path, "render or copy it again"
-        ) from error
+        raise InputError(f"this picture is damaged: {_reason(error)}", path, "render or copy it again") from error
     return np.ascontiguousarray(pixels), metadata
 
 

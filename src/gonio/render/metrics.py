@@ -50,9 +50,7 @@ METRICS: dict[str, str] = {
 def _pair(test: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     a, b = np.asarray(test, np.float64), np.asarray(reference, np.float64)
     if a.shape != b.shape:
-        raise InputError(
-            f"the pictures differ in size: {_size(a)} against {_size(b)}", "", "render both at one --size"
-        )
+        raise InputError(f"the pictures differ in size: {_size(a)} against {_size(b)}", "", "render both at one --size")
     if a.ndim != 3 or a.shape[2] != 3 or a.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {a.shape}")
     for name, picture in (("first", a), ("second", b)):

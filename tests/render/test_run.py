@@ -1,0 +1,373 @@
+"""Passes, their size, and every way to end a render."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from gonio.errors import InputError, MachineError
+from gonio.render import denoise, images, run
+
+PIXELS = 300_000
+
+SCENE = {
+    "output": {"filename": "ball.exr"},
+    "sampler": {"type": "independent", "xSamples": 2, "ySamples": 2},
+    "camera": {
+        "type": "pinhole",
+        "transform": {"position": [0, 1, 4], "lookAt": [0, 0, 0], "up": [0, 1, 0]},
+        "verticalFov": 40,
+        "film": {"size": [24, 16]},
+    },
+    "integrator": {"type": "path", "maxDepth": 3},
+    "scene": {
+        "shapes": [
+            {
+                "type": "sphere",
+                "center": [0, 0, 0],
+                "radius": 1,
+                "material": {"type": "matte", "albedo": [0.7, 0.5, 0.3]},
+            }
+        ],
+        "lights": [{"type": "spotLight", "position": [2, 3, 4], "energy": [40, 40, 40]}],
+    },
+}
+
+XML = """<scene version="3.0.0">
+  <default name="alpha" value="0.2"/>
+  <integrator type="path"><integer name="max_depth" value="3"/></integrator>
+  <sensor type="perspective">
+    <float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0,1,4" target="0,0,0" up="0,1,0"/></transform>
+    <sampler type="independent"><integer name="sample_count" value="4"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/></film>
+  </sensor>
+  <emitter type="constant"/>
+  <shape type="sphere">
+    <bsdf type="gonio_conductor"><string name="preset" value="Au"/><float name="alpha" value="$alpha"/></bsdf>
+  </shape>
+</scene>"""
+
+
+class FakeRender:
+    """A render whose clock ticks as its passes say: one second for the kernel, then 5 M samples a second."""
+
+    def __init__(self, compile_seconds: float = 1.0, rate: float = 5e6) -> None:
+        self.done, self.now, self.rate, self._compile = 0, 0.0, rate, compile_seconds
+        self.passes: list[int] = []
+        self.times: list[float] = []
+
+    def advance(self, count: int) -> None:
+        seconds = count * PIXELS / self.rate + (self._compile if not self.passes else 0)
+        self.passes.append(count)
+        self.times.append(seconds)
+        self.now += seconds
+        self.done += count
+
+    def image(self) -> np.ndarray:
+        return np.zeros((1, 1, 3), np.float32)
+
+    def aov(self) -> dict[str, np.ndarray]:
+        return {}
+
+    def clock(self) -> float:
+        return self.now
+
+
+def test_passes_settle_at_half_a_second_and_end_at_the_wanted_count() -> None:
+    render = FakeRender()
+    assert run.run(render, 1000, PIXELS, clock=render.clock) == ""
+    assert render.done == 1000
+    assert max(render.times[2:]) <= 0.6  # at most this long until Ctrl-C is answered
+    assert len(render.passes) < 1000 * PIXELS / render.rate / run.PASS_SECONDS + 8  # and start-up costs few passes
+
+
+def test_progress_tells_samples_rate_and_time_left() -> None:
+    render = FakeRender()
+    seen: list[run.Progress] = []
+    run.run(render, 200, PIXELS, report=seen.append, clock=render.clock)
+    assert [progress.done for progress in seen] == sorted({progress.done for progress in seen})
+    assert seen[-1] == run.Progress(200, 200, pytest.approx(5e6), 0.0)
+    middle = seen[len(seen) // 2]  # the compiling of the first pass does not spoil the rate
+    assert middle.rate == pytest.approx(5e6)
+    assert middle.remaining == pytest.approx((200 - middle.done) * PIXELS / 5e6)
+
+
+def test_an_interrupt_ends_after_the_pass() -> None:
+    render = FakeRender()
+    assert run.run(render, 1000, PIXELS, interrupted=lambda: len(render.passes) == 3, clock=render.clock) == "interrupt"
+    assert len(render.passes) == 3 and 0 < render.done < 1000
+
+
+def test_the_time_limit_is_kept_to_within_one_small_pass() -> None:
+    render = FakeRender()
+    assert run.run(render, 10**6, PIXELS, timeout=5, clock=render.clock) == "timeout"
+    assert 5 <= render.now < 5.2
+
+
+def test_a_limit_that_is_too_short_still_gives_one_pass() -> None:
+    render = FakeRender()
+    assert run.run(render, 100, PIXELS, timeout=1e-6, clock=render.clock) == "timeout"
+    assert render.done >= 1
+
+
+def test_a_mitsuba_scene_has_passes_of_one_size() -> None:
+    render = FakeRender()
+    render.pass_size = 7  # type: ignore[attr-defined]
+    run.run(render, 30, PIXELS, clock=render.clock)
+    assert render.passes == [7, 7, 7, 7, 2]
+
+
+@pytest.mark.parametrize("text", ["640", "x", "640x", "-3x4", "6.5x4", "640x480x3", "99999999999x1"])
+def test_a_bad_size_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="is no size"):
+        run.parse_size(text)
+
+
+def test_a_size_is_width_times_height() -> None:
+    assert run.parse_size("640x480") == (640, 480)
+
+
+@pytest.mark.parametrize(
+    ("option", "where"),
+    [
+        ({"spp": 0}, "--spp"),
+        ({"size": (0, 5)}, "--size"),
+        ({"size": (10**6, 10**6)}, "--size"),
+        ({"max_depth": 0}, "--max-depth"),
+        ({"seed": -1}, "--seed"),
+        ({"threads": 0}, "--threads"),
+        ({"timeout": 0.0}, "--timeout"),
+        ({"timeout": float("nan")}, "--timeout"),
+        ({"exposure": float("nan")}, "--exposure"),
+    ],
+)
+def test_options_are_checked_before_anything_is_loaded(option: dict[str, object], where: str) -> None:
+    request = run.Request(Path("nowhere"), **option)  # type: ignore[arg-type]
+    with pytest.raises(InputError) as caught:
+        request.check()
+    assert caught.value.where == where
+
+
+def test_a_missing_denoiser_is_told_before_the_render(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(denoise, "available", lambda: "")
+    with pytest.raises(MachineError):
+        run.Request(Path("nowhere"), denoise=True).check()
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    folder = tmp_path / "ball"
+    folder.mkdir()
+    (folder / "scene.json").write_text(json.dumps(SCENE))
+    return folder
+
+
+def test_a_render_writes_the_picture_and_its_settings(scene: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.exr"
+    result = run.render(run.Request(scene, output, spp=8, seed=5))
+    picture = images.read(output)
+    assert picture.pixels.shape == (16, 24, 3) and picture.pixels.max() > 0
+    assert result.spp == picture.metadata["spp"] == 8
+    assert picture.metadata["seed"] == 5
+    assert picture.metadata["integrator"] == "path" and picture.metadata["max_depth"] == 3
+    assert picture.metadata["scene"] == str(scene)
+    assert "stopped" not in picture.metadata
+
+
+def test_the_picture_goes_into_the_current_folder_by_the_scenes_name(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run.render(run.Request(scene)).output == Path("ball.exr")
+    assert (tmp_path / "ball.exr").is_file()
+
+
+def test_same_seed_same_bits_whatever_the_passes(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def rendered(seed: int) -> np.ndarray:
+        prepared = run.prepare(run.Request(scene, spp=13, seed=seed))
+        run.run(prepared.render, prepared.spp, 24 * 16)
+        return prepared.render.image()
+
+    whole = rendered(1)
+    monkeypatch.setattr(run, "FIRST_PASS", 1)
+    monkeypatch.setattr(run, "PASS_SECONDS", 1e-9)  # passes of one sample
+    assert np.array_equal(rendered(1), whole)
+    assert not np.array_equal(rendered(2), whole)
+
+
+def test_the_scene_is_overridden_by_options(scene: Path) -> None:
+    prepared = run.prepare(run.Request(scene, size=(10, 6), integrator="normal", sampler="independent"))
+    assert prepared.size == (10, 6)
+    assert prepared.settings["integrator"] == "normal" and prepared.settings["sampler"] == "independent"
+    assert prepared.spp == 4
+
+
+def test_an_unknown_integrator_gets_a_suggestion(scene: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        run.prepare(run.Request(scene, integrator="pth"))
+    assert (caught.value.where, caught.value.hint) == ("--integrator", "did you mean 'path'?")
+
+
+def test_a_timeout_keeps_the_picture_and_says_so(scene: Path, tmp_path: Path) -> None:
+    result = run.render(run.Request(scene, tmp_path / "a.npz", spp=2**29, timeout=0.3))
+    metadata = images.read(result.output).metadata
+    assert metadata["stopped"] == result.stopped == "timeout"
+    assert metadata["spp"] == result.spp < metadata["wanted_spp"] == 2**29
+
+
+# --- Mitsuba's scenes ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def xml(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.xml"
+    path.write_text(XML)
+    return path
+
+
+def test_a_mitsuba_scene_renders_with_gonio_materials(xml: Path, tmp_path: Path) -> None:
+    result = run.render(run.Request(xml, tmp_path / "a.npz"))
+    pixels = images.read(result.output).pixels
+    assert pixels.shape == (16, 24, 3) and result.spp == 4
+    ball = pixels[8, 12]
+    assert ball[0] > ball[2]  # gold is not grey
+    assert result.settings["integrator"] == "mitsuba:PathIntegrator"
+
+
+def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
+
+    def rendered(seed: int) -> np.ndarray:
+        prepared = run.prepare(run.Request(xml, spp=6, seed=seed))
+        run.run(prepared.render, prepared.spp, 24 * 16)
+        assert prepared.render.done == 6
+        return prepared.render.image()
+
+    assert np.array_equal(rendered(1), rendered(1))
+    assert not np.array_equal(rendered(1), rendered(2))
+
+
+def test_both_ways_through_a_mitsuba_scene_agree(xml: Path) -> None:
+    pictures = []
+    for integrator in (None, "path"):
+        prepared = run.prepare(run.Request(xml, spp=512, integrator=integrator, max_depth=3 if integrator else None))
+        run.run(prepared.render, prepared.spp, 24 * 16)
+        pictures.append(prepared.render.image())
+    # Mitsuba's default filter spreads samples over pixels, so means are compared, not pixels.
+    assert pictures[0].mean() == pytest.approx(pictures[1].mean(), rel=0.01)
+
+
+def test_a_mitsuba_scene_takes_size_and_parameters(xml: Path) -> None:
+    prepared = run.prepare(run.Request(xml, size=(12, 20), overrides={"alpha": 0.5}))
+    assert prepared.size == (12, 20)
+    with pytest.raises(InputError, match="alhpa"):
+        run.prepare(run.Request(xml, overrides={"alhpa": 0.5}))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("</scene>", "", "not well-formed XML"),
+        ('type="sphere"', 'type="spheer"', "spheer"),
+        ('name="alpha" value="0.2"', 'name="alpha" value="-1"', "-1 given"),
+        ("gonio_conductor", "gonio_condutor", "gonio_condutor"),
+        ("sensor", "texture", "line 4|no <sensor>"),
+    ],
+)
+def test_a_bad_mitsuba_scene_is_one_clear_error(xml: Path, old: str, new: str, message: str) -> None:
+    xml.write_text(XML.replace(old, new))
+    with pytest.raises(InputError, match=message) as caught:
+        run.prepare(run.Request(xml))
+    assert "Traceback" not in caught.value.what and ".cpp" not in caught.value.what
+    assert caught.value.where == str(xml)
+
+
+def test_a_mitsuba_scene_may_not_read_outside_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "secret.ply").write_text("ply")
+    inside = tmp_path / "scene"
+    inside.mkdir()
+    scene = inside / "a.xml"
+    scene.write_text(
+        XML.replace('<shape type="sphere">', '<shape type="ply"><string name="filename" value="../secret.ply"/>')
+    )
+    with pytest.raises(InputError, match="outside the scene's folder"):
+        run.prepare(run.Request(scene))
+    with pytest.raises(InputError) as caught:  # allowed, it is read, and found to be no mesh
+        run.prepare(run.Request(scene, allow_outside=True))
+    assert "outside" not in caught.value.what
+
+
+def test_options_that_mitsubas_integrator_would_ignore_are_refused(xml: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        run.prepare(run.Request(xml, max_depth=3))
+    assert "--integrator" in caught.value.hint
+
+
+def test_pictures_of_one_channel_become_grey() -> None:
+    class Film:
+        def crop_size(self) -> tuple[int, int]:
+            return 2, 1
+
+    sensor = SimpleNamespace(film=Film, sampler=lambda: SimpleNamespace(sample_count=lambda: 1))
+    scene = SimpleNamespace(sensors=lambda: [sensor], integrator=lambda: None)
+    mi = SimpleNamespace(render=lambda *a, **k: np.array([[[1.0], [2.0]]], np.float32))
+    render = run.MitsubaRender(mi, scene, spp=1)  # type: ignore[arg-type]
+    render.advance(1)
+    assert render.image().tolist() == [[[1, 1, 1], [2, 2, 2]]]
+
+
+# --- Ctrl-C --------------------------------------------------------------------------------------------
+
+
+def _start(scene: Path, output: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "gonio.cli", "render", str(scene), "--spp", str(2**29), "-o", str(output)]
+    # A test run in the background of a shell hands an ignored SIGINT down.
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+@pytest.fixture
+def endless(scene: Path) -> Path:
+    """A scene whose passes take their half second."""
+    big = json.loads((scene / "scene.json").read_text())
+    big["camera"]["film"]["size"] = [320, 200]
+    (scene / "scene.json").write_text(json.dumps(big))
+    return scene
+
+
+def test_ctrl_c_keeps_the_picture_so_far(endless: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.exr"
+    process = _start(endless, output)
+    time.sleep(3)
+    process.send_signal(signal.SIGINT)
+    told, warned = process.communicate(timeout=30)
+    assert process.returncode == run.INTERRUPTED, warned
+    assert "stopped by Ctrl-C" in told and "Traceback" not in warned
+    assert images.read(output).metadata["stopped"] == "interrupt"
+
+
+def test_a_second_ctrl_c_ends_at_once_and_leaves_no_file(endless: Path, tmp_path: Path) -> None:
+    output = tmp_path / "out" / "a.exr"
+    output.parent.mkdir()
+    process = _start(endless, output)
+    time.sleep(3)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=5)
+    assert process.returncode == run.INTERRUPTED
+    # Where the pass ended between the two, the picture is kept, and whole; never is a part left.
+    assert [entry.name for entry in output.parent.iterdir()] in ([], ["a.exr"])

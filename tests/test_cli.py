@@ -1,0 +1,328 @@
+"""The command line: exit codes, three-line errors, JSON, and a start that loads nothing heavy."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gonio import cli
+from gonio.render import images
+
+SCENE = {
+    "output": {"filename": "ball.png"},
+    "sampler": {"type": "independent", "xSamples": 2, "ySamples": 2},
+    "camera": {
+        "type": "pinhole",
+        "transform": {"position": [0, 1, 4], "lookAt": [0, 0, 0], "up": [0, 1, 0]},
+        "verticalFov": 40,
+        "film": {"size": [24, 16]},
+    },
+    "integrator": {"type": "directSampleLight"},
+    "scene": {
+        "shapes": [
+            {
+                "type": "sphere",
+                "center": [0, 0, 0],
+                "radius": 1,
+                "material": {"type": "phong", "kd": [0.2, 0.2, 0.2], "ks": [0.5, 0.5, 0.5], "p": 8},
+            }
+        ],
+        "lights": [{"type": "spotLight", "position": [2, 3, 4], "energy": [40, 40, 40]}],
+    },
+}
+
+VERBS = ("render", "study", "compare", "plot", "models", "explain", "schema", "doctor")
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A scene's folder; the current folder is an empty one beside it."""
+    folder = tmp_path / "ball"
+    folder.mkdir()
+    (folder / "scene.json").write_text(json.dumps(SCENE))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return folder
+
+
+def gonio(*arguments: object) -> int:
+    """Run the command in this process; its exit code."""
+    with pytest.raises(SystemExit) as caught:
+        cli.main([str(argument) for argument in arguments])
+    return int(caught.value.code or 0)
+
+
+def failure(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """Run a command that has to fail on its input; what it says."""
+    assert gonio(*arguments) == 2
+    told = capsys.readouterr()
+    assert "Traceback" not in told.err + told.out
+    assert told.out == ""
+    lines = told.err.strip().splitlines()
+    assert 1 <= len(lines) <= 3 and lines[0].startswith("error: ")
+    return told.err
+
+
+# --- start and help ------------------------------------------------------------------------------------
+
+
+def test_help_loads_nothing_heavy() -> None:
+    program = (
+        "import sys; from gonio import cli\n"
+        "try: cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print([m for m in ('mitsuba', 'drjit', 'numpy', 'matplotlib', 'pydantic', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.strip().splitlines()[-1] == "[]"
+
+
+def test_rendering_loads_no_plotting(scene: Path) -> None:
+    program = (
+        "import sys; from gonio import cli\n"
+        f"try: cli.main(['render', {str(scene)!r}, '-o', 'a.exr'])\n"
+        "except SystemExit as end: assert not end.code, end.code\n"
+        "print([m for m in ('matplotlib', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout.strip().splitlines()[-1] == "[]", done.stderr
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_an_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio(verb, "--help") == 0
+    text = capsys.readouterr().out
+    assert re.search(rf"^ *gonio {verb}\b", text, re.MULTILINE), text
+
+
+def test_help_groups_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("--help") == 0
+    text = capsys.readouterr().out
+    for heading in ("Pictures", "Materials", "Support", "Exit codes"):
+        assert heading in text
+    assert all(re.search(rf"\b{verb}\b", text) for verb in VERBS)
+
+
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    import gonio as package
+
+    assert gonio("--version") == 0
+    assert capsys.readouterr().out == f"gonio {package.__version__}\n"
+
+
+# --- errors --------------------------------------------------------------------------------------------
+
+
+def test_no_arguments_print_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio() == 2
+    told = capsys.readouterr()
+    assert "Usage" in told.out + told.err and "error" not in told.err
+
+
+def test_a_misspelt_verb_or_option_gets_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "'render'" in failure(capsys, "rendr")
+    assert "--spp" in failure(capsys, "render", "x", "--sp", 3)
+    assert "gonio compare --help" in failure(capsys, "compare", "a.exr")
+
+
+def test_a_missing_scene_is_named(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = failure(capsys, "render", scene.with_name("bal"))
+    assert "bal" in text and "did you mean 'ball'?" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--spp", "0"], "0 samples"),
+        (["--spp", "many"], "'--spp'"),
+        (["--size", "0x10"], "no pixels"),
+        (["--size", "10by10"], "is no size"),
+        (["--size", "900000x900000"], "GiB"),
+        (["--integrator", "pathh"], "did you mean 'path'?"),
+        (["--sampler", "sobl"], "did you mean 'sobol'?"),
+        (["--device", "gpu"], "auto, cpu, cuda"),
+        (["--threads", "0"], "threads"),
+        (["--timeout", "-1"], "time limit"),
+        (["-o", "nowhere/a.exr"], "does not exist"),
+        (["-o", "a.jpeg"], "unknown picture format"),
+    ],
+)
+def test_bad_options_are_one_clear_error(
+    scene: Path, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert message in failure(capsys, "render", scene, *options)
+    assert list(Path().iterdir()) == []
+
+
+def test_an_error_in_the_scene_names_file_pointer_and_hint(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (scene / "scene.json").read_text().replace('"radius": 1', '"radius": -1')
+    (scene / "scene.json").write_text(text)
+    told = failure(capsys, "render", scene)
+    assert "scene.json#/scene/shapes/0/radius" in told and " hint: " in told
+
+
+def test_errors_can_be_json(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("render", scene, "--spp", "0", "--json") == 2
+    told = capsys.readouterr()
+    error = json.loads(told.out)["error"]
+    assert error["where"] == "--spp" and error["code"] == 2 and error["hint"]
+    assert told.err == ""
+
+
+def test_markup_in_a_message_is_printed_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "[bold]/x[/red]" in failure(capsys, "render", "[bold]/x[/red]")
+
+
+def test_a_fault_of_our_own_says_how_to_report_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from gonio.render import scene as scenes
+
+    def broken() -> dict[str, object]:
+        raise ZeroDivisionError("no luck")
+
+    monkeypatch.setattr(scenes, "json_schema", broken)
+    monkeypatch.delenv("GONIO_DEBUG", raising=False)
+    assert gonio("schema") == 3
+    told = capsys.readouterr().err
+    assert "ZeroDivisionError: no luck" in told and "--debug" in told and "Traceback" not in told
+    monkeypatch.setenv("GONIO_DEBUG", "1")
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["schema"])
+
+
+def test_a_full_disk_is_a_fault_of_the_machine(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import errno
+
+    def no_space(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", no_space)
+    assert gonio("render", scene) == 3
+    assert list(Path().iterdir()) == []
+
+
+# --- verbs ---------------------------------------------------------------------------------------------
+
+
+def test_render_writes_beside_where_it_is_run_and_prints_the_path(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert gonio("render", scene / "scene.json") == 0
+    assert capsys.readouterr().out.startswith("ball.png  24x16, 4 spp")
+    assert images.read("ball.png").metadata["spp"] == 4
+
+
+def test_render_reports_json(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("render", scene, "-o", "a.exr", "--spp", "2", "--size", "8x4", "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["output"] == "a.exr" and result["size"] == [8, 4] and result["spp"] == 2
+    assert result["stopped"] == "" and result["settings"]["integrator"] == "directSampleLight"
+
+
+def test_exposure_brightens_a_png(scene: Path) -> None:
+    assert gonio("render", scene, "-o", "a.png", "--exposure", "-2") == 0
+    assert gonio("render", scene, "-o", "b.png", "--exposure", "-3") == 0
+    dim, dimmer = images.read("a.png").pixels, images.read("b.png").pixels
+    assert dim.mean() == pytest.approx(2 * dimmer.mean(), rel=0.02)
+
+
+def test_study_lays_out_every_combination(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vary = ["--vary", "scene.shapes.0.material.p=4,16", "--vary", "scene.shapes.0.material.kd=[.1,.1,.1],[0.5,0,0],.9"]
+    assert gonio("study", scene, *vary, "-o", "sheet.png", "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert len(result["cells"]) == 6
+    assert result["cells"][1] == {"scene.shapes.0.material.p": 4, "scene.shapes.0.material.kd": [0.5, 0, 0]}
+    assert Path("sheet.png").stat().st_size > 1000
+
+
+def test_study_refuses_a_path_that_leads_nowhere(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "'radius'" in failure(capsys, "study", scene, "--vary", "scene.shapes.0.radios=1,2")
+    assert "sets nothing" in failure(capsys, "study", scene, "--vary", "radius")
+    assert "figure format" in failure(capsys, "study", scene, "--vary", "a=1", "-o", "a.exr")
+
+
+@pytest.fixture
+def two_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    reference = np.full((12, 16, 3), 0.5, np.float32)
+    images.write("a.exr", reference * 1.1)
+    images.write("b.exr", reference)
+    images.write("small.npz", reference[:4])
+
+
+@pytest.mark.usefixtures("two_pictures")
+def test_compare_judges_by_the_tolerance(capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("compare", "a.exr", "b.exr", "--json") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["rmse"] == pytest.approx(0.05) and result["mean_ratio"] == pytest.approx(1.1)
+    assert gonio("compare", "a.exr", "b.exr", "--metric", "rmse", "--tolerance", "0.06") == 0
+    assert gonio("compare", "a.exr", "b.exr", "--metric", "rmse", "--tolerance", "0.04", "-o", "map.png") == 1
+    assert "fails: rmse 0.05 > 0.04" in capsys.readouterr().out
+    assert Path("map.png").is_file()
+
+
+@pytest.mark.usefixtures("two_pictures")
+def test_compare_refuses_what_cannot_be_compared(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "16x12 against 16x4" in failure(capsys, "compare", "a.exr", "small.npz")
+    assert "cannot read" in failure(capsys, "compare", "a.exr", "c.exr")
+    assert "did you mean 'relmse'?" in failure(capsys, "compare", "a.exr", "b.exr", "--metric", "relms")
+    assert "tolerance" in failure(capsys, "compare", "a.exr", "b.exr", "--tolerance", "nan")
+
+
+def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[str]) -> None:
+    from gonio.models import models
+
+    assert gonio("models", "--json") == 0
+    assert list(json.loads(capsys.readouterr().out)) == list(models())
+    for name, cls in models().items():
+        assert gonio("explain", name, "--json") == 0
+        page = json.loads(capsys.readouterr().out)
+        assert [row["name"] for row in page["parameters"]] == list(cls.parameters())
+        assert page["doc"]
+    assert gonio("explain", "conductor") == 0
+    assert "alpha" in capsys.readouterr().out
+    assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")
+
+
+def test_schema_is_a_json_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("schema") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert "$schema" in printed
+    assert gonio("schema", "-o", tmp_path / "s.json") == 0
+    assert json.loads((tmp_path / "s.json").read_text()) == printed
+
+
+# --- doctor --------------------------------------------------------------------------------------------
+
+
+def _doctor(**environment: str) -> tuple[int, dict[str, object]]:
+    done = subprocess.run(
+        [sys.executable, "-m", "gonio.cli", "doctor", "--json"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+    )
+    return done.returncode, json.loads(done.stdout)
+
+
+def test_the_doctor_finds_something_to_render_with() -> None:
+    code, report = _doctor()
+    assert code == 0 and report["can_render"] is True
+    subjects = [finding["subject"] for finding in report["findings"]]  # type: ignore[attr-defined]
+    assert {"Mitsuba", "Dr.Jit", "threads", "denoiser", "render on cpu"} <= set(subjects)
+
+
+def test_the_doctor_survives_a_library_that_is_none(tmp_path: Path) -> None:
+    wrong = tmp_path / "libLLVM.so"
+    wrong.write_bytes(b"no library")
+    code, report = _doctor(DRJIT_LIBLLVM_PATH=str(wrong), CUDA_VISIBLE_DEVICES="")
+    assert code == 3 and report["can_render"] is False
+    bad = [finding for finding in report["findings"] if finding["state"] == "bad"]  # type: ignore[attr-defined]
+    assert any("unset DRJIT_LIBLLVM_PATH" in finding["text"] for finding in bad)

@@ -1,0 +1,93 @@
+"""Plots draw what the material computes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import InputError
+from gonio.models import models
+from gonio.viewer import plots
+
+METAL = '{"type": "conductor", "preset": "Au", "alpha": 0.3}'
+
+
+def _needed(name: str) -> tuple[list[str], str]:
+    """What a material asks for: metal for every material inside of it, a preset for indices of refraction."""
+    required = [p for p in models()[name].parameters().values() if p.required]
+    inner = [f"{p.name}={METAL}" for p in required if p.kind == "bsdf"]
+    others = [f"{p.name}=0.3" for p in required if p.kind in ("float", "alpha")]
+    return inner + others, "Au" if any(p.kind == "spectrum" for p in required) else ""
+
+
+@pytest.mark.parametrize("kind", plots.KINDS)
+@pytest.mark.parametrize("name", list(models()))
+def test_every_material_can_be_plotted(name: str, kind: str, tmp_path: Path) -> None:
+    assignments, preset = _needed(name)
+    path = plots.plot(name, assignments, preset, kind, "" if kind == "albedo" else "45", tmp_path / "a.svg")
+    assert path.stat().st_size > 1000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_curve_is_the_materials_eval_in_the_plane_of_incidence() -> None:
+    one = plots.curve(go.Lambert(albedo=0.5), view=30)
+    assert one.angles[0] == -90 and one.angles[-1] == 90
+    assert one.mean == pytest.approx(0.5 / np.pi * np.cos(np.radians(one.angles)), abs=1e-6)
+    assert one.pdf == pytest.approx(np.cos(np.radians(one.angles)) / np.pi, abs=1e-6)
+    assert one.grey and one.deltas == ()
+
+
+def test_a_highlight_stands_on_the_mirrors_side() -> None:
+    one = plots.curve(go.Conductor.preset("Au", alpha=0.05), view=40)
+    assert one.angles[one.mean.argmax()] == pytest.approx(40, abs=0.5)
+    assert not one.grey
+
+
+def test_smooth_glass_splits_its_power_in_two_delta_lobes() -> None:
+    one = plots.curve(go.Dielectric(eta=1.5, alpha=0.0), view=30)
+    (first, reflected), (second, transmitted) = sorted(one.deltas)
+    assert first == pytest.approx(30, abs=0.02)
+    assert second == pytest.approx(180 - np.degrees(np.arcsin(0.5 / 1.5)), abs=0.02)
+    assert reflected + transmitted == pytest.approx(1, abs=1e-5)
+    assert reflected == pytest.approx(0.0415, abs=1e-3)  # Fresnel at 30 degrees, index 1.5
+
+
+def test_albedo_has_its_closed_forms() -> None:
+    views = np.array([0.0, 45.0, 80.0])
+    assert plots.albedo(go.Lambert(albedo=0.3), views) == pytest.approx(0.3, abs=1e-4)
+    assert plots.albedo(go.Mirror(), views) == pytest.approx(1, abs=1e-6)
+    assert plots.albedo(go.Dielectric(eta=1.5, alpha=0.0), views) == pytest.approx(1, abs=1e-5)
+
+
+def test_rings_are_round_numbers_below_the_peak() -> None:
+    for peak in (0.0123, 0.97, 1.0, 3.3, 42, 1e5):
+        ticks = plots._round_ticks(peak)
+        assert 1 <= len(ticks) <= 5 and ticks[-1] <= peak and len(f"{ticks[0]:g}") <= 6
+    assert plots._round_ticks(0) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message", "hint"),
+    [
+        (("lamberd", []), "unknown material", "did you mean 'lambert'?"),
+        (("lambert", ["albdo=1"]), "no parameter 'albdo'", "did you mean 'albedo'?"),
+        (("lambert", ["albedo"]), "sets nothing", "NAME=VALUE"),
+        (("lambert", [], "Au"), "no presets", "--param"),
+        (("mix", []), "needs a, b", "--param a="),
+        (("mix", ["a=3", "b=lambert"]), "is no material", "a=lambert"),
+        (("lambert", [], "", "lob"), "unknown kind", "did you mean 'lobe'?"),
+        (("lambert", [], "", "lobe", "10,90"), "'90' is no angle", "below 90"),
+        (("lambert", [], "", "lobe", "x"), "'x' is no angle", "below 90"),
+        (("lambert", ["albedo=-1"]), "-1", ""),
+    ],
+)
+def test_what_cannot_be_plotted_is_one_clear_error(
+    arguments: tuple[object, ...], message: str, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=message) as caught:
+        plots.plot(*arguments)  # type: ignore[arg-type]
+    assert hint in caught.value.hint
+    assert list(tmp_path.iterdir()) == []
