@@ -345,6 +345,7 @@ class BSDF:
         clone = object.__new__(type(self))
         clone.__dict__.update(self.__dict__)
         clone.__dict__["_bound"] = True
+        clone.__dict__.pop("_kept", None)
         for parameter in self.parameters().values():
             value = getattr(self, parameter.name)
             if parameter.kind == "bsdf":
@@ -407,6 +408,21 @@ def converter(kind: backend.Types) -> Callable[[Parameter, Any], Any]:
     return convert
 
 
+def _settled(model: BSDF, kind: backend.Types) -> Any:
+    """The model bound to types and settled; what plain numbers derive is kept with the model, which is frozen."""
+    bound = model.bind(converter(kind))
+    if type(model).derive is BSDF.derive:
+        return bound
+    kept = model.__dict__.setdefault("_kept", {})
+    if kind.float in kept:
+        bound.__dict__["_settled"] = kept[kind.float]
+    else:
+        settled = bound.settle()
+        if settled is not None and all(isinstance(v, int | float | tuple) for v in model._bound_values()):
+            kept[kind.float] = settled
+    return bound
+
+
 def _doorway(method: Callable) -> Callable:
     """Let bound parameters through; for anything else bind, convert to Dr.Jit and convert the answer back."""
     inner = ops.function(method)
@@ -420,13 +436,10 @@ def _doorway(method: Callable) -> Callable:
             raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{method.__name__}", " or ".join(MODES))
         as_drjit = backend.is_drjit(wo)
         if as_drjit:
-            bound = self.bind(converter(backend.types_like(type(wo))))
-            bound.settle()
-            return inner(bound, wo, other, *args)
+            return inner(_settled(self, backend.types_like(type(wo))), wo, other, *args)
         kind = backend.types(precision)
         first, second, count = _rows(wo, other, method.__name__)
-        bound = self.bind(converter(kind))
-        bound.settle()
+        bound = _settled(self, kind)
         result = inner(bound, backend.vector_of(first, 3, kind), backend.vector_of(second, 3, kind), *args)
         if isinstance(result, tuple):
             return type(result)(*[backend.to_numpy(value, count) for value in result])  # type: ignore[call-arg]
