@@ -106,8 +106,8 @@ class Render:
         self.done = 0
         self._order = _tiles(self.width, self.height)
         self._pixel = mi.UInt32(self._order)
-        self._sums = [dr.zeros(mi.Float64, self.width * self.height) for _ in range(12 if aovs else 6)]
-        dr.eval(self._pixel, self._sums)
+        self._sums = _Sums.zeros(mi, self.width * self.height, 6 if aovs else 0)
+        dr.make_opaque(self._pixel, self._sums)  # zeros as data: else the first pass would be a kernel of its own
         with dr.suspend_grad():
             self._transport = _Transport(mi, scene, self.sensor, settings, aovs)
 
@@ -132,7 +132,7 @@ class Render:
 
     def image(self) -> np.ndarray:
         """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""
-        return self._mean(0, -3)
+        return self._mean(self._sums.near[0:3], self._sums.far)
 
     def aov(self) -> dict[str, np.ndarray]:
         """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).
@@ -142,11 +142,16 @@ class Render:
         """
         if not self.aovs:
             raise InputError("features were not rendered", "Render.aov", "make the Render with aovs=True")
-        return {"albedo": self._mean(3), "normal": self._mean(6)}
+        return {"albedo": self._mean(self._sums.near[3:6]), "normal": self._mean(self._sums.near[6:9])}
 
-    def _mean(self, *starts: int) -> np.ndarray:
+    @property
+    def invalid(self) -> int:
+        """How many values so far were not finite and were left out; anything but 0 is a fault of some BSDF or light."""
+        return int(dr.sum(self._sums.invalid)[0])
+
+    def _mean(self, *sums: list[Any]) -> np.ndarray:
         pixels = np.empty((self.height * self.width, 3), np.float32)
-        channels = [sum(np.asarray(self._sums[start + c]) for start in starts) for c in range(3)]
+        channels = [sum(np.asarray(part) for part in parts) for parts in zip(*sums, strict=True)]
         pixels[self._order] = np.stack(channels, axis=1) / max(self.done, 1)
         return pixels.reshape(self.height, self.width, 3)
 
@@ -159,6 +164,36 @@ def _tiles(width: int, height: int) -> np.ndarray:
 
 
 @dataclass
+class _Sums:
+    """What the lanes add up, in 64 bits: radiance and features of first vertices, radiance of the rest of the paths.
+
+    A value that is not finite (a BSDF's overflow) is left out and counted, so that it does not cost the pixel.
+    """
+
+    near: list[Any]
+    far: list[Any]
+    invalid: Any
+
+    @staticmethod
+    def zeros(mi: Any, lanes: int, features: int) -> _Sums:
+        near = [dr.zeros(mi.Float64, lanes) for _ in range(3 + features)]
+        return _Sums(near, [dr.zeros(mi.Float64, lanes) for _ in range(3)], dr.zeros(mi.UInt32, lanes))
+
+    def add_near(self, values: Any) -> _Sums:
+        near, invalid = self._add(self.near, values, True)
+        return _Sums(near, self.far, invalid)
+
+    def add_far(self, values: Any, active: Any) -> _Sums:
+        far, invalid = self._add(self.far, values, active)
+        return _Sums(self.near, far, invalid)
+
+    def _add(self, sums: list[Any], values: Any, active: Any) -> tuple[list[Any], Any]:
+        finite = dr.isfinite(sum(values))
+        add = [s + type(s)(dr.select(finite & active, v, 0)) for s, v in zip(sums, values, strict=True)]
+        return add, self.invalid + dr.select(finite | ~dr.mask_t(finite)(active), type(self.invalid)(0), 1)
+
+
+@dataclass
 class _Path:
     """A path on its way, one a lane."""
 
@@ -167,6 +202,7 @@ class _Path:
     ray: Any  # the next segment, and
     hit: Any  # what it meets
     throughput: Any
+    eta: Any  # product of the relative indices on the way
     pdf: Any  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
     solid_angle: Any  # LightSample.solid_angle at its origin
     radiance: Any  # found so far
@@ -183,7 +219,8 @@ def _waiting_type(variant: str) -> type:
     """
     mi = engine.load()
     found = {name: kind for name, kind in mi.PreliminaryIntersection3f.DRJIT_STRUCT.items() if name != "valid"}
-    kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum, "pdf": mi.Float, "solid_angle": mi.Float}
+    kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
+    kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
 
     def pack(path: _Path) -> Any:
         hit = {name: getattr(path.hit, name) for name in found}
@@ -217,8 +254,12 @@ class _Transport:
         depth = {"path": settings.max_depth, "whitted": WHITTED_DEPTH}.get(settings.integrator, 2)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
+        name = settings.integrator
+        self.samples_lights = name != "directSampleBSDF"
+        self.samples_bsdf = name in ("path", "direct", "directSampleBSDF")  # smooth lobes too, not delta lobes alone
+        self.follows_delta = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta) for shape in scene.shapes())
         # Whether any path has a second vertex to shade.
-        self.goes_on = settings.integrator == "whitted" or (settings.integrator == "path" and settings.max_depth > 2)
+        self.goes_on = (name == "path" and settings.max_depth > 2) or (name == "whitted" and self.follows_delta)
 
     def _ambient(self) -> Any:
         """The ambient light as a texture (so that it works in spectral variants), None where nothing would use it."""
@@ -229,7 +270,7 @@ class _Transport:
         texture = self.mi.load_dict({"type": "rgb", "value": list(self.settings.ambient)})
         return texture
 
-    def accumulate(self, pixel: Any, key: Any, first: Any, last: Any, sums: list[Any]) -> list[Any]:
+    def accumulate(self, pixel: Any, key: Any, first: Any, last: Any, sums: _Sums) -> _Sums:
         """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples.
 
         Samples go in batches of BATCH. The first vertices of a batch are done one sample after the other: their rays
@@ -244,45 +285,43 @@ class _Transport:
         # one number to be the same in all lanes, and then writes every lane's entry at one lane's place.
         none = dr.opaque(mi.UInt32, 0, lanes)
 
-        def batch(index: Any, near: tuple[Any, ...], far: tuple[Any, ...]) -> tuple[Any, ...]:
+        def batch(index: Any, sums: _Sums) -> tuple[Any, ...]:
             end = dr.minimum(index + BATCH, last)
             waiting = dr.alloc_local(self.Waiting, BATCH if self.goes_on else 1, value=dr.zeros(self.Waiting))
 
-            def begin(index: Any, near: Any, waiting: Any, count: Any) -> tuple[Any, ...]:
+            def begin(index: Any, sums: _Sums, waiting: Any, count: Any) -> tuple[Any, ...]:
                 path, values = self.begin(pixel, key, index)
-                near = tuple(s + mi.Float64(v) for s, v in zip(near, values, strict=True))
+                sums = sums.add_near(values)
                 if self.goes_on:
                     waiting.write(self.Waiting.pack(path), count, path.active)
                     count = count + dr.select(path.active, mi.UInt32(1), mi.UInt32(0))
-                return index + 1, near, waiting, count
+                return index + 1, sums, waiting, count
 
-            state = (index, near, waiting, none)
+            state = (index, sums, waiting, none)
             state = dr.while_loop(state, lambda i, *_: i < end, begin, mode="symbolic", label="first vertices")
-            index, near, waiting, count = state
+            index, sums, waiting, count = state
             if self.goes_on:
-                far = self.follow(key, waiting, count, none, far)
-            return index, near, far
+                sums = self.follow(key, waiting, count, none, sums)
+            return index, sums
 
         start = first + dr.zeros(mi.UInt32, lanes)
-        loop = (start, tuple(sums[:-3]), tuple(sums[-3:]))
-        _, near, far = dr.while_loop(loop, lambda index, *_: index < last, batch, mode="symbolic", label="batches")
-        return [*near, *far]
+        state = dr.while_loop((start, sums), lambda i, _: i < last, batch, mode="symbolic", label="batches")
+        return state[1]
 
-    def follow(self, key: Any, waiting: Any, count: Any, none: Any, far: tuple[Any, ...]) -> tuple[Any, ...]:
+    def follow(self, key: Any, waiting: Any, count: Any, none: Any, sums: _Sums) -> _Sums:
         """Follow the paths put by in `waiting[0:count]` to their ends and add what they find."""
         mi = self.mi
 
-        def body(slot: Any, path: Any, waiting: Any, far: tuple[Any, ...]) -> tuple[Any, ...]:
+        def body(slot: Any, path: Any, waiting: Any, sums: _Sums) -> tuple[Any, ...]:
             path = dr.select(path.active, path, waiting.read(slot).unpack())
             path = self.extend(path, key)
             ended = ~path.active
-            values = self.rgb(path.radiance, path.ray.wavelengths)
-            far = tuple(s + mi.Float64(dr.select(ended, v, 0)) for s, v in zip(far, values, strict=True))
-            return slot + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, waiting, far
+            sums = sums.add_far(self.rgb(path.radiance, path.ray.wavelengths), ended)
+            return slot + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, waiting, sums
 
         idle = dr.zeros(self.Waiting).unpack()
         idle.active = mi.Bool(False)
-        state = (none, idle, waiting, far)
+        state = (none, idle, waiting, sums)
         loop = dr.while_loop(state, lambda slot, *_: slot < count, body, mode="symbolic", label="further vertices")
         return loop[3]
 
@@ -292,8 +331,8 @@ class _Transport:
         ray, weight = self.camera_ray(pixel, key, index)
         ray = mi.Ray3f(ray)
         hit = self.scene.ray_intersect_preliminary(ray, coherent=True)
-        path = _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(0), mi.Float(0),
-                     mi.Spectrum(0), mi.Bool(True))  # fmt: skip
+        path = _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
+                     mi.Float(0), mi.Spectrum(0), mi.Bool(True))  # fmt: skip
         if self.settings.integrator in ("normal", "uv"):
             return path, self.show(hit.compute_surface_interaction(ray))
         features: list[Any] = []
@@ -332,81 +371,99 @@ class _Transport:
         return radiance
 
     def extend(self, path: _Path, key: Any, features: list[Any] | None = None) -> _Path:
-        """One vertex of a path: meet a surface, take its light, gather light there, choose the next direction.
+        """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
 
         features  given at the first vertex: a list that gets its albedo and normal, if they are wanted
         """
+        mi, lights = self.mi, self.lights
         first = features is not None
-        mi, scene, lights, context = self.mi, self.scene, self.lights, self.context
-        name = self.settings.integrator
-        sample_lights = name != "directSampleBSDF"
-        sample_bsdf = name in ("path", "direct", "directSampleBSDF")  # its smooth lobes; delta lobes are always
-
-        index, ray, throughput, radiance, active = path.index, path.ray, path.throughput, path.radiance, path.active
+        ray, throughput, radiance, active = path.ray, path.throughput, path.radiance, path.active
         depth = mi.UInt32(0) if first else path.depth
+        dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
+        last = depth + 2 >= self.max_depth
+
         si = path.hit.compute_surface_interaction(ray, mi.RayFlags.All, active)
         emitted = lights.emitted(si, active)
-        if sample_lights and not first:
-            found = dr.any(emitted != 0)
-            weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, active & found & (path.pdf > 0)))
+        if self.samples_lights and not first:
+            compete = active & (path.pdf > 0) & dr.any(emitted != 0)
+            weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
         radiance = radiance + throughput * dr.select(active, emitted, 0)
-
         active = active & si.is_valid() & (depth + 1 < self.max_depth)
-        last = depth + 2 >= self.max_depth
-        dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
-        lobe, pick = self.pair(key, index, dimension + CHOICE)
-        u = mi.Point2f(*self.pair(key, index, dimension + LOBE))
+
         bsdf = si.bsdf(ray)
-        solid_angle = mi.Float(0)
-        if sample_lights and lights.count > 0:
-            light = lights.sample(si, mi.Point2f(*self.pair(key, index, dimension + LIGHT)), pick, active)
-            toward = si.to_local(light.ds.d)
-            value, value_pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
-            light_weight = value * light.weight
-            if sample_bsdf:
-                light_weight *= dr.select(light.delta, 1, mis(light.ds.pdf, value_pdf))
-            visible = active & dr.any(light_weight != 0)
-            visible &= ~scene.ray_test(si.spawn_ray_to(light.ds.p), visible)
-            radiance = radiance + throughput * dr.select(visible, light_weight, 0)
-            solid_angle = light.solid_angle
-        else:
-            bs, weight = bsdf.sample(context, si, lobe, u, active)
+        gathered, solid_angle, bs, weight = self.scatter(path.index, key, dimension, si, bsdf, active)
+        radiance = radiance + throughput * dr.select(active, gathered, 0)
         if self.ambient is not None:
-            radiance = radiance + throughput * self._ambient_light(bsdf, si, active)
-
-        if first and self.aovs:
-            features += [dr.select(active, f, 0) for f in (*self.rgb(weight, ray.wavelengths), *si.sh_frame.n)]
+            radiance = radiance + throughput * self.ambient_light(bsdf, si, active)
         throughput = throughput * weight
-        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-        pdf = dr.select(delta, 0, bs.pdf) if sample_lights else mi.Float(0)
-        active = active & dr.any(throughput != 0)
-        if not sample_bsdf:
-            active = active & delta
-        ray = si.spawn_ray(si.to_world(bs.wo))
-        if name == "path":
-            throughput, active = self._roulette(depth, throughput, active, key, index)
+        if first and self.aovs:
+            seen = (*self.rgb(throughput, ray.wavelengths), *si.sh_frame.n)
+            features += [dr.select(active, v, 0) for v in seen]
 
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        active = active & dr.any(throughput != 0) & (self.samples_bsdf | delta)
+        pdf = dr.select(delta, 0, bs.pdf) if self.samples_lights else mi.Float(0)
+        eta = path.eta * dr.select(active, bs.eta, 1)
+        if self.settings.integrator == "path":
+            throughput, active = self.roulette(path.index, key, dimension, depth, throughput, eta, active)
+
+        ray = si.spawn_ray(si.to_world(bs.wo))
         # The last ray can only find light: no surface beyond it is shaded.
         end = active & last
         found, found_pdf = lights.last_hit(ray, ray.o, solid_angle, end)
-        if sample_lights:
+        if self.samples_lights:
             found = dr.select(pdf > 0, found * mis(pdf, found_pdf), found)
         radiance = radiance + throughput * dr.select(end, found, 0)
-        active = active & ~last
-        hit = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        if not lights.has_environment:
-            active = active & hit.is_valid()
-        return _Path(index, depth + 1, ray, hit, throughput, pdf, solid_angle, radiance, active)
 
-    def _roulette(self, depth, throughput, active, key, index):
-        """End dim paths by chance: survive with the throughput's largest channel, at most 0.95, and weigh by it."""
-        mi = self.mi
-        survive = dr.minimum(dr.max(throughput), 0.95)
-        u, _ = sampler.independent_pair(key, index, depth * VERTEX_DIMENSIONS + FIRST_VERTEX + ROULETTE)
+        active = active & ~last
+        hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        if not lights.has_environment:  # else the path goes on to meet it
+            active = active & hit.is_valid()
+        return _Path(path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, active)
+
+    def scatter(self, index: Any, key: Any, dimension: Any, si: Any, bsdf: Any, active: Any) -> tuple[Any, ...]:
+        """Ask the BSDF, in one call, what it does with a light's direction, and for a direction of its own.
+
+        Returns (light gathered from the lights, solid angle of the light, BSDF sample, its weight).
+        """
+        mi, lights, context = self.mi, self.lights, self.context
+        lobe, pick = self.pair(key, index, dimension + CHOICE)
+        u = mi.Point2f(*self.pair(key, index, dimension + LOBE))
+        if not self.samples_lights or lights.count == 0:
+            return mi.Spectrum(0), mi.Float(0), *bsdf.sample(context, si, lobe, u, active)
+        light = lights.sample(si, mi.Point2f(*self.pair(key, index, dimension + LIGHT)), pick, active)
+        toward = si.to_local(light.ds.d)
+        if self.samples_bsdf or self.follows_delta or self.aovs:
+            value, pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
+        else:
+            value, pdf = bsdf.eval(context, si, toward, active), mi.Float(0)
+            bs, weight = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
+        gathered = value * light.weight
+        if self.samples_bsdf:
+            gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
+        visible = active & dr.any(gathered != 0)
+        visible &= ~self.scene.ray_test(si.spawn_ray_to(light.ds.p), visible)
+        return dr.select(visible, gathered, 0), light.solid_angle, bs, weight
+
+    def ambient_light(self, bsdf: Any, si: Any, active: Any) -> Any:
+        """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
+        if self.mi.is_rgb:
+            reflected = bsdf.eval_attribute_3("ambient", si, active)
+        else:
+            reflected = bsdf.eval_attribute("ambient", si, active)
+        return dr.select(active, reflected * self.ambient.eval(si, active), 0)
+
+    def roulette(self, index: Any, key: Any, dimension: Any, depth: Any, throughput: Any, eta: Any, active: Any) -> Any:
+        """End dim paths by chance: survive with the throughput's largest channel, at most 0.95, and weigh by it.
+
+        Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
+        """
+        survive = dr.clip(dr.max(throughput) * dr.square(eta), 1e-6, 0.95)
+        u, _ = sampler.independent_pair(key, index, dimension + ROULETTE)
         plays = depth + 1 >= ROULETTE_DEPTH
         active = active & (~plays | (u < survive))
-        return dr.select(plays, throughput * dr.rcp(dr.maximum(survive, 1e-30)), throughput), active
+        return dr.select(plays, throughput / survive, throughput), active
 
 
 def mis(pdf: Any, other: Any) -> Any:
