@@ -106,6 +106,7 @@ def test_dielectric_is_mitsubas_roughdielectric(native: Any, ndf: str, alpha: An
     inside = wo[:, 2] < 0
     turning = inside & (np.abs(near - np.sqrt(5) / 3) < 3e-4)
     critical = np.where(through, inside & (far < 0.06), turning) | (near < 0.02)
+    critical |= np.abs(h[:, 2]) < 1e-3 * np.linalg.norm(h, axis=1)  # m.z, a difference of two float32, is in the density
     assert critical.mean() < 0.04
 
     assert (value > 0).any()
