@@ -4,7 +4,7 @@ A compensated material needs M at both directions for every pair. Two bilinear l
 whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right variable makes
 one possible. Masking changes where mu is a few alpha, so with
 
-    s(mu) = sqrt(mu / sqrt(mu^2 + (4 alpha)^2))        (Smith; for the Schlick forms sqrt(mu / (mu + 4 k)))
+    s(mu) = sqrt(mu / sqrt(mu^2 + (4 alpha)^2))        (metals with Smith's masking; for others see `squeeze`)
     x(mu) = 2 s(mu) / s(1) - 1  in [-1, 1]
 
 M is a smooth function of x whatever the width, down to a limit at alpha -> 0. Rows of a table hold the coefficients in x
@@ -27,73 +27,88 @@ from .quadrature import gauss
 ROWS = 129  # roughness 0 to 1; linear interpolation between them errs by 3e-5
 DEGREE = 10  # errs by 6e-5 (GGX), 1e-4 (Beckmann), 5e-4 (Beckmann's rational fit, which jumps by 5e-5)
 CHANNELS = DEGREE + 2  # the last is M_avg
-SCALE = 4.0  # chosen for the smallest error of the fit over all distributions and maskings
 LOBE_NODES = 64
 NODES_OF_FIT = 64
-VERSION = 1
+VERSION = 2
 
 
-def knee(masking: str, alpha: Any) -> Any:
-    """The cosine about which masking sets in: 4 alpha, or 4 k for the Schlick forms."""
+# How mu is bent into s, by form:   s(mu)                              bend
+#   "hypot"  metals, Smith            sqrt(mu / sqrt(mu^2 + bend^2))     8 k = 4 alpha
+#   "root"   Schlick; glass, thin     sqrt(mu / (mu + bend))             4 k
+#   "ratio"  glass, dense             mu / (mu + bend)                   8 k
+# with k = alpha / 2, or that of schlick-direct. Chosen, like the factors, for the smallest error of the fit.
+
+
+def form_of(masking: str, side: str = "") -> str:
+    """The form of a table: of a metal, or of a side of glass."""
+    if side:
+        return "root" if side == "thin" else "ratio"
+    return "root" if masking.startswith("schlick") else "hypot"
+
+
+def knee(form: str, masking: str, alpha: Any) -> Any:
+    """The bend: the cosine about which masking sets in."""
+    factor = 4.0 if form == "root" else 8.0
     if masking == "schlick-direct":
-        return sqr(sqrt(alpha) + 1.0) * (SCALE / 8.0)
-    return alpha * (SCALE / 2.0 if masking == "schlick-ibl" else SCALE)
+        return sqr(sqrt(alpha) + 1.0) * (factor / 8.0)
+    return alpha * (factor / 2.0)
 
 
-def squeeze(masking: str, mu: Any, bend: Any) -> Any:
-    """s(mu), see the module."""
-    if masking.startswith("schlick"):
-        return sqrt(mu / (mu + bend))
-    return sqrt(mu / sqrt(sqr(mu) + sqr(bend)))
+def squeeze(form: str, mu: Any, bend: Any) -> Any:
+    """s(mu)."""
+    if form == "hypot":
+        return sqrt(mu / sqrt(sqr(mu) + sqr(bend)))
+    return sqrt(mu / (mu + bend)) if form == "root" else mu / (mu + bend)
 
 
-def _numpy_squeeze(masking: str, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    return np.sqrt(mu / (mu + bend if masking.startswith("schlick") else np.hypot(mu, bend)))
+def _numpy_knee(form: str, masking: str, alpha: np.ndarray) -> np.ndarray:
+    k = (np.sqrt(alpha) + 1.0) ** 2 / 8.0 if masking == "schlick-direct" else alpha / 2.0
+    return k * (4.0 if form == "root" else 8.0)
 
 
-def _unsqueeze(masking: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    if masking.startswith("schlick"):
-        return bend * s**2 / (1.0 - s**2)
-    return bend * s**2 / np.sqrt(1.0 - s**4)
+def _numpy_squeeze(form: str, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    ratio = mu / (np.hypot(mu, bend) if form == "hypot" else mu + bend)
+    return ratio if form == "ratio" else np.sqrt(ratio)
 
 
-def knee_of(masking: str, alpha: np.ndarray) -> np.ndarray:
-    """`knee` in NumPy."""
-    if masking == "schlick-direct":
-        return (np.sqrt(alpha) + 1.0) ** 2 * (SCALE / 8.0)
-    return alpha * (SCALE / 2.0 if masking == "schlick-ibl" else SCALE)
+def _unsqueeze(form: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    ratio = s if form == "ratio" else s**2
+    return bend * ratio / (np.sqrt(1.0 - ratio**2) if form == "hypot" else 1.0 - ratio)
 
 
-def fit(masking: str, bend: np.ndarray, missing: Any) -> np.ndarray:
+def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -> np.ndarray:
     """Coefficients in x, lowest power first, of M at each bend: nearly minimax, by reweighted least squares.
 
     missing  a function of mu (rows, nodes) to M
     Returns (rows, CHANNELS); the last channel is M_avg, of the polynomial where that is not negative.
     """
-    x = -np.cos(np.pi * (np.arange(NODES_OF_FIT) + 0.5) / NODES_OF_FIT)
-    top = _numpy_squeeze(masking, np.ones(1), bend[:, None])
-    mu = _unsqueeze(masking, 0.5 * (x + 1.0) * top, bend[:, None])
+    x = -np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
+    top = _numpy_squeeze(form, np.ones(1), bend[:, None])
+    mu = _unsqueeze(form, 0.5 * (x + 1.0) * top, bend[:, None])
     value = missing(np.clip(mu, 0.0, 1.0))
     basis = np.polynomial.chebyshev.chebvander(x, DEGREE)
     rows = []
-    for target in value:
-        weight = np.ones_like(x)
+    for target, at in zip(value, mu, strict=True):
+        # below mu = .02 albedo hardly matters, and that of glass has a cusp
+        start = np.minimum(at / 0.02, 1.0) + 0.02
+        weight = np.ones_like(x) * start
         for _ in range(12):
             found, *_rest = np.linalg.lstsq(basis * weight[:, None], target * weight, rcond=None)
             error = np.abs(basis @ found - target)
+            error = error * start
             weight *= np.sqrt(error / max(error.max(), 1e-300) + 0.02)
         rows.append(np.polynomial.chebyshev.cheb2poly(found))
     coefficients = np.zeros((len(bend), DEGREE + 1))
     for row, found in zip(coefficients, rows, strict=True):
         row[: len(found)] = found
     node, w = gauss(96)
-    average = evaluate(masking, coefficients, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
+    average = evaluate(form, coefficients, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
     return np.concatenate([coefficients, average[:, None]], axis=1)
 
 
-def evaluate(masking: str, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
+def evaluate(form: str, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """M of rows of coefficients at mu (rows, nodes), as `missing` computes it."""
-    x = 2.0 * _numpy_squeeze(masking, mu, bend[:, None]) / _numpy_squeeze(masking, np.ones(1), bend[:, None]) - 1.0
+    x = 2.0 * _numpy_squeeze(form, mu, bend[:, None]) / _numpy_squeeze(form, np.ones(1), bend[:, None]) - 1.0
     total = np.zeros(np.broadcast_shapes(x.shape, (len(bend), 1)))
     for power in range(DEGREE, -1, -1):
         total = total * x + coefficients[:, power, None]
@@ -106,28 +121,80 @@ def isotropic(ndf: str, masking: str) -> Table:
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+        form = form_of(masking)
         return fit(
-            masking,
-            knee_of(masking, alpha),
+            form,
+            _numpy_knee(form, masking, alpha),
             lambda mu: 1.0 - quadrature.moments(ndf, masking, mu, alpha[:, None]).whole,
         )
 
-    key = ("curves", VERSION, ndf, masking, ROWS, DEGREE, SCALE)
+    key = ("curves", VERSION, ndf, masking, ROWS, DEGREE)
     return Table(f"missing_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build, ndf))
 
 
 @lru_cache
 def lobe(ndf: str, masking: str) -> Table:
     """mu^2 over (roughness, u): the inverse of the share of M mu below mu, to sample the lobe proportional to it."""
-    rows = isotropic(ndf, masking).values
     alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
-    grid = np.linspace(0.0, 1.0, 4097)  # of mu^2, in which the density is M / M_avg
-    density = evaluate(masking, rows[:, :-1], knee_of(masking, alpha), np.sqrt(np.maximum(grid, 1e-12))[None, :]) + 1e-9
-    below = np.concatenate([np.zeros((ROWS, 1)), np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1)], axis=1)
-    below /= below[:, -1:]
-    u = np.linspace(0.0, 1.0, LOBE_NODES)
-    inverse = np.array([np.interp(u, row, grid) for row in below])
+    form = form_of(masking)
+    bend = _numpy_knee(form, masking, alpha)
+    inverse = _inverse(form, isotropic(ndf, masking).values[:, :-1], bend, LOBE_NODES)
     return Table(f"lobe_{ndf}_{masking}".replace("-", "_"), inverse[..., None])
+
+
+GLASS_ETAS = 21  # at equal steps of sqrt(F0) = (eta - 1) / (eta + 1)
+GLASS_ROWS = 33
+LARGEST_ROOT = 2.0 / 3.0  # eta = 5
+SIDES = ("thin", "dense")
+
+
+@lru_cache
+def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
+    """Coefficients over (sqrt(F0), roughness) of rough glass, as light meets it from its thin and from its dense side."""
+
+    def build() -> np.ndarray:
+        alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+        roots = np.linspace(0.0, LARGEST_ROOT, GLASS_ETAS)
+        eta = np.maximum((1.0 + roots) / (1.0 - roots), 1.0 + 1e-4)
+        alphas, etas = np.tile(alpha, GLASS_ETAS), np.repeat(eta, GLASS_ROWS)
+        sides = []
+        for side, ratio in zip(SIDES, (etas, 1.0 / etas), strict=True):
+            form = form_of(masking, side)
+
+            def missing(mu: np.ndarray, ratio: np.ndarray = ratio) -> np.ndarray:
+                power = quadrature.glass(ndf, masking, fresnel, mu, alphas[:, None], ratio[:, None])
+                return 1.0 - power.reflected - power.transmitted
+
+            sides.append(fit(form, _numpy_knee(form, masking, alphas), missing, nodes=36))
+        return np.array(sides).reshape(2, GLASS_ETAS, GLASS_ROWS, CHANNELS)
+
+    key = ("glass", VERSION, ndf, masking, fresnel, GLASS_ETAS, GLASS_ROWS, DEGREE)
+    values = cache.remember(key, build, ndf)
+    stem = f"missing_glass_{ndf}_{masking}_{fresnel}".replace("-", "_")
+    return {side: Table(f"{stem}_{side}", v) for side, v in zip(SIDES, values, strict=True)}
+
+
+@lru_cache
+def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
+    """As `lobe`, over (sqrt(F0), roughness, u), for either side."""
+    alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
+    tables = {}
+    for side, table in glass(ndf, masking, fresnel).items():
+        form = form_of(masking, side)
+        bend = _numpy_knee(form, masking, np.tile(alpha, GLASS_ETAS))
+        inverse = _inverse(form, table.values.reshape(-1, CHANNELS)[:, :-1], bend, 32)
+        name = table.name.replace("missing", "lobe")
+        tables[side] = Table(name, inverse.reshape(GLASS_ETAS, GLASS_ROWS, 32, 1))
+    return tables
+
+
+def _inverse(form: str, rows: np.ndarray, bend: np.ndarray, count: int) -> np.ndarray:
+    """mu^2 below which lie the shares 0 to 1 of M mu, for each row."""
+    grid = np.linspace(0.0, 1.0, 2049)  # of mu^2, in which the density is M / M_avg
+    density = evaluate(form, rows, bend, np.sqrt(np.maximum(grid, 1e-12))[None, :]) + 1e-9
+    below = np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1)
+    below = np.concatenate([np.zeros((len(rows), 1)), below], axis=1) / below[:, -1:]
+    return np.array([np.interp(np.linspace(0.0, 1.0, count), row, grid) for row in below])
 
 
 def coefficients(ndf: str, masking: str, alpha: Any) -> tuple[Any, ...]:
@@ -135,12 +202,12 @@ def coefficients(ndf: str, masking: str, alpha: Any) -> tuple[Any, ...]:
     return ops.lookup(isotropic(ndf, masking), ops.inset(sqrt(alpha), ROWS))
 
 
-def missing(masking: str, found: tuple[Any, ...], bend: Any, top: Any, mu: Any) -> Any:
+def missing(form: str, found: tuple[Any, ...], bend: Any, top: Any, mu: Any) -> Any:
     """M(mu), at least 0.
 
     found  from `coefficients`;  bend, top  `knee` at this width, and 2 / s(1)
     """
-    x = squeeze(masking, mu, bend) * top - 1.0
+    x = squeeze(form, mu, bend) * top - 1.0
     total = found[DEGREE]
     for power in range(DEGREE - 1, -1, -1):
         total = total * x + found[power]

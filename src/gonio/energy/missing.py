@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..models import BSDF, microfacet
 from ..models.conductor import Conductor
 from ..models.dielectric import Dielectric
-from ..ops import clamp, inset, lookup, maximum, mean, safe_div, sincos, sqrt, vec3, where
+from ..ops import abs, clamp, copysign, inset, lookup, maximum, mean, safe_div, sincos, sqr, sqrt, vec3, where
 from . import curves, fresnel_average
 
 # M_avg below this is less than the polynomials' own error: nothing is missing
@@ -30,7 +30,7 @@ def check_base(base: BSDF, where_: str, transmitting: bool) -> None:
         raise InputError(f"{type(base).__name__} transmits, a material that only reflects expected", where_, hint)
 
 
-def rule(base: Any) -> type[Metal]:
+def rule(base: Any) -> Any:
     """The rule of a base."""
     return Glass if base.transmits else Metal
 
@@ -51,7 +51,8 @@ class Metal:
         alpha, _ = microfacet.widths(base.alpha)
         width = alpha.x
         found = curves.coefficients(base.ndf, base.masking, width)
-        bend = curves.knee(base.masking, width)
+        form = curves.form_of(base.masking)
+        bend = curves.knee(form, base.masking, width)
         average = maximum(found[-1], 0.0)
         f_avg, albedo = _reflectance_average(material)
         added = _bounces(material.color, f_avg, 1.0 - average) * albedo
@@ -59,7 +60,7 @@ class Metal:
         return {
             "missing": found[:-1],
             "bend": bend,
-            "top": safe_div(2.0, curves.squeeze(base.masking, 1.0 + 0.0 * width, bend)),
+            "top": 2.0 / curves.squeeze(form, 1.0 + 0.0 * width, bend),
             "scale": scale,
             "added": added * scale,
             "ratio": safe_div(mean(added), maximum(mean(f_avg * albedo), 1e-6)),
@@ -69,10 +70,9 @@ class Metal:
     @staticmethod
     def missing(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction; 0 below the surface."""
-        mu = maximum(w.z, 1e-6)
-        return where(
-            w.z > 0.0, curves.missing(material.base.masking, found["missing"], found["bend"], found["top"], mu), 0.0
-        )
+        form = curves.form_of(material.base.masking)
+        value = curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
+        return where(w.z > 0.0, value, 0.0)
 
     @staticmethod
     def added(material: Any, found: dict[str, Any], wo: Any, wi: Any, mode: str) -> Any:
@@ -107,6 +107,11 @@ class Metal:
         return 1.0 + 0.0 * wo.z
 
 
+def either(a: Any, b: Any) -> Any:
+    """a or b, not both."""
+    return (a & ~b) | (b & ~a)
+
+
 def _bounces(color: str, f_avg: Any, e_avg: Any) -> Any:
     """f_add: what the geometric series of bounces leaves of the light, by name."""
     series = f_avg * e_avg / (1.0 - f_avg * (1.0 - e_avg))
@@ -121,5 +126,115 @@ def _reflectance_average(material: Any) -> tuple[Any, Any]:
     return fresnel_average.of_glass(base), base.albedo
 
 
-class Glass(Metal):
-    """Rough dielectrics."""
+class Glass:
+    """Bases that reflect and transmit.
+
+    From side a a share T_a of what is missing goes to side b, the rest back to a (power, not radiance):
+        f_reflected = (1 - T_a) M_a(o) M_a(i) / (pi M_avg,a),    f_transmitted = T_a M_a(o) M_b(i) / (pi M_avg,b),
+    so that a's albedo is made whole whatever T_a is. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, asks for
+    T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is met by
+    T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
+    """
+
+    @staticmethod
+    def derive(material: Any) -> dict[str, Any]:
+        """Polynomials and averages of both sides, and the shares; "thin" is the side of the lower index."""
+        base = material.base
+        alpha, _ = microfacet.widths(base.alpha)
+        width = sqrt(alpha.x * alpha.y)
+        eta = maximum(base.eta, 1.0 / base.eta)
+        place = (
+            inset((eta - 1.0) / (eta + 1.0) * (1.0 / curves.LARGEST_ROOT), curves.GLASS_ETAS),
+            inset(sqrt(width), curves.GLASS_ROWS),
+        )
+        tables = curves.glass(base.ndf, base.masking, base.fresnel)
+        thin, dense = (lookup(tables[side], *place) for side in curves.SIDES)
+        m_thin, m_dense = maximum(thin[-1], 0.0), maximum(dense[-1], 0.0)
+        enters = 1.0 - fresnel_average.of_glass(base)
+        total = maximum(m_thin + m_dense, 2.0 * NOTHING)
+        some = (m_thin > NOTHING) & (m_dense > NOTHING) & (abs(base.eta - 1.0) > 1e-4)
+        bends = {side: curves.knee(curves.form_of(base.masking, side), base.masking, width) for side in curves.SIDES}
+        tops = {
+            side: 2.0 / curves.squeeze(curves.form_of(base.masking, side), 1.0 + 0.0 * width, bend)
+            for side, bend in bends.items()
+        }
+        tint = _bounces(material.color, base.albedo, 1.0 - 0.5 * (m_thin + m_dense))
+        return {
+            "thin": thin[:-1],
+            "dense": dense[:-1],
+            "bends": bends,
+            "tops": tops,
+            "scale_thin": where(some, ops.inv_pi / maximum(m_thin, NOTHING), 0.0),
+            "scale_dense": where(some, ops.inv_pi / maximum(m_dense, NOTHING), 0.0),
+            "through_thin": enters * m_dense / total,
+            "through_dense": enters / sqr(eta) * m_thin / total,
+            "added": tint,
+            "ratio": safe_div(mean(tint), maximum(mean(base.albedo), 1e-6)),
+            "place": place,
+        }
+
+    @staticmethod
+    def _thin(material: Any, w: Any) -> Any:
+        """Whether a direction lies on the side of the lower index."""
+        inside = w.z < 0.0
+        return where(material.base.eta >= 1.0, ~inside, inside)
+
+    @staticmethod
+    def missing(material: Any, found: dict[str, Any], w: Any, thin: Any) -> Any:
+        """M at a direction, from its own side."""
+        mu = maximum(abs(w.z), 1e-6)
+        sides = []
+        for side in curves.SIDES:
+            form = curves.form_of(material.base.masking, side)
+            sides.append(curves.missing(form, found[side], found["bends"][side], found["tops"][side], mu))
+        return where(thin, *sides)
+
+    @staticmethod
+    def _through(found: dict[str, Any], thin: Any) -> Any:
+        return where(thin, found["through_thin"], found["through_dense"])
+
+    @staticmethod
+    def added(material: Any, found: dict[str, Any], wo: Any, wi: Any, mode: str) -> Any:
+        """The broad lobes times |cos theta_i|."""
+        thin = Glass._thin(material, wo)
+        value = Glass.missing(material, found, wo, thin) * Glass.pdf(material, found, wo, wi)
+        if mode == "radiance":
+            value = value * where(wo.z * wi.z > 0.0, 1.0, 1.0 / sqr(Glass.eta(material, wo, wi)))
+        return found["added"] * value
+
+    @staticmethod
+    def share(material: Any, found: dict[str, Any], wo: Any) -> Any:
+        """Probability of the broad lobes: the power they carry over all the power."""
+        m_o = Glass.missing(material, found, wo, Glass._thin(material, wo))
+        given = where(found["scale_thin"] > 0.0, m_o, 0.0) * found["ratio"]
+        return safe_div(given, given + maximum(1.0 - m_o, 0.0))
+
+    @staticmethod
+    def pdf(material: Any, found: dict[str, Any], wo: Any, wi: Any) -> Any:
+        """M(mu_i) mu_i / (pi M_avg) of wi's side, times the share of that side."""
+        thin_o, thin_i = Glass._thin(material, wo), Glass._thin(material, wi)
+        through = Glass._through(found, thin_o)
+        chance = where(wo.z * wi.z > 0.0, 1.0 - through, through)
+        scale = where(thin_i, found["scale_thin"], found["scale_dense"])
+        value = Glass.missing(material, found, wi, thin_i) * abs(wi.z) * scale * chance
+        return where(wo.z * wi.z != 0.0, value, 0.0)
+
+    @staticmethod
+    def sample(material: Any, found: dict[str, Any], wo: Any, u: Any) -> Any:
+        """A side by u1, then a direction of that density."""
+        base = material.base
+        thin = Glass._thin(material, wo)
+        passes = u.x < Glass._through(found, thin)
+        tables = curves.glass_lobe(base.ndf, base.masking, base.fresnel)
+        at = inset(u.y, tables["thin"].shape[-1])
+        (of_thin,), (of_dense,) = (lookup(tables[side], *found["place"], at) for side in curves.SIDES)
+        mu2 = clamp(where(either(thin, passes), of_thin, of_dense), 1e-12, 1.0)
+        sin, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * ops.pi) * u.z)
+        z = copysign(sqrt(mu2), wo.z)
+        return vec3(sin * c, sin * s, where(passes, -z, z))
+
+    @staticmethod
+    def eta(material: Any, wo: Any, wi: Any) -> Any:
+        """Index on wi's side over index on wo's side."""
+        eta = material.base.eta
+        return where(wo.z * wi.z > 0.0, 1.0, where(wo.z >= 0.0, eta, 1.0 / eta))
