@@ -179,6 +179,20 @@ def _adapter_class(mi: ModuleType) -> type:
             if self.two_sided:
                 TwoSided(self.model)
             self._set_flags(self.model.delta)
+            self.settled: Any = None
+            self._settle()
+
+        def _settle(self) -> None:
+            """Find once what the model derives from values that are the same at every hit."""
+            self.settled = None
+            if type(self.model).derive is not BSDF.derive and not self.textured():
+                self.settled = self.at(dr.zeros(mi.SurfaceInteraction3f), True).settle()
+
+        def textured(self) -> bool:
+            """Whether a parameter of this material or of one inside it varies over the surface."""
+            return any(slot.textures for slot in self.slots.values()) or any(
+                not isinstance(child, GonioBSDF) or child.textured() for child in self.inner.values()
+            )
 
         def _child(self, props: Any, name: str) -> Any:
             child = props.get(name, None)
@@ -218,14 +232,18 @@ def _adapter_class(mi: ModuleType) -> type:
         def parameters_changed(self, keys: list[str]) -> None:
             for slot in self.slots.values():
                 dr.make_opaque(*slot.values.values())
+            self._settle()
             # a width that was 0 may be so no longer: both kinds of lobe are possible from now on
             if self.model.delta == "always" and any(key.startswith("alpha") for key in keys):
                 self._set_flags("maybe")
 
         # -------------------------------------------------------------- the model at a point
 
-        def at(self, si: Any, active: Any) -> Any:
-            """The model, its parameters bound to their values at a surface interaction."""
+        def at(self, si: Any, active: Any, turned: bool = False) -> Any:
+            """The model, its parameters bound to their values at a surface interaction.
+
+            turned  the caller turns both directions to the front already
+            """
             found: dict[str, Any] = {}
             for name, slot in self.slots.items():
                 kind = slot.parameter.kind
@@ -241,9 +259,14 @@ def _adapter_class(mi: ModuleType) -> type:
                     found[name] = got[name]
             bound = self.model.bind(lambda parameter, value: found.get(parameter.name))
             for name, child in self.inner.items():
-                inner = child.at(si, active) if isinstance(child, GonioBSDF) else Foreign(child, si, active)
+                if isinstance(child, GonioBSDF):
+                    inner = child.at(si, active, turned or self.two_sided)
+                else:
+                    inner = Foreign(child, si, active)
                 bound.__dict__[name] = inner
-            if self.two_sided:
+            if self.settled is not None:
+                bound.__dict__["_settled"] = self.settled
+            if self.two_sided and not turned:
                 wrapped = object.__new__(TwoSided)
                 wrapped.__dict__.update(base=bound, _bound=True)
                 return wrapped
