@@ -1,0 +1,107 @@
+"""Fresnel's equations against their closed forms and against complex arithmetic."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from sphere import SEED
+
+from gonio.ops import backend
+from gonio.optics import fresnel
+
+RNG = np.random.default_rng(SEED)
+KIND = backend.types("float64")
+
+
+def number(x: Any) -> Any:
+    return KIND.float(np.atleast_1d(np.asarray(x, dtype=np.float64)))
+
+
+def dielectric(cos_i: Any, eta: Any) -> np.ndarray:
+    c, e = number(cos_i), number(eta)
+    return fresnel.dielectric(c, fresnel.cos_transmitted(c, e), e).numpy()
+
+
+def test_dielectric_is_the_textbook_formula() -> None:
+    cos_i, eta = RNG.random(10_000), np.exp(RNG.uniform(-1.5, 1.5, 10_000))
+    cos_t = np.sqrt((1 - (1 - cos_i**2) / eta**2).astype(complex))
+    s, p = (cos_i - eta * cos_t) / (cos_i + eta * cos_t), (eta * cos_i - cos_t) / (eta * cos_i + cos_t)
+    np.testing.assert_allclose(dielectric(cos_i, eta), 0.5 * (np.abs(s) ** 2 + np.abs(p) ** 2), rtol=1e-10, atol=1e-14)
+
+
+def test_conductor_is_the_textbook_formula_with_a_complex_index() -> None:
+    cos_i, eta, k = RNG.random(10_000), RNG.uniform(0.05, 4, 10_000), RNG.uniform(0, 8, 10_000)
+    n = eta + 1j * k
+    cos_t = np.sqrt(1 - (1 - cos_i**2) / n**2)
+    s, p = (cos_i - n * cos_t) / (cos_i + n * cos_t), (n * cos_i - cos_t) / (n * cos_i + cos_t)
+    got = fresnel.conductor(number(cos_i), number(eta), number(k)).numpy()
+    np.testing.assert_allclose(got, 0.5 * (np.abs(s) ** 2 + np.abs(p) ** 2), rtol=1e-9)
+
+
+def test_conductor_without_absorption_is_a_dielectric() -> None:
+    cos_i, eta = RNG.random(2000) * 0.999 + 1e-3, RNG.uniform(1.01, 4, 2000)
+    conductor = fresnel.conductor(number(cos_i), number(eta), number(np.zeros(2000))).numpy()
+    np.testing.assert_allclose(conductor, dielectric(cos_i, eta), rtol=1e-9)
+
+
+def test_normal_incidence_is_equations_11_and_12_of_the_sheet() -> None:
+    eta, k = RNG.uniform(0.1, 4, 100), RNG.uniform(0, 8, 100)
+    r0 = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
+    one = number(np.ones(100))
+    np.testing.assert_allclose(fresnel.r0_conductor(number(eta), number(k)).numpy(), r0, rtol=1e-14)
+    np.testing.assert_allclose(fresnel.conductor(one, number(eta), number(k)).numpy(), r0, rtol=1e-12)
+    r0 = ((eta - 1) / (eta + 1)) ** 2
+    np.testing.assert_allclose(fresnel.r0_dielectric(number(eta)).numpy(), r0, rtol=1e-14)
+    np.testing.assert_allclose(dielectric(np.ones(100), eta), r0, rtol=1e-11, atol=1e-15)
+
+
+def test_at_brewsters_angle_only_s_polarized_light_is_reflected() -> None:
+    eta = np.array([1.2, 1.5, 2.42])
+    cos_i = np.cos(np.arctan(eta))
+    expected = 0.5 * ((1 - eta**2) / (1 + eta**2)) ** 2  # R_p = 0, and theta_i + theta_t = 90 degrees in R_s
+    np.testing.assert_allclose(dielectric(cos_i, eta), expected, rtol=1e-12)
+
+
+def test_beyond_the_critical_angle_all_is_reflected() -> None:
+    critical = np.sqrt(1 - 1 / 1.5**2)
+    below = np.linspace(0, critical - 1e-9, 100)
+    assert np.all(dielectric(below, np.full(100, 1 / 1.5)) == 1.0)
+    assert np.all(dielectric(np.linspace(critical + 1e-6, 1, 100), np.full(100, 1 / 1.5)) < 1.0)
+
+
+def test_grazing_light_is_all_reflected() -> None:
+    assert dielectric(0.0, 1.5) == 1.0
+    assert dielectric(1e-9, 1.5) == pytest.approx(1.0, abs=1e-8)
+    assert fresnel.conductor(number(0.0), number(0.2), number(3.0)).numpy() == pytest.approx(1.0)
+
+
+def test_reflectance_is_the_same_from_both_sides() -> None:
+    cos_i, eta = RNG.uniform(0.01, 1, 1000), RNG.uniform(1.01, 3, 1000)
+    cos_t = np.sqrt(1 - (1 - cos_i**2) / eta**2)
+    np.testing.assert_allclose(dielectric(cos_i, eta), dielectric(cos_t, 1 / eta), rtol=1e-9)
+
+
+def test_equal_indices_reflect_nothing() -> None:
+    np.testing.assert_allclose(dielectric(np.linspace(0.01, 1, 50), np.ones(50)), 0.0, atol=1e-24)
+
+
+def test_schlick_meets_r0_and_one() -> None:
+    r0 = number([0.04, 0.5, 0.95])
+    np.testing.assert_allclose(fresnel.schlick(number(np.ones(3)), r0).numpy(), [0.04, 0.5, 0.95])
+    np.testing.assert_allclose(fresnel.schlick(number(np.zeros(3)), r0).numpy(), 1.0)
+    half = fresnel.schlick(number(0.5), number(0.04)).numpy()
+    assert half == pytest.approx(0.04 + 0.96 / 32)
+
+
+def test_schlick_is_within_four_percent_of_glass() -> None:
+    cos_i = np.linspace(0, 1, 500)
+    exact = dielectric(cos_i, np.full(500, 1.5))
+    assert np.abs(fresnel.schlick(number(cos_i), number(np.full(500, 0.04))).numpy() - exact).max() < 0.04
+
+
+def test_snells_law_holds_for_the_transmitted_cosine() -> None:
+    cos_i, eta = RNG.random(1000), RNG.uniform(1, 3, 1000)
+    cos_t = fresnel.cos_transmitted(number(cos_i), number(eta)).numpy()
+    np.testing.assert_allclose(eta**2 * (1 - cos_t**2), 1 - cos_i**2, rtol=1e-10, atol=1e-14)

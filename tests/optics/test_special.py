@@ -1,0 +1,169 @@
+"""Special functions against SciPy, maps of the square against their densities, indices, frames."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.special
+from chi_square import SIGNIFICANCE, p_value
+from sphere import SEED, random_directions, relative
+
+import gonio as go
+from gonio.errors import InputError
+from gonio.ops import backend
+from gonio.optics import frame, fresnel, indices, masking, warp
+from gonio.optics.ndf import distribution
+from gonio.optics.special import beta, erfinv
+
+
+def _number(x: np.ndarray, precision: str) -> Any:
+    return backend.types(precision).float(np.asarray(x, dtype=np.float64))
+
+
+def _vector(rows: np.ndarray, precision: str = "float64") -> Any:
+    return backend.vector_of(rows, len(np.atleast_2d(rows)[0]), backend.types(precision))
+
+
+def test_erfinv_is_scipys_within_its_stated_error() -> None:
+    x = np.concatenate([np.linspace(-0.999, 0.999, 20_001), 1 - np.logspace(-6, -3, 200)])
+    exact = scipy.special.erfinv(x)
+    assert relative(erfinv(_number(x, "float64")).numpy(), exact, 1e-9).max() < 5e-7
+    inner = np.abs(x) < 0.999
+    assert relative(erfinv(_number(x, "float32")).numpy(), exact, 1e-9)[inner].max() < 2e-6
+
+
+@pytest.mark.parametrize("precision, bar", [("float64", 1e-8), ("float32", 3e-6)])
+def test_beta_is_scipys_within_its_stated_error(precision: str, bar: float) -> None:
+    a, b = np.meshgrid(1 + np.logspace(-6, 2, 80), 1 + np.logspace(-6, 2, 80))
+    a, b = a.ravel(), b.ravel()
+    got = beta(_number(a, precision), _number(b, precision)).numpy().astype(float)
+    exact = scipy.special.beta(a, b)
+    usual = exact > 1e-30
+    assert relative(got, exact)[usual].max() < bar * (1 if precision == "float64" else 10)
+    near = (a < 10) & (b < 10)
+    assert relative(got, exact)[near].max() < bar
+
+
+def test_beta_of_a_grazing_direction_is_its_limit() -> None:
+    # B(1, b) = 1 / b, also for the enormous Lambda of a grazing direction
+    b = np.logspace(0, 6, 50)
+    np.testing.assert_allclose(beta(_number(np.ones(50), "float64"), _number(b, "float64")).numpy(), 1 / b, rtol=1e-7)
+
+
+@pytest.mark.parametrize("p", [None, 1.0, 30.0, 1000.0])
+def test_warps_follow_their_densities(p: float | None) -> None:
+    kind = backend.types("float64")
+    u = np.random.default_rng(SEED).random((100_000, 2))
+    u1, u2 = kind.float(u[:, 0].copy()), kind.float(u[:, 1].copy())
+    if p is None:
+        w = warp.square_to_cosine_hemisphere(u1, u2).numpy().T
+        pdf = lambda d: warp.square_to_cosine_hemisphere_pdf(_vector(d)).numpy()  # noqa: E731
+    else:
+        w = warp.square_to_power_lobe(u1, u2, kind.float(p)).numpy().T
+        pdf = lambda d: warp.square_to_power_lobe_pdf(_vector(d).z, kind.float(p)).numpy()  # noqa: E731
+    value, integral = p_value(w, np.ones(len(w), bool), pdf)
+    assert value > SIGNIFICANCE and integral == pytest.approx(1, abs=1e-4)
+
+
+def test_reflection_and_refraction_obey_the_law_of_the_plane_and_of_snell() -> None:
+    w, m = random_directions(1000, 61), random_directions(1000, 62)
+    m *= np.sign(np.sum(w * m, 1))[:, None]
+    r = frame.reflect(_vector(w), _vector(m)).numpy().T
+    np.testing.assert_allclose(np.sum(r * m, 1), np.sum(w * m, 1), rtol=1e-10, atol=1e-14)
+    np.testing.assert_allclose(np.cross(r, m), -np.cross(w, m), atol=1e-14)
+    kind = backend.types("float64")
+    eta = kind.float(1.5)
+    cos_t = fresnel.cos_transmitted(kind.float(np.sum(w * m, 1)), eta)
+    t = frame.refract(_vector(w), _vector(m), cos_t, eta).numpy().T
+    np.testing.assert_allclose(np.linalg.norm(t, axis=1), 1, rtol=1e-12)
+    np.testing.assert_allclose(1.5 * np.cross(t, m), -np.cross(w, m), atol=1e-13)
+    assert np.all(np.sum(t * m, 1) < 0)
+
+
+def test_rotating_back_undoes_a_rotation() -> None:
+    w, turn = random_directions(100, 63), _vector(np.array([np.cos(0.7), np.sin(0.7)]))
+    turned = frame.rotate(_vector(w), turn)
+    np.testing.assert_allclose(frame.rotate_back(turned, turn).numpy().T, w, atol=1e-15)
+    # a frame turned by +90 degrees sees +y as its x
+    quarter = _vector(np.array([0.0, 1.0]))
+    np.testing.assert_allclose(frame.rotate(_vector(np.array([[0.0, 1, 0]])), quarter).numpy().T, [[1, 0, 0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", masking.KINDS)
+def test_masking_lies_between_zero_and_one_and_is_symmetric(kind: str) -> None:
+    wo, wi = random_directions(5000, 64, upper=True), random_directions(5000, 65, upper=True)
+    m = wo + wi
+    m /= np.linalg.norm(m, axis=1, keepdims=True)
+    alpha = _vector(np.array([0.2, 0.7]))
+    for name in ("ggx", "beckmann", "student-t"):
+        ndf = distribution(name)
+        g = masking.masking_shadowing(kind, ndf, _vector(wo), _vector(wi), _vector(m), alpha).numpy()
+        back = masking.masking_shadowing(kind, ndf, _vector(wi), _vector(wo), _vector(m), alpha).numpy()
+        # Beckmann's rational fit overshoots 1 by 6e-5 at its seam
+        assert g.min() >= 0 and g.max() <= 1 + (2e-4 if (kind, name) == ("smith-separable", "beckmann") else 1e-12)
+        np.testing.assert_allclose(g, back, rtol=1e-12)
+
+
+def test_correlated_masking_hides_less_than_separable_masking() -> None:
+    wo, wi = random_directions(2000, 66, upper=True), random_directions(2000, 67, upper=True)
+    m = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
+    args = distribution("ggx"), _vector(wo), _vector(wi), _vector(m), _vector(np.array([0.6, 0.6]))
+    correlated = masking.masking_shadowing("smith-correlated", *args).numpy()
+    assert np.all(correlated >= masking.masking_shadowing("smith-separable-exact", *args).numpy() - 1e-14)
+
+
+def test_transmission_is_hidden_more_than_reflection() -> None:
+    """B(1 + a, 1 + b) is the chance of both when seen from opposite sides: below 1 / (1 + a + b) (Heitz2016)."""
+    wo, wi = random_directions(2000, 68, upper=True), random_directions(2000, 69, upper=True)
+    m = np.tile([0.0, 0.0, 1.0], (2000, 1))
+    alpha = _vector(np.array([0.6, 0.6]))
+    reflect = masking.masking_shadowing("smith-correlated", distribution("ggx"), _vector(wo), _vector(wi), _vector(m), alpha)
+    through = masking.masking_shadowing(
+        "smith-correlated", distribution("ggx"), _vector(wo), _vector(wi * [1, 1, -1]), -_vector(-m), alpha, transmits=True
+    )
+    assert np.all(through.numpy() <= reflect.numpy() + 1e-9)
+
+
+def test_schlicks_masking_has_the_homeworks_k() -> None:
+    cos, alpha = 0.3, 0.25
+    roughness = np.sqrt(alpha)
+    k = (roughness + 1) ** 2 / 8
+    expected = (cos / (cos * (1 - k) + k)) ** 2
+    w = np.array([[np.sqrt(1 - cos**2), 0, cos]])
+    mirrored = w * [-1, 1, 1]
+    m = _vector(np.array([[0.0, 0, 1]]))
+    widths = _vector(np.array([alpha, alpha]))
+    got = masking.masking_shadowing("schlick-direct", distribution("ggx"), _vector(w), _vector(mirrored), m, widths)
+    assert got.numpy()[0] == pytest.approx(expected, rel=1e-12)
+    k = alpha / 2
+    got = masking.masking_shadowing("schlick-ibl", distribution("ggx"), _vector(w), _vector(mirrored), m, widths)
+    assert got.numpy()[0] == pytest.approx((cos / (cos * (1 - k) + k)) ** 2, rel=1e-12)
+
+
+def test_metals_have_their_colours() -> None:
+    def colour(name: str) -> np.ndarray:
+        metal = indices.metal(name)
+        return np.array([((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k) for n, k in zip(metal.eta, metal.k, strict=True)])
+
+    r, g, b = colour("Cu")
+    assert r > 0.9 and r - g > 0.15 and g > b - 0.02, "copper is reddish"
+    r, g, b = colour("gold")
+    assert r > 0.9 and g > 0.6 and g - b > 0.2, "gold is yellowish"
+    silver = colour("silver")
+    assert silver.min() > 0.9
+    assert np.ptp(colour("aluminium")) < 0.05
+
+
+def test_every_index_names_its_source_and_is_found_by_symbol_or_name() -> None:
+    for symbol, metal in indices.METALS.items():
+        assert metal.source and len(metal.eta) == len(metal.k) == 3
+        assert indices.metal(symbol.lower()) is indices.metal(metal.name) is metal
+    assert indices.medium("Water").eta == pytest.approx(1.333)
+    with pytest.raises(InputError, match="unknown metal 'goldd'"):
+        indices.metal("goldd")
+    with pytest.raises(InputError, match="did you mean 'gold'"):
+        go.Conductor.preset("goldd")
+    with pytest.raises(InputError, match="did you mean 'water'"):
+        go.Dielectric.preset("watr")
