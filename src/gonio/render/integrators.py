@@ -22,12 +22,14 @@ from dataclasses import dataclass, make_dataclass
 from functools import cache
 from typing import Any
 
-import drjit as dr
 import numpy as np
 
 from ..errors import InputError
+from ..ops.backend import drjit
 from . import engine, sampler
 from .lights import Lights
+
+dr = drjit()
 
 INTEGRATORS: dict[str, str] = {
     "path": "path tracing: light and BSDF sampling combined at every vertex (max_depth - 1 shaded vertices)",
@@ -79,11 +81,15 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.integrator not in INTEGRATORS:
-            raise InputError(f"unknown integrator '{self.integrator}'", "integrator", "one of " + ", ".join(INTEGRATORS))
+            raise InputError(
+                f"unknown integrator '{self.integrator}'", "integrator", "one of " + ", ".join(INTEGRATORS)
+            )
         if self.sampler not in SAMPLERS:
             raise InputError(f"unknown sampler '{self.sampler}'", "sampler", "one of " + ", ".join(SAMPLERS))
         if not 1 <= self.max_depth < 2**31:
-            raise InputError(f"max_depth {self.max_depth}", "max_depth", "1 shows lights only, 2 direct light, and so on")
+            raise InputError(
+                f"max_depth {self.max_depth}", "max_depth", "1 shows lights only, 2 direct light, and so on"
+            )
         if not 0 <= self.seed < 2**32:
             raise InputError(f"seed {self.seed}", "seed", "a whole number from 0 to 4294967295")
 

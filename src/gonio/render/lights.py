@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-import drjit as dr
+from ..ops.backend import drjit
+
+dr = drjit()
 
 # Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
 # 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing
@@ -128,6 +130,10 @@ class SphericalRectangle:
         return point, (x / self.rectangle.length0, y / self.rectangle.length1), self.pdf(distance, cosine)
 
 
+def is_sphere(mi: ModuleType, shape: Any) -> bool:
+    return bool(shape.shape_type() == mi.ShapeType.Sphere.value)
+
+
 def is_rectangle(mi: ModuleType, shape: Any) -> bool:
     """Whether a shape is a `rectangle` whose edges are perpendicular (a sheared one is not)."""
     if shape is None or shape.shape_type() != mi.ShapeType.Rectangle.value:
@@ -164,25 +170,29 @@ def register(mi: ModuleType) -> None:
         def eval(self, si: Any, active: Any = True) -> Any:
             return dr.select(active, self.radiance.eval(si, active), 0)
 
-        def _rectangle(self) -> Rectangle | None:
-            shape = self.get_shape()
-            return Rectangle.of(mi, shape) if is_rectangle(mi, shape) else None
-
         def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
-            if rectangle := self._rectangle():
-                ds = _rectangle_sample(mi, SphericalRectangle(rectangle, it.p), sample, it)
-            else:
-                ds = self.get_shape().sample_direction(it, sample, active)
+            shape = self.get_shape()
+            if is_rectangle(mi, shape):
+                ds = _rectangle_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
+            elif is_sphere(mi, shape):  # samples the visible cap
+                ds = shape.sample_direction(it, sample, active)
+            else:  # not its own method: a mesh's never chooses a point whose normal looks away
+                ds = _area_sample(mi, shape.sample_position(it.time, sample, active), it)
             active = mi.Bool(active) & (ds.pdf > 0)
             ds.emitter = mi.EmitterPtr(self)
             si = mi.SurfaceInteraction3f(ds, it.wavelengths)
             return ds, dr.select(active, self.radiance.eval(si, active) / ds.pdf, 0)
 
         def pdf_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
-            if rectangle := self._rectangle():
-                pdf = SphericalRectangle(rectangle, it.p).pdf(ds.dist, dr.abs(dr.dot(ds.d, ds.n)))
-                return dr.select(active, pdf, 0)
-            return self.get_shape().pdf_direction(it, ds, active)
+            shape = self.get_shape()
+            cosine = dr.abs(dr.dot(ds.d, ds.n))
+            if is_rectangle(mi, shape):
+                pdf = SphericalRectangle(Rectangle.of(mi, shape), it.p).pdf(ds.dist, cosine)
+            elif is_sphere(mi, shape):
+                pdf = shape.pdf_direction(it, ds, active)
+            else:
+                pdf = shape.pdf_position(ds, active) * dr.square(ds.dist) / cosine
+            return dr.select(active & (cosine > 0), pdf, 0)
 
         def eval_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
             return self.radiance.eval(mi.SurfaceInteraction3f(ds, it.wavelengths), active)
@@ -205,12 +215,27 @@ _registered: set[str] = set()
 def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Any, it: Any) -> Any:
     """A Mitsuba direction sample from a spherical rectangle."""
     point, uv, pdf = seen.sample(sample.x, sample.y)
-    ds = dr.zeros(mi.DirectionSample3f, dr.width(point))
-    ds.p, ds.n, ds.uv, ds.pdf = point, mi.Normal3f(seen.rectangle.normal), mi.Point2f(*uv), pdf
-    ds.time, ds.delta = it.time, False
-    away = point - it.p
+    ps = dr.zeros(mi.PositionSample3f, dr.width(point))
+    ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(seen.rectangle.normal), mi.Point2f(*uv), it.time
+    ds = _toward(mi, ps, it)
+    ds.pdf = pdf
+    return ds
+
+
+def _area_sample(mi: ModuleType, ps: Any, it: Any) -> Any:
+    """A Mitsuba direction sample from a point sampled by area: pdf per steradian = pdf per area * r^2 / |cos|."""
+    ds = _toward(mi, ps, it)
+    cosine = dr.abs(dr.dot(ds.d, ds.n))
+    ds.pdf = dr.select(cosine > 0, ps.pdf * dr.square(ds.dist) / cosine, 0)
+    return ds
+
+
+def _toward(mi: ModuleType, ps: Any, it: Any) -> Any:
+    ds = mi.DirectionSample3f(ps)
+    away = ps.p - it.p
     ds.dist = dr.norm(away)
     ds.d = away / ds.dist
+    ds.delta = mi.Bool(False)
     return ds
 
 
