@@ -101,8 +101,8 @@ def render(
 
     \b
     Examples:
-      gonio render scenes/phong
-      gonio render scenes/phong -o phong.exr --spp 256 --size 640x480
+      gonio render examples/phong
+      gonio render examples/phong -o phong.exr --spp 256 --size 640x480
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
     from .render import run
@@ -224,9 +224,10 @@ def study(
 
     \b
     Examples:
-      gonio study scenes/phong --vary scene.shapes.0.material.p=4,16,64
-      gonio study scenes/phong --vary "scene.shapes.*.material.kd=[.1,.1,.1],[.5,.5,.5]" \\
-        --vary "scene.shapes.*.material.p=4,16,64" --size 300x90 -o kd-p.png
+      gonio study examples/phong --vary shapes.1.material.p=4,16,64
+      gonio study examples/phong-kd-p -o kd-p.png --size 200x200 \\
+        --vary "shapes.*.material.kd=[.1,.1,.1],[.5,.5,.5]" \\
+        --vary "shapes.*.material.p=4,16,64"
     """
     from .render import run
     from .viewer import contact_sheet
@@ -394,21 +395,47 @@ def explain(
         return
     print(f"{cls.name}\n{'=' * len(cls.name)}\n{text}\n")
     if rows:
-        table = _table("parameter", "kind", "range", "unit", "default", "what it is")
-        for row in rows:
-            table.add_row(*(row[key] for key in ("name", "kind", "range", "unit", "default", "doc")))
-        _print_rich(table)
+        _print_parameters(rows)
 
 
-def _parameter_row(parameter: Any) -> dict[str, str]:
+def _parameter_row(parameter: Any) -> dict[str, Any]:
     return {
         "name": parameter.name,
+        "doc": parameter.doc,
         "kind": parameter.kind,
         "range": parameter.range,
         "unit": parameter.unit,
         "default": "required" if parameter.required else str(parameter.default),
-        "doc": parameter.doc,
+        "choices": parameter.choices,
     }
+
+
+def _print_parameters(rows: list[dict[str, Any]]) -> None:
+    """Each parameter with what it is, then its kind, range, unit and default; choices with their meaning."""
+    import shutil
+    import textwrap
+
+    width = min(shutil.get_terminal_size().columns, 100)
+    indent = max(len(row["name"]) for row in rows) + 4
+    for row in rows:
+        print(
+            textwrap.fill(
+                row["doc"], width, initial_indent=f"  {row['name']:<{indent - 2}}", subsequent_indent=" " * indent
+            )
+        )
+        facts = [row["kind"]]
+        if not row["choices"] and row["range"] != row["kind"]:
+            facts.append(row["range"])
+        facts += [row["unit"]] * bool(row["unit"])
+        facts.append(row["default"] if row["default"] == "required" else f"default {row['default']}")
+        print(" " * indent + ", ".join(facts))
+        for choice, meaning in row["choices"].items():
+            hanging = " " * (indent + 4)
+            print(
+                textwrap.fill(
+                    f"{choice}: {meaning}", width, initial_indent=" " * (indent + 2), subsequent_indent=hanging
+                )
+            )
 
 
 def _first_line(cls: type) -> str:
