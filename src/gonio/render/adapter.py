@@ -73,7 +73,8 @@ def _adapter_class(mi: ModuleType) -> type:
                     raise InputError(f"'{props[name]}' given, a number or a texture expected", where)
                 if value is None or (parameter.kind == "spectrum" and mi.is_spectral and np.ndim(value)):
                     textures[name] = props.get_unbounded_texture(name)
-                    plain.append(np.array([max(parameter.low, 0.0), min(parameter.high, 1.0)]))
+                    span = np.array([max(parameter.low, 0.0), min(parameter.high, 1.0)])
+                    plain.append(np.tile(span[:, None], 3) if parameter.kind == "spectrum" else span)
                     constant = constant_of(textures[name]) if parameter.kind == "spectrum" else None
                     if constant is not None:
                         values[name], plain[-1] = constant, np.asarray(constant).ravel()
