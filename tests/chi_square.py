@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy import stats
+
 from sphere import joined
 
 ROWS, COLUMNS, POINTS = 48, 48, 5

@@ -10,7 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))  # `sphere`, `materials`
 
-from gonio import ops  # noqa: E402
+from gonio import ops
 
 
 @pytest.fixture(autouse=True)

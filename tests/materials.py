@@ -65,5 +65,9 @@ SMALL = {
     **IDEAL,
     **NESTED,
     **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned")},
-    **{f"{kind}-{ndf}-smith-correlated": ROUGH[f"{kind}-{ndf}-smith-correlated"] for kind in ("metal", "glass") for ndf in NDFS},
+    **{
+        f"{kind}-{ndf}-smith-correlated": ROUGH[f"{kind}-{ndf}-smith-correlated"]
+        for kind in ("metal", "glass")
+        for ndf in NDFS
+    },
 }

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
-from sphere import at, hemisphere, random_directions, random_numbers
 
-import gonio as go
+from sphere import at, hemisphere, random_directions, random_numbers
 
 COUNT = 5000
 WO, WI = random_directions(COUNT, 71, upper=True), random_directions(COUNT, 72, upper=True)
@@ -74,7 +74,9 @@ def test_oren_nayar_is_equations_2_and_3_in_angles(sigma: float) -> None:
 
 def test_oren_nayar_without_slopes_is_lambert() -> None:
     np.testing.assert_allclose(
-        go.OrenNayar(0.7, 0.0).eval(WO, WI, precision="float64"), go.Lambert(0.7).eval(WO, WI, precision="float64"), rtol=1e-14
+        go.OrenNayar(0.7, 0.0).eval(WO, WI, precision="float64"),
+        go.Lambert(0.7).eval(WO, WI, precision="float64"),
+        rtol=1e-14,
     )
 
 
@@ -221,7 +223,9 @@ def test_nearly_matched_indices_nearly_let_light_straight_through(eta: float) ->
 
 def test_glass_without_transmission_is_its_reflection_alone() -> None:
     whole, exercise = go.Dielectric(1.5, 0.3), go.Dielectric(1.5, 0.3, transmission=False)
-    np.testing.assert_allclose(exercise.eval(WO, WI, precision="float64"), whole.eval(WO, WI, precision="float64"), rtol=1e-12)
+    np.testing.assert_allclose(
+        exercise.eval(WO, WI, precision="float64"), whole.eval(WO, WI, precision="float64"), rtol=1e-12
+    )
     assert not exercise.eval(WO, WI * [1, 1, -1]).any() and not exercise.transmits and whole.transmits
 
 

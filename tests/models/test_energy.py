@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
+
 from materials import MASKINGS, NDFS, SMALL
 from sphere import SEED, at, hemisphere
-
-import gonio as go
 
 W, WEIGHTS = hemisphere(384, 192)
 BOTH, BOTH_WEIGHTS = np.concatenate([W, W * [1, 1, -1]]), np.concatenate([WEIGHTS, WEIGHTS])

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
-from sphere import random_directions, relative
-
-import gonio as go
 from gonio.ops import backend
 from gonio.optics.ndf import distribution
+
+from sphere import random_directions, relative
 
 COUNT = 100_000
 WO = random_directions(COUNT, 31).astype(np.float32)
@@ -106,7 +106,9 @@ def test_dielectric_is_mitsubas_roughdielectric(native: Any, ndf: str, alpha: An
     inside = wo[:, 2] < 0
     turning = inside & (np.abs(near - np.sqrt(5) / 3) < 3e-4)
     critical = np.where(through, inside & (far < 0.06), turning) | (near < 0.02)
-    critical |= np.abs(h[:, 2]) < 1e-3 * np.linalg.norm(h, axis=1)  # m.z, a difference of two float32, is in the density
+    critical |= np.abs(h[:, 2]) < 1e-3 * np.linalg.norm(
+        h, axis=1
+    )  # m.z, a difference of two float32, is in the density
     assert critical.mean() < 0.04
 
     assert (value > 0).any()

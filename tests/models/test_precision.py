@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 
+import gonio as go
 import numpy as np
 import pytest
+
 from materials import ALL, FINITE, NDFS, SMALL
 from sphere import at, random_directions, random_numbers, relative
-
-import gonio as go
 
 COUNT = 20_000
 # directions that float32 holds exactly: the rounding of the input is not the model's
@@ -75,7 +75,13 @@ EDGES = np.array(
 )
 CORNERS = np.array(list(itertools.product([0.0, 1e-7, 0.5, 0.99999994], repeat=3)))
 EXTREME = {
-    f"{type(base).__name__}-{ndf}-{masking}-{base.sampling}-{base.fresnel}-{alpha}-{eta}": (base, ndf, masking, alpha, eta)
+    f"{type(base).__name__}-{ndf}-{masking}-{base.sampling}-{base.fresnel}-{alpha}-{eta}": (
+        base,
+        ndf,
+        masking,
+        alpha,
+        eta,
+    )
     for ndf in NDFS
     for base, masking, alpha, eta in [
         (go.Conductor(), "smith-correlated", 1e-4, (0.0, 1.0001, 4.0)),

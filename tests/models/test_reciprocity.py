@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
+
 from materials import FINITE
 from sphere import random_directions
-
-import gonio as go
 
 COUNT = 20_000
 WO, WI = random_directions(COUNT, 81), random_directions(COUNT, 82)
@@ -39,7 +39,9 @@ def test_importance_scatters_as_radiance_does_the_other_way(name: str) -> None:
     radiance = material.f(WO, WI, precision="float64")
     importance = material.f(WI, WO, "importance", precision="float64")
     scale = (_index(material, WI) / _index(material, WO))[:, None] ** 2
-    np.testing.assert_allclose(importance, radiance * np.where(WO[:, 2:] * WI[:, 2:] < 0, 1.0, scale), rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(
+        importance, radiance * np.where(WO[:, 2:] * WI[:, 2:] < 0, 1.0, scale), rtol=1e-8, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", [name for name, m in FINITE.items() if "reciprocity" in m.breaks])

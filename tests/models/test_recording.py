@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
-from materials import ALL, SMALL
-from sphere import random_directions, random_numbers
-
-import gonio as go
 from gonio.models.base import converter
 from gonio.ops import backend
+
+from materials import ALL, SMALL
+from sphere import random_directions, random_numbers
 
 COUNT = 3000
 WO, WI, U = random_directions(COUNT, 41), random_directions(COUNT, 42), random_numbers(COUNT, 41)
@@ -74,7 +74,9 @@ def _check(name: str, method: str, mode: str = "radiance") -> None:
     for r, c, change in zip(recorded, computed, moved, strict=True):
         excess = _size(r - c) - np.maximum(1e-12 * _size(c), 8 * change)
         worst = int(np.argmax(excess))
-        assert excess[worst] <= 0, f"ray {worst}: {r[worst]} recorded, {c[worst]} computed, moves by {change[worst]:.2g}"
+        assert excess[worst] <= 0, (
+            f"ray {worst}: {r[worst]} recorded, {c[worst]} computed, moves by {change[worst]:.2g}"
+        )
 
 
 @pytest.mark.parametrize("method", ["eval", "pdf", "sample"])

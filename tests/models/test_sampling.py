@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
+
 from chi_square import SIGNIFICANCE, p_value
 from materials import FINITE, NDFS, SMALL
 from sphere import SEED, at, hemisphere
-
-import gonio as go
 
 COUNT = 120_000
 VIEWS = {"normal": at(0), "30": at(30, 40), "60": at(60, 200), "grazing": at(86, 100), "inside": at(140, -20)}
@@ -19,7 +19,9 @@ def _judge(material: go.BSDF, wo: np.ndarray, count: int = COUNT) -> tuple[float
     u = np.random.default_rng(SEED).random((count, 3), dtype=np.float32)
     s = material.sample(np.broadcast_to(wo, (count, 3)), u)  # float32, as users sample; judged by float64's density
     rest = ~s.delta
-    share = 1.0 - (float(s.pdf[s.delta][0]) if s.delta.any() else 0.0)  # the delta lobe's probability is the same for all
+    share = 1.0 - (
+        float(s.pdf[s.delta][0]) if s.delta.any() else 0.0
+    )  # the delta lobe's probability is the same for all
     valid = s.pdf[rest] > 0
     p, integral = p_value(
         s.wi[rest].astype(np.float64), valid, lambda w: material.pdf(wo, w, precision="float64") / share

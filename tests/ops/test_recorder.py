@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
-
-import gonio as go
 from gonio import ops
 from gonio.ops import RecordingError, record
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chi_square import SIGNIFICANCE, p_value
-from sphere import SEED, at, hemisphere, random_directions, relative
-
 from gonio import ops
 from gonio.errors import InputError
 from gonio.ops import backend
 from gonio.optics.ndf import NDF, distribution, distributions
+
+from chi_square import SIGNIFICANCE, p_value
+from sphere import SEED, at, hemisphere, random_directions, relative
 
 KIND = backend.types("float64")
 WIDTHS = [(0.1, 0.1), (0.5, 0.5), (1.0, 1.0), (0.15, 0.6)]
@@ -90,7 +90,9 @@ def test_width_along_one_axis_acts_along_that_axis(name: str) -> None:
 
 
 def _chi_square(pdf: Any, normals: np.ndarray) -> float:
-    return p_value(normals, np.ones(len(normals), bool), lambda w: np.where(w[:, 2] > 0, pdf(vector(w)).numpy(), 0.0))[0]
+    return p_value(normals, np.ones(len(normals), bool), lambda w: np.where(w[:, 2] > 0, pdf(vector(w)).numpy(), 0.0))[
+        0
+    ]
 
 
 @pytest.mark.parametrize("alpha", [(0.01, 0.01), (0.5, 0.5), (1.0, 1.0), (0.1, 0.5)], ids=str)
@@ -147,7 +149,9 @@ def test_smiths_lambda_is_symmetric_in_side_and_grows_toward_grazing() -> None:
     widths = vector(np.array([0.3, 0.3]))
     for name in NAMES:
         lam = distribution(name).Lambda(vector(np.array([at(d) for d in (0, 30, 60, 85, 89.9)])), widths).numpy()
-        mirrored = distribution(name).Lambda(vector(np.array([at(180 - d) for d in (0, 30, 60, 85, 89.9)])), widths).numpy()
+        mirrored = (
+            distribution(name).Lambda(vector(np.array([at(180 - d) for d in (0, 30, 60, 85, 89.9)])), widths).numpy()
+        )
         np.testing.assert_allclose(lam, mirrored, rtol=1e-9, atol=1e-12)
         assert np.all(np.diff(lam) >= 0) and lam[0] == pytest.approx(0, abs=1e-9)
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sphere import SEED
-
 from gonio.ops import backend
 from gonio.optics import fresnel
+
+from sphere import SEED
 
 RNG = np.random.default_rng(SEED)
 KIND = backend.types("float64")

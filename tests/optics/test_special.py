@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
 import scipy.special
-from chi_square import SIGNIFICANCE, p_value
-from sphere import SEED, random_directions, relative
-
-import gonio as go
 from gonio.errors import InputError
 from gonio.ops import backend
 from gonio.optics import frame, fresnel, indices, masking, warp
 from gonio.optics.ndf import distribution
 from gonio.optics.special import beta, erfinv
+
+from chi_square import SIGNIFICANCE, p_value
+from sphere import SEED, random_directions, relative
 
 
 def _number(x: np.ndarray, precision: str) -> Any:
@@ -88,7 +88,9 @@ def test_rotating_back_undoes_a_rotation() -> None:
     np.testing.assert_allclose(frame.rotate_back(turned, turn).numpy().T, w, atol=1e-15)
     # a frame turned by +90 degrees sees +y as its x
     quarter = _vector(np.array([0.0, 1.0]))
-    np.testing.assert_allclose(frame.rotate(_vector(np.array([[0.0, 1, 0]])), quarter).numpy().T, [[1, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(
+        frame.rotate(_vector(np.array([[0.0, 1, 0]])), quarter).numpy().T, [[1, 0, 0]], atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("kind", masking.KINDS)
@@ -119,9 +121,17 @@ def test_transmission_is_hidden_more_than_reflection() -> None:
     wo, wi = random_directions(2000, 68, upper=True), random_directions(2000, 69, upper=True)
     m = np.tile([0.0, 0.0, 1.0], (2000, 1))
     alpha = _vector(np.array([0.6, 0.6]))
-    reflect = masking.masking_shadowing("smith-correlated", distribution("ggx"), _vector(wo), _vector(wi), _vector(m), alpha)
+    reflect = masking.masking_shadowing(
+        "smith-correlated", distribution("ggx"), _vector(wo), _vector(wi), _vector(m), alpha
+    )
     through = masking.masking_shadowing(
-        "smith-correlated", distribution("ggx"), _vector(wo), _vector(wi * [1, 1, -1]), -_vector(-m), alpha, transmits=True
+        "smith-correlated",
+        distribution("ggx"),
+        _vector(wo),
+        _vector(wi * [1, 1, -1]),
+        -_vector(-m),
+        alpha,
+        transmits=True,
     )
     assert np.all(through.numpy() <= reflect.numpy() + 1e-9)
 
@@ -145,7 +155,9 @@ def test_schlicks_masking_has_the_homeworks_k() -> None:
 def test_metals_have_their_colours() -> None:
     def colour(name: str) -> np.ndarray:
         metal = indices.metal(name)
-        return np.array([((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k) for n, k in zip(metal.eta, metal.k, strict=True)])
+        return np.array(
+            [((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k) for n, k in zip(metal.eta, metal.k, strict=True)]
+        )
 
     r, g, b = colour("Cu")
     assert r > 0.9 and r - g > 0.15 and g > b - 0.02, "copper is reddish"

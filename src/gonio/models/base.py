@@ -35,6 +35,7 @@ from ..optics import warp
 Value = Any  # a number, an array with one value a ray, a texture in a scene; bound: a Dr.Jit value or a symbol
 
 MODES = ("radiance", "importance")
+CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have their own number
 
 
 class Sample(NamedTuple):
@@ -133,6 +134,9 @@ class Parameter:
             raise InputError(f"{value!r} given, a number or an array expected", where) from None
         if isinstance(value, str | bytes) or array.ndim > (2 if self.kind == "spectrum" else 1):
             raise InputError(f"{value!r} given, a number or an array expected", where)
+        if self.kind == "spectrum" and array.ndim and array.shape[-1] != CHANNELS:
+            what = f"a colour of shape {array.shape}, a number, {CHANNELS} values or (N, {CHANNELS}) expected"
+            raise InputError(what, where)
         if not np.all(np.isfinite(array)):
             raise InputError(f"{value!r} is not finite", where)
         if array.size and array.min() < self.low:
@@ -384,11 +388,11 @@ def converter(kind: backend.Types) -> Callable[[Parameter, Any], Any]:
     def convert(parameter: Parameter, value: Any) -> Any:
         if parameter.kind == "spectrum":
             if backend.is_drjit(value):
-                return value
+                return value if backend.drjit().is_vector_v(value) else kind.vec3(value, value, value)
             array = np.asarray(value, dtype=np.float64)
             if array.ndim == 0:
-                array = np.broadcast_to(array, (3,))
-            return backend.vector_of(array, array.shape[-1], kind)
+                array = np.broadcast_to(array, (CHANNELS,))
+            return backend.vector_of(array, CHANNELS, kind)
         if parameter.kind == "alpha":
             if isinstance(value, tuple | list):
                 return kind.vec2(backend.float_of(value[0], kind), backend.float_of(value[1], kind))
@@ -439,11 +443,18 @@ def _doorway(method: Callable) -> Callable:
             return inner(_settled(self, backend.types_like(type(wo))), wo, other, *args)
         kind = backend.types(precision)
         first, second, count = _rows(wo, other, method.__name__)
+        _check_rows(self, count)
+        if count == 0:  # Dr.Jit joins no array of no entries with one of one entry
+            first = second = np.array([0.0, 0.0, 1.0])
         bound = _settled(self, kind)
         result = inner(bound, backend.vector_of(first, 3, kind), backend.vector_of(second, 3, kind), *args)
+
+        def out(value: Any) -> np.ndarray:
+            return backend.to_numpy(value, count) if count else backend.to_numpy(value, 1)[:0]
+
         if isinstance(result, tuple):
-            return type(result)(*[backend.to_numpy(value, count) for value in result])  # type: ignore[call-arg]
-        return backend.to_numpy(result, count)
+            return type(result)(*[out(value) for value in result])  # type: ignore[call-arg]
+        return out(result)
 
     takes_mode = "mode" in inspect.signature(method).parameters
     return enter
@@ -460,10 +471,26 @@ def _rows(a: Any, b: Any, name: str) -> tuple[np.ndarray, np.ndarray, int]:
         if array.ndim not in (1, 2) or array.shape[-1] != 3:
             raise InputError(f"an array of shape {array.shape}, expected (N, 3)", f"{name}: {label}")
         arrays.append(array)
-    sizes = {len(x) for x in arrays if x.ndim == 2 and len(x) != 1} or {1}
+    sizes = sorted({len(x) for x in arrays if x.ndim == 2 and len(x) != 1}) or [1]
     if len(sizes) > 1:
-        raise InputError(f"{sizes} rows given, the same number expected", name)
-    return arrays[0], arrays[1], sizes.pop()
+        raise InputError(f"{sizes[0]} and {sizes[1]} rows given, the same number expected", name)
+    return arrays[0], arrays[1], sizes[0]
+
+
+def _check_rows(material: BSDF, count: int) -> None:
+    """Raise InputError where a parameter has one value a ray, for another number of rays."""
+    for name, parameter in material.parameters().items():
+        value = getattr(material, name)
+        if parameter.kind == "bsdf":
+            _check_rows(value, count)
+        if not parameter.numeric or isinstance(value, int | float):
+            continue
+        single = 1 if parameter.kind == "spectrum" else 0  # dimensions of one ray's value
+        for part in value if parameter.kind == "alpha" and isinstance(value, tuple | list) else (value,):
+            rows = 1 if backend.is_drjit(part) or np.ndim(part) <= single else len(part)
+            if rows not in (1, count) and count != 1:
+                where = f"{type(material).__name__}.{name}"
+                raise InputError(f"{rows} rows given for {count} directions, the same number expected", where)
 
 
 for _name in ("pdf", "sample"):  # the fall-backs are called from outside too
