@@ -187,7 +187,7 @@ def _adapter_class(mi: ModuleType) -> type:
             """Find once what the model derives from values that are the same at every hit."""
             self.settled = None
             if type(self.model).derive is not BSDF.derive and not self.textured():
-                self.settled = self.at(dr.zeros(mi.SurfaceInteraction3f), True).settle()
+                self.settled = self.at(dr.zeros(mi.SurfaceInteraction3f), True, inner=True).settle()
 
         def textured(self) -> bool:
             """Whether a parameter of this material or of one inside it varies over the surface."""
@@ -240,10 +240,10 @@ def _adapter_class(mi: ModuleType) -> type:
 
         # -------------------------------------------------------------- the model at a point
 
-        def at(self, si: Any, active: Any, turned: bool = False) -> Any:
+        def at(self, si: Any, active: Any, inner: bool = False) -> Any:
             """The model, its parameters bound to their values at a surface interaction.
 
-            turned  the caller turns both directions to the front already
+            inner  it is part of another material, which alone decides whether both sides are shaded
             """
             found: dict[str, Any] = {}
             for name, slot in self.slots.items():
@@ -260,14 +260,11 @@ def _adapter_class(mi: ModuleType) -> type:
                     found[name] = got[name]
             bound = self.model.bind(lambda parameter, value: found.get(parameter.name))
             for name, child in self.inner.items():
-                if isinstance(child, GonioBSDF):
-                    inner = child.at(si, active, turned or self.two_sided)
-                else:
-                    inner = Foreign(child, si, active)
-                bound.__dict__[name] = inner
+                own = isinstance(child, GonioBSDF)
+                bound.__dict__[name] = child.at(si, active, inner=True) if own else Foreign(child, si, active)
             if self.settled is not None:
                 bound.__dict__["_settled"] = self.settled
-            if self.two_sided and not turned:
+            if self.two_sided and not inner:
                 wrapped = object.__new__(TwoSided)
                 wrapped.__dict__.update(base=bound, _bound=True)
                 return wrapped
