@@ -94,7 +94,9 @@ def bake(
         raise InputError(f"unknown method '{method}'", "--method", did_you_mean(method, known))
     if method != "quadrature" and (spp < 1 or model is not None):
         what = f"{spp} samples asked for" if spp < 1 else "models are integrated by quadrature only"
-        raise InputError(what, "--spp" if spp < 1 else "--method", "give 1 or more" if spp < 1 else "leave --method out")
+        raise InputError(
+            what, "--spp" if spp < 1 else "--method", "give 1 or more" if spp < 1 else "leave --method out"
+        )
 
     roughness, mu = axes(layout, masking, size)
     grid = np.broadcast_to(mu, (size, size)), np.broadcast_to(roughness[:, None] ** 2, (size, size))
@@ -215,9 +217,7 @@ def _directional(
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
 
 
-def _average(
-    model: BSDF | None, ndf: str, masking: str, roughness: np.ndarray, fine: bool = False
-) -> np.ndarray:
+def _average(model: BSDF | None, ndf: str, masking: str, roughness: np.ndarray, fine: bool = False) -> np.ndarray:
     x, w = quadrature.gauss(48 if fine else 32)
     mu, alpha = np.broadcast_arrays(x**2, roughness[:, None] ** 2)
     values = _exact(model, ndf, masking, mu, alpha, fine)["E"]

@@ -55,7 +55,7 @@ class Metal:
         bend = curves.knee(form, base.masking, width)
         average = maximum(found[-1], 0.0)
         f_avg, albedo = _reflectance_average(material)
-        added = _bounces(material.color, f_avg, 1.0 - average) * albedo
+        added = _bounces(getattr(material, "color", "bounce"), f_avg, 1.0 - average) * albedo
         scale = safe_div(ops.inv_pi, where(average > NOTHING, average, 0.0))
         return {
             "missing": found[:-1],
@@ -122,8 +122,15 @@ def _reflectance_average(material: Any) -> tuple[Any, Any]:
     """(F_avg, albedo) of a base that only reflects."""
     base = material.base
     if hasattr(base, "k"):
-        return fresnel_average.of_metal(base, material.average), base.albedo
+        return fresnel_average.of_metal(base, getattr(material, "average", "exact")), base.albedo
     return fresnel_average.of_glass(base), base.albedo
+
+
+def normal_reflectance(base: Any) -> Any:
+    """F0 of a base that only reflects, its albedo included."""
+    if hasattr(base, "k"):
+        return base.reflectance(1.0 + 0.0 * base.alpha.x)
+    return base.reflectance(1.0 + 0.0 * base.eta, 1.0 + 0.0 * base.eta, base.eta) * base.albedo
 
 
 class Glass:
@@ -158,7 +165,7 @@ class Glass:
             side: 2.0 / curves.squeeze(curves.form_of(base.masking, side), 1.0 + 0.0 * width, bend)
             for side, bend in bends.items()
         }
-        tint = _bounces(material.color, base.albedo, 1.0 - 0.5 * (m_thin + m_dense))
+        tint = _bounces(getattr(material, "color", "bounce"), base.albedo, 1.0 - 0.5 * (m_thin + m_dense))
         return {
             "thin": thin[:-1],
             "dense": dense[:-1],

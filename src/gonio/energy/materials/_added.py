@@ -1,0 +1,68 @@
+"""A base and something added to it: what the compensated materials share. The broad lobes are those of a rule."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ... import ops
+from ...models.base import BSDF, Sample, bsdf
+from ...ops import safe_div, vec3, where
+from .. import missing
+
+ALMOST_ONE = 0.99999994  # the largest float32 under 1
+
+
+class _Added(BSDF):
+    """base + `_extra`, sampled by a mixture of the base and of the rule's broad lobes."""
+
+    base: BSDF = bsdf("the material to be compensated")
+
+    @property
+    def transmits(self) -> bool:
+        return self.base.transmits
+
+    @property
+    def delta(self) -> str:
+        return self.base.delta
+
+    def tint(self, wo: Any) -> Any:
+        """The base's."""
+        return self.base.tint(wo)
+
+    def _rule(self) -> Any:
+        return missing.rule(self.base)
+
+    def _extra(self, found: Any, wo: Any, wi: Any, mode: str) -> Any:
+        """What is added, times |cos theta_i|."""
+        return self._rule().added(self, found, wo, wi, mode)
+
+    def derive(self) -> Any:
+        """What does not depend on directions."""
+        return self._rule().derive(self)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        """The base, plus what is added."""
+        return self.base.eval(wo, wi, mode) + self._extra(self.derived(), wo, wi, mode)
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        """The base's density and that of lobes proportional to (1 - E(mu_i)) mu_i, mixed by the energy each carries."""
+        rule, found = self._rule(), self.derived()
+        share = rule.share(self, found, wo)
+        return self.base.pdf(wo, wi) * (1.0 - share) + rule.pdf(self, found, wo, wi) * share
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+        """u1 picks the base or the lobes, and is stretched to serve again."""
+        rule, found = self._rule(), self.derived()
+        share = rule.share(self, found, wo)
+        broad = u.x < share
+        again = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
+        u = vec3(ops.minimum(again, ALMOST_ONE), u.y, u.z)
+        s = self.base.sample(wo, u, mode)
+        wi = where(broad, rule.sample(self, found, wo, u), s.wi)
+        delta = s.delta & ~broad
+        density = self.pdf(wo, wi)
+        pdf = where(broad | (s.pdf > 0.0), where(delta, s.pdf * (1.0 - share), density), 0.0)
+        value = self.eval(wo, wi, mode) * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
+        eta = where(broad, rule.eta(self, wo, wi), s.eta)
+        # a smooth base misses nothing: share = 0
+        return Sample(wi, where(delta, s.weight * safe_div(1.0, 1.0 - share), value), pdf, delta, eta)
