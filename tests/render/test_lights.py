@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from gonio.render import engine, lights
 
 mi = engine.load()

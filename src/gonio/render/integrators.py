@@ -53,6 +53,9 @@ ROULETTE_DEPTH = 5
 PIXEL, TIME, APERTURE, FIRST_VERTEX = 0, 1, 2, 3
 LIGHT, LOBE, CHOICE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
 
+# The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm): white of radiance 1 has Y = 1.
+CIE_Y_INTEGRAL = 106.7502593994140625
+
 # 4 x 4 pixels fill the 16 lanes of AVX-512 and two packets of AVX2: on the five-conductor scene the same rays take
 # 0.21 s in tiles and 0.32 s in scanlines.
 TILE = 4
@@ -114,6 +117,9 @@ class Render:
         self._pixel = mi.UInt32(self._order)
         self._sums = _Sums.zeros(mi, self.width * self.height, 6 if aovs else 0)
         dr.make_opaque(self._pixel, self._sums)  # zeros as data: else the first pass would be a kernel of its own
+        # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
+        # two kernels; this puts both in the second state.
+        self.sensor.parameters_changed()
         with dr.suspend_grad():
             self._transport = _Transport(mi, scene, self.sensor, settings, aovs)
 
@@ -370,8 +376,8 @@ class _Transport:
     def rgb(self, radiance: Any, wavelengths: Any) -> Any:
         mi = self.mi
         if mi.is_spectral:
-            xyz = mi.cie1931_xyz(wavelengths) * radiance
-            return mi.xyz_to_srgb(mi.Color3f(*(dr.mean(c) for c in xyz)))
+            responses = [mi.cie1931_xyz(wavelength) * r for wavelength, r in zip(wavelengths, radiance, strict=True)]
+            return mi.xyz_to_srgb(sum(responses) / (len(responses) * CIE_Y_INTEGRAL))
         if mi.is_monochromatic:
             return mi.Color3f(radiance[0])
         return radiance

@@ -152,6 +152,10 @@ def register(mi: ModuleType) -> None:
 
     radiance  emitted radiance, W/(m^2 sr), the same in every direction on **both** sides; rgb, spectrum or texture
 
+    tag       any text. Mitsuba's loader merges Python plugins with equal properties, and then complains of one
+              emitter on two shapes: two lamps of the same radiance need different tags, or `load_dict(...,
+              optimize=False)`
+
     It is sampled by solid angle on rectangles, by the shape's own method on others. Not for light tracing
     (`sample_ray` is not offered).
     """
@@ -165,6 +169,7 @@ def register(mi: ModuleType) -> None:
         def __init__(self, properties: Any):
             mi.Emitter.__init__(self, properties)
             self.radiance = properties.get_emissive_texture("radiance")
+            properties.get("tag", "")
             self.m_flags = mi.EmitterFlags.Surface
 
         def eval(self, si: Any, active: Any = True) -> Any:
