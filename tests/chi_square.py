@@ -1,8 +1,8 @@
 """Pearson's chi-square test of samples on the sphere against a density, in cells that follow the samples.
 
 A lobe of width .01 fills a millionth of the sphere, so fixed cells either miss it or number millions. Here half of
-the draws, a training set, places the cells' edges (quantiles, mixed with equal steps, in the cosine and then in azimuth, row by row), the
-other half is counted. Edges never cross the horizon, where densities jump.
+the draws, a training set, places the cells' edges (in the cosine, then in azimuth row by row), the other half is
+counted. Edges never cross the horizon, where densities jump.
 """
 
 from __future__ import annotations

@@ -36,8 +36,8 @@ def joined(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
 def hemisphere(n_mu: int, n_phi: int) -> tuple[np.ndarray, np.ndarray]:
     """Directions (n, 3) of the upper hemisphere and their weights, which add up to 2 pi.
 
-    Gauss-Legendre in the angle theta, so that directions gather at the pole and at the horizon, and equal steps in azimuth, exact
-    for every trigonometric polynomial below n_phi.
+    Gauss-Legendre in the angle theta, so that directions gather at the pole and at the horizon, and equal steps in
+    azimuth, exact for every trigonometric polynomial below n_phi.
     """
     x, w = np.polynomial.legendre.leggauss(n_mu)
     theta = 0.25 * np.pi * (x + 1.0)

@@ -115,7 +115,7 @@ def test_smooth_and_rough_rays_may_be_mixed() -> None:
 
 
 def test_mode_is_radiance_or_importance() -> None:
-    with pytest.raises(go.InputError, match="unknown mode 'photons'.*\n.*radiance or importance"):
+    with pytest.raises(go.InputError, match=r"unknown mode 'photons'.*\n.*radiance or importance"):
         go.Lambert().eval(WO, WI, "photons")
     value = go.Dielectric().eval(WO, WI * [1, 1, -1])
     scaled = go.Dielectric().eval(WO, WI * [1, 1, -1], mode="importance")

@@ -9,7 +9,8 @@ radiance), and differ, knowingly, in these:
   The widened alpha, one per ray, is handed to ours below.
 - Values under 1e-6 are compared absolutely: Mitsuba sets densities of normals below 1e-20 to 0.
 - From inside, near the critical angle, Mitsuba takes 1 - F from a cosine that Snell's root has cancelled in float32;
-  where a facet is just grazed, 1 - F cancels in any float32, and at the critical angle F has an infinite slope. There (one pair in thirty) our float64 is the judge.
+  where a facet is just grazed, 1 - F cancels in any float32; at the critical angle itself F has an infinite slope; and
+  m.z of a facet on edge is a difference of two float32. There (one pair in thirty) our float64 is the judge.
 """
 
 from __future__ import annotations

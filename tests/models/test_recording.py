@@ -120,5 +120,5 @@ def test_absent_rotation_leaves_no_trace_in_the_graph() -> None:
 def test_graph_says_which_value_is_missing() -> None:
     from gonio.ops import RecordingError
 
-    with pytest.raises(RecordingError, match="no value for self.albedo"):
+    with pytest.raises(RecordingError, match=r"no value for self\.albedo"):
         go.Lambert().record("eval").evaluate(wo=WO.T, wi=WI.T)
