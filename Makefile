@@ -20,6 +20,7 @@ install: .venv/installed
 	touch $@
 
 demo: .venv/rendering
+	@mkdir -p out
 	$(BIN)/gonio render examples/shading-balls -o out/shading-balls.png
 
 lint: .venv/installed
