@@ -19,6 +19,7 @@ from .. import ops
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, Parameter, Sample, models
 from ..models.two_sided import TwoSided
+from ..optics.indices import RGB_WAVELENGTHS
 
 _registered: dict[str, type] = {}
 
@@ -83,7 +84,7 @@ def _adapter_class(mi: ModuleType) -> type:
             elif preset is not None and hasattr(preset, name):
                 value = np.asarray(getattr(preset, name), dtype=float)
                 if value.ndim and mi.is_spectral:
-                    textures[name] = mi.load_dict({"type": "srgb", "color": value.tolist(), "unbounded": True})
+                    textures[name] = measured(value)
                     plain.append(value)
                     continue
                 value = value if value.ndim else float(value)
@@ -101,6 +102,14 @@ def _adapter_class(mi: ModuleType) -> type:
                 values[name] = mi.Float(float(value))
             dr.make_opaque(values[name])
         return _Slot(parameter, values, textures), (tuple(plain) if len(plain) == 2 else plain[0])
+
+    def measured(value: np.ndarray) -> Any:
+        """A spectrum through a preset's values at `RGB_WAVELENGTHS`, level beyond; Mitsuba's own way from colours to
+        spectra is made for reflectances and would cut an index at 1."""
+        nodes = (360.0, *reversed(RGB_WAVELENGTHS), 830.0)
+        levels = (value[-1], *reversed(value), value[0])
+        text = [", ".join(f"{float(x):.9g}" for x in row) for row in (nodes, levels)]
+        return mi.load_dict({"type": "irregular", "wavelengths": text[0], "values": text[1]})
 
     def constant_of(texture: Any) -> Any:
         """The opaque colour of a texture that is one colour everywhere, else None; spectra stay textures."""
