@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import GonioWarning, InputError
 from . import meshes, schema, textures
 from .materials import BY_TYPE, MaterialPart
 from .text import pointer
@@ -46,7 +47,9 @@ class _Builder:
     def load(self, plugin: dict[str, Any], where: str) -> Any:
         """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
         try:
-            return self.mi.load_dict(plugin)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", GonioWarning)  # the reader has said it, with the place
+                return self.mi.load_dict(plugin)
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
         except RuntimeError as error:
