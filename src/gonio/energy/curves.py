@@ -142,6 +142,69 @@ def lobe(ndf: str, masking: str) -> Table:
     return Table(f"lobe_{ndf}_{masking}".replace("-", "_"), inverse[..., None])
 
 
+ASPECTS = 9  # sqrt(alpha_min / alpha_max), 0 to 1
+ASPECT_ROWS = 33  # sqrt(alpha_max), 0 to 1
+HARMONICS = 6  # powers 0 to 5 of y
+AZIMUTHS = 9  # nodes to fit them
+TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: powers of x by powers of y, M_avg, padding
+
+
+@lru_cache
+def anisotropic(ndf: str, masking: str) -> Table:
+    """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) of a metal with two widths.
+
+    About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from the
+    axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 + alpha_min^2 sin^2.
+    Channel k HARMONICS + j holds the coefficient of x^k y^j.
+    """
+
+    def build() -> np.ndarray:
+        form = form_of(masking)
+        floor = np.sqrt(quadrature.SMALLEST_ALPHA)
+        aspect = np.maximum(np.linspace(0.0, 1.0, ASPECTS), 0.02)
+        larger = np.maximum(np.linspace(0.0, 1.0, ASPECT_ROWS), floor) ** 2
+        big = np.tile(larger, ASPECTS)
+        small = np.repeat(aspect**2, ASPECT_ROWS) * big
+        y = np.cos(np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS)
+        to_powers = np.linalg.pinv(np.vander(y, HARMONICS, increasing=True))
+        by_azimuth = []
+        for value in y:
+            cos2, sin2, seen = _azimuth(value, big, small)
+            phi = np.arctan2(np.sqrt(sin2), np.sqrt(cos2))
+
+            def missing(mu: np.ndarray, phi: np.ndarray = phi) -> np.ndarray:
+                at = quadrature.moments(ndf, masking, mu, big[:, None], small[:, None], phi[:, None], nodes=(28, 28))
+                return 1.0 - at.whole
+
+            by_azimuth.append(fit(form, _numpy_knee(form, masking, seen), missing, nodes=24)[:, :-1])
+        found = np.einsum("jy,yrk->rkj", to_powers, np.array(by_azimuth))
+        # M_avg: over azimuth and cosine, of the fit itself
+        turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
+        node, weight = gauss(64)
+        average = np.zeros(len(big))
+        for phi in turns:
+            cos2, sin2 = np.cos(phi) ** 2, np.sin(phi) ** 2
+            seen = np.sqrt(big**2 * cos2 + small**2 * sin2)
+            here = (big * cos2 - small * sin2) / (big * cos2 + small * sin2)
+            rows = np.einsum("rkj,rj->rk", found, here[:, None] ** np.arange(HARMONICS))
+            values = evaluate(form, rows, _numpy_knee(form, masking, seen), node[None, :] ** 2)
+            average += values @ (4.0 * weight * node**3) / len(turns)
+        table = np.zeros((len(big), TURNED))
+        table[:, : (DEGREE + 1) * HARMONICS] = found.reshape(len(big), -1)
+        table[:, -1] = average
+        return table.reshape(ASPECTS, ASPECT_ROWS, TURNED)
+
+    key = ("turned", VERSION, ndf, masking, ASPECTS, ASPECT_ROWS, HARMONICS, DEGREE)
+    return Table(f"missing_turned_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build, ndf))
+
+
+def _azimuth(y: float, big: np.ndarray, small: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(cos^2 phi, sin^2 phi, alpha_phi) at y = cos(2 phi')."""
+    # tan^2(phi) = (1 - y) / (1 + y) big / small
+    cos2 = small * (1.0 + y) / (small * (1.0 + y) + big * (1.0 - y))
+    return cos2, 1.0 - cos2, np.sqrt(big**2 * cos2 + small**2 * (1.0 - cos2))
+
+
 GLASS_ETAS = 21  # at equal steps of sqrt(F0) = (eta - 1) / (eta + 1)
 GLASS_ROWS = 33
 LARGEST_ROOT = 2.0 / 3.0  # eta = 5

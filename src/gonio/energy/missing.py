@@ -13,7 +13,9 @@ from ..errors import InputError
 from ..models import BSDF, microfacet
 from ..models.conductor import Conductor
 from ..models.dielectric import Dielectric
-from ..ops import abs, clamp, copysign, inset, lookup, maximum, mean, safe_div, sincos, sqr, sqrt, vec3, where
+from ..ops import abs, clamp, copysign, inset, lookup, maximum, mean, minimum, safe_div, sincos, sqr, sqrt, vec3, where
+from ..ops import backend
+from ..optics import frame
 from . import curves, fresnel_average
 
 # M_avg below this is less than the polynomials' own error: nothing is missing
@@ -35,10 +37,13 @@ def rule(base: Any) -> Any:
     return Glass if base.transmits else Metal
 
 
-def anisotropic(base: Any) -> bool:
-    """Whether the base was given two widths; known before anything runs."""
-    alpha = base.__dict__.get("_given_alpha", base.alpha)
-    return isinstance(alpha, tuple | list) and alpha[0] is not alpha[1]
+def turned(base: BSDF) -> bool:
+    """Whether an unbound base has, or may have, two widths that differ; it shapes the code."""
+    alpha = base.alpha  # type: ignore[attr-defined]
+    if isinstance(alpha, tuple | list):
+        plain = all(isinstance(a, int | float) for a in alpha)
+        return not (plain and alpha[0] == alpha[1])
+    return backend.is_drjit(alpha) and backend.drjit().is_vector_v(alpha)
 
 
 class Metal:
@@ -49,29 +54,63 @@ class Metal:
         """Polynomial of M, its average, and f_add / (pi M_avg)."""
         base = material.base
         alpha, _ = microfacet.widths(base.alpha)
-        width = alpha.x
+        two = material.turned
+        width = sqrt(alpha.x * alpha.y) if two else alpha.x
         found = curves.coefficients(base.ndf, base.masking, width)
         form = curves.form_of(base.masking)
         bend = curves.knee(form, base.masking, width)
-        average = maximum(found[-1], 0.0)
+        average = lobe_average = maximum(found[-1], 0.0)
+        more: dict[str, Any] = {}
+        if two:
+            big, small = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
+            at = (inset(sqrt(small / big), curves.ASPECTS), inset(sqrt(big), curves.ASPECT_ROWS))
+            channels = lookup(curves.anisotropic(base.ndf, base.masking), *at)
+            average = maximum(channels[-1], 0.0)
+            more = {"turned": channels[:-1], "along": where(alpha.x >= alpha.y, 1.0, -1.0), "alpha": alpha}
         f_avg, albedo = _reflectance_average(material)
         added = _bounces(getattr(material, "color", "bounce"), f_avg, 1.0 - average) * albedo
-        scale = safe_div(ops.inv_pi, where(average > NOTHING, average, 0.0))
         return {
             "missing": found[:-1],
             "bend": bend,
             "top": 2.0 / curves.squeeze(form, 1.0 + 0.0 * width, bend),
-            "scale": scale,
-            "added": added * scale,
+            "scale": _scale(lobe_average),
+            "added": added * _scale(average),
             "ratio": safe_div(mean(added), maximum(mean(f_avg * albedo), 1e-6)),
             "row": inset(sqrt(width), curves.ROWS),
+            **more,
         }
+
+    @staticmethod
+    def _isotropic(material: Any, found: dict[str, Any], w: Any) -> Any:
+        """M at a direction, of the mean of the widths; 0 below the surface."""
+        form = curves.form_of(material.base.masking)
+        value = curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
+        return where(w.z > 0.0, value, 0.0)
 
     @staticmethod
     def missing(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction; 0 below the surface."""
-        form = curves.form_of(material.base.masking)
-        value = curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
+        if not material.turned:
+            return Metal._isotropic(material, found, w)
+        base, alpha = material.base, found["alpha"]
+        w = frame.rotate(w, base.rotation)
+        sin2 = maximum(frame.sin2(w), 1e-12)
+        along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
+        y = (alpha.x * along_x - alpha.y * along_y) / (alpha.x * along_x + alpha.y * along_y) * found["along"]
+        # at the normal itself there is no azimuth: any will do
+        y = where(frame.sin2(w) > 1e-12, y, 0.0)
+        seen = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, sqr(microfacet.SMOOTH)))
+        rows = []
+        for power in range(curves.DEGREE + 1):
+            first = power * curves.HARMONICS
+            value = found["turned"][first + curves.HARMONICS - 1]
+            for step in range(curves.HARMONICS - 2, -1, -1):
+                value = value * y + found["turned"][first + step]
+            rows.append(value)
+        form = curves.form_of(base.masking)
+        bend = curves.knee(form, base.masking, seen)
+        top = 2.0 / curves.squeeze(form, 1.0 + 0.0 * bend, bend)
+        value = curves.missing(form, tuple(rows), bend, top, maximum(w.z, 1e-6))
         return where(w.z > 0.0, value, 0.0)
 
     @staticmethod
@@ -83,14 +122,14 @@ class Metal:
     @staticmethod
     def share(material: Any, found: dict[str, Any], wo: Any) -> Any:
         """Probability of the broad lobe: the power it carries over all the power, at the mean colour."""
-        m_o = where(found["scale"] > 0.0, Metal.missing(material, found, wo), 0.0)
+        m_o = where(found["scale"] > 0.0, Metal._isotropic(material, found, wo), 0.0)
         given = m_o * found["ratio"]
         return safe_div(given, given + (1.0 - m_o))
 
     @staticmethod
     def pdf(material: Any, found: dict[str, Any], wo: Any, wi: Any) -> Any:
-        """M(mu_i) mu_i / (pi M_avg)."""
-        return Metal.missing(material, found, wi) * maximum(wi.z, 0.0) * found["scale"]
+        """M(mu_i) mu_i / (pi M_avg); of the mean of two widths."""
+        return Metal._isotropic(material, found, wi) * maximum(wi.z, 0.0) * found["scale"]
 
     @staticmethod
     def sample(material: Any, found: dict[str, Any], wo: Any, u: Any) -> Any:
@@ -105,6 +144,12 @@ class Metal:
     def eta(material: Any, wo: Any, wi: Any) -> Any:
         """Index on wi's side over index on wo's side."""
         return 1.0 + 0.0 * wo.z
+
+
+def _scale(average: Any) -> Any:
+    """1 / (pi M_avg), or 0 where nothing is missing."""
+    some = average > NOTHING
+    return where(some, ops.inv_pi / where(some, average, 1.0), 0.0)
 
 
 def either(a: Any, b: Any) -> Any:

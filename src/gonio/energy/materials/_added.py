@@ -15,7 +15,18 @@ ALMOST_ONE = 0.99999994  # the largest float32 under 1
 class _Added(BSDF):
     """base + `_extra`, sampled by a mixture of the base and of the rule's broad lobes."""
 
-    base: BSDF = bsdf("the material to be compensated")
+    base: BSDF = bsdf("the material to be compensated: a conductor or a dielectric")
+    _takes_glass = True  # whether the base may transmit
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        missing.check_base(self.base, f"{type(self).__name__}.base", self._takes_glass)
+        self.__dict__["_turned"] = missing.turned(self.base)
+
+    @property
+    def turned(self) -> bool:
+        """Whether the base has two widths; known before anything runs."""
+        return self.__dict__["_turned"]
 
     @property
     def transmits(self) -> bool:

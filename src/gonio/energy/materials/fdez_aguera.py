@@ -22,10 +22,7 @@ class FdezAguera(_Added):
 
     breaks = {"reciprocity": Breach("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)}
     lossless = 2e-3
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        missing.check_base(self.base, "FdezAguera.base", transmitting=False)
+    _takes_glass = False
 
     def derive(self) -> Any:
         """What does not depend on directions."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...models.base import choice
-from .. import fresnel_average, missing
+from .. import fresnel_average
 from ._added import _Added
 
 COLORS = {
@@ -31,7 +31,3 @@ class KullaConty(_Added):
     average: str = choice("exact", "how F_avg is found", fresnel_average.KINDS)
     # of a white furnace: metals keep 5e-4 (Beckmann's rational fit), glass 2e-3 and near eta = 1.1 1.4e-2
     lossless = 0.015
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        missing.check_base(self.base, "KullaConty.base", transmitting=True)

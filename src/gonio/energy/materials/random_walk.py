@@ -26,7 +26,6 @@ class RandomWalk(_Added):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        missing.check_base(self.base, "RandomWalk.base", transmitting=True)
         if (self.base.ndf, self.base.masking) != ("ggx", "smith-correlated"):
             what = f"{self.base.ndf} with {self.base.masking} given, ggx with smith-correlated expected"
             raise InputError(what, "RandomWalk.base", "the walk's first bounce is exactly that")

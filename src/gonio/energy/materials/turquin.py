@@ -25,6 +25,12 @@ class Turquin(BSDF):
     def __post_init__(self) -> None:
         super().__post_init__()
         missing.check_base(self.base, "Turquin.base", transmitting=False)
+        self.__dict__["_turned"] = missing.turned(self.base)
+
+    @property
+    def turned(self) -> bool:
+        """Whether the base has two widths."""
+        return self.__dict__["_turned"]
 
     @property
     def delta(self) -> str:
