@@ -114,7 +114,8 @@ def test_registering_twice_does_nothing() -> None:
 
 
 def test_a_sheared_rectangle_is_not_taken_for_a_rectangle() -> None:
-    straight = mi.load_dict({"type": "rectangle", "to_world": T().rotate([1, 0, 0], 40).rotate([0, 0, 1], 20).scale([1, 3, 1])})
+    turned = T().rotate([1, 0, 0], 40).rotate([0, 0, 1], 20).scale([1, 3, 1])
+    straight = mi.load_dict({"type": "rectangle", "to_world": turned})
     assert lights.is_rectangle(mi, straight)
     sheared = mi.load_dict(
         {"type": "rectangle", "to_world": T([[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])}

@@ -80,9 +80,8 @@ class SphericalRectangle:
         self.z0 = -dr.abs(dr.dot(offset, rectangle.normal))
         zz = dr.square(self.z0)
         xx0, xx1, yy0, yy1 = dr.square(self.x0), dr.square(self.x1), dr.square(self.y0), dr.square(self.y1)
-        # z components of the normals of the four planes through the origin and an edge.
+        # z components of the normals of the planes through the origin and an edge: v = y0, y1 and u = x0.
         self.n0 = -self.y0 * dr.rsqrt(yy0 + zz)
-        n1 = self.x1 * dr.rsqrt(xx1 + zz)
         self.n2 = self.y1 * dr.rsqrt(yy1 + zz)
         n3 = -self.x0 * dr.rsqrt(xx0 + zz)
         self.k = 2 * dr.pi - dr.acos(-self.n2 * n3) - dr.acos(-n3 * self.n0)
