@@ -1,0 +1,54 @@
+"""go.albedo: closed forms, agreement of its three ways, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gonio as go
+
+
+def test_lambert_and_mirror_have_closed_forms():
+    found = go.albedo(go.Lambert((0.2, 0.5, 0.9)), [0.1, 1.0])
+    assert found.method == "closed-form"
+    np.testing.assert_allclose(found.value, [[0.2, 0.5, 0.9]] * 2)
+    np.testing.assert_allclose(go.albedo(go.Mirror(0.9), 0.3).value, 0.9, rtol=1e-6)
+    np.testing.assert_allclose(go.albedo(go.Dielectric(1.5, 0.0), [-0.4, 0.4]).value, 1.0)
+
+
+def test_a_mix_of_closed_forms_is_one():
+    found = go.albedo(go.mix(go.Lambert(0.5), go.Mirror(), 0.25), 0.7)
+    assert found.method == "closed-form"
+    np.testing.assert_allclose(found.value, 0.625, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        go.OrenNayar(0.8, 0.5),
+        go.Phong(0.1, 0.4, 80.0),
+        go.Conductor.preset("Au", alpha=0.2),
+        go.Conductor.preset("Au", alpha=(0.1, 0.5), rotation=0.4),
+        go.Dielectric(1.5, 0.3),
+        go.mix(go.Lambert(0.5), go.Conductor.preset("Cu", alpha=0.1), 0.4),
+    ],
+    ids=lambda m: m.name,
+)
+def test_quadrature_agrees_with_the_models_own_sampling(model):
+    exact = go.albedo(model, [0.2, 0.9], 0.3)
+    drawn = go.albedo(model, [0.2, 0.9], 0.3, method="sampling", samples=1 << 17)
+    assert exact.method == "quadrature"
+    assert np.all(np.abs(exact.value - drawn.value) < 6.0 * drawn.error + 1e-4)
+
+
+def test_bad_input_is_one_clear_error():
+    with pytest.raises(go.InputError, match="a material expected"):
+        go.albedo("gold", 0.5)  # type: ignore[arg-type]
+    with pytest.raises(go.InputError, match="unknown method"):
+        go.albedo(go.Lambert(), 0.5, method="guess")
+    with pytest.raises(go.InputError, match="cosine"):
+        go.albedo(go.Lambert(), 1.5)
+    with pytest.raises(go.InputError, match="one value a ray"):
+        go.albedo(go.Conductor(alpha=np.array([0.1, 0.2])), 0.5)
+    with pytest.raises(go.InputError, match="no closed form"):
+        go.albedo(go.OrenNayar(), 0.5, method="closed-form")

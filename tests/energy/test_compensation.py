@@ -1,0 +1,224 @@
+"""Materials that keep what they receive: white furnaces, reciprocity, sampling, colour, and what they refuse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gonio as go
+from gonio import ops
+from gonio.energy import curves, fresnel_average, quadrature, split_sum, walk
+
+MU = np.array([0.05, 0.1, 0.2, 0.4, 0.7, 1.0])
+NODE, WEIGHT = quadrature.gauss(96)
+COS = NODE**2  # dense at grazing
+RING = np.stack([np.sqrt(1.0 - COS**2), 0.0 * COS, COS], axis=1)
+
+
+def direction(mu, phi=0.0):
+    s = np.sqrt(1.0 - mu * mu)
+    return np.array([[s * np.cos(phi), s * np.sin(phi), mu]])
+
+
+def whole_albedo(model, mu):
+    """Base by its own quadrature, the rest (isotropic about the normal) by Gauss-Legendre over the cosine."""
+    total = go.albedo(model.base, mu).value[0]
+    for side in (1.0, -1.0) if model.transmits else (1.0,):
+        wi = RING * [1.0, 1.0, side]
+        both = [m.eval(direction(mu), wi, mode="importance", precision="float64") for m in (model, model.base)]
+        total = total + 2.0 * np.pi * np.einsum("nc,n->c", both[0] - both[1], 2.0 * NODE * WEIGHT)
+    return total
+
+
+@pytest.mark.parametrize("masking", ["smith-correlated", "smith-separable"])
+@pytest.mark.parametrize("ndf", ["ggx", "beckmann"])
+def test_white_furnace_of_metal_is_closed(ndf, masking):
+    for roughness in (0.05, 0.13, 0.31, 0.55, 0.8, 1.0):
+        metal = go.KullaConty(go.Conductor(alpha=roughness**2, ndf=ndf, masking=masking, fresnel="one"))
+        for mu in MU:
+            assert whole_albedo(metal, mu) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("eta", [1.5, 1 / 1.5, 1.33])
+def test_white_furnace_of_glass_is_closed_on_both_sides(eta):
+    for alpha in (0.05, 0.2, 0.5, 1.0):
+        glass = go.KullaConty(go.Dielectric(eta, alpha))
+        for mu in (*MU, *-MU):
+            assert 0.995 <= whole_albedo(glass, mu)[0] <= 1.002
+
+
+def test_a_metal_with_two_widths_keeps_its_energy():
+    metal = go.KullaConty(go.Conductor(alpha=(0.1, 0.4), fresnel="one", rotation=0.3))
+    phi = (np.arange(48) + 0.5) / 48 * 2 * np.pi
+    turned = np.array([[r[0] * np.cos(p), r[0] * np.sin(p), r[2]] for r in RING for p in phi])
+    for mu, at in ((0.1, 0.0), (0.5, 1.0), (0.9, 2.0)):
+        both = [m.eval(direction(mu, at), turned, precision="float64")[:, 0] for m in (metal, metal.base)]
+        added = 2.0 * np.pi * np.sum((both[0] - both[1]).reshape(len(RING), -1).mean(1) * 2.0 * NODE * WEIGHT)
+        assert go.albedo(metal.base, mu, at).value[0, 0] + added == pytest.approx(1.0, abs=3e-3)
+
+
+@pytest.mark.parametrize(
+    "base",
+    [go.Conductor.preset("Au", alpha=0.5), go.Conductor.preset("Cu", alpha=(0.2, 0.6)), go.Dielectric(1.5, 0.5)],
+    ids=["metal", "turned", "glass"],
+)
+def test_kulla_conty_is_reciprocal(base):
+    model = go.KullaConty(base)
+    rng = np.random.default_rng(3)
+    v = rng.normal(size=(500, 3))
+    v /= np.linalg.norm(v, axis=1)[:, None]
+    w = v[::-1]
+    if not base.transmits:
+        v, w = np.abs(v), np.abs(w)
+    index = lambda d: np.where(d[:, 2:] > 0, 1.0, 1.5**2 if base.transmits else 1.0)
+    forth = model.f(v, w, precision="float64") / index(v)
+    back = model.f(w, v, precision="float64") / index(w)
+    np.testing.assert_allclose(forth, back, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("cls", [go.KullaConty, go.Turquin, go.FdezAguera])
+@pytest.mark.parametrize("alpha", [0.1, 0.7, (0.2, 0.5)])
+def test_weight_is_eval_over_pdf_and_pdf_integrates_to_one(cls, alpha):
+    model = cls(go.Conductor.preset("Au", alpha=alpha))
+    wo = direction(0.6, 0.4)
+    rng = np.random.default_rng(1)
+    s = model.sample(wo, rng.random((2000, 3)), precision="float64")
+    good = s.pdf > 0
+    expected = model.eval(wo, s.wi, precision="float64")[good]
+    expected /= model.pdf(wo, s.wi, precision="float64")[good, None]
+    np.testing.assert_allclose(s.weight[good], expected, rtol=1e-9)
+    drawn = go.albedo(model, 0.6, 0.4, method="sampling", samples=1 << 17)
+    exact = go.albedo(model, 0.6, 0.4)
+    assert np.all(np.abs(drawn.value - exact.value) < 6 * drawn.error + 5e-4)
+
+
+def test_broad_lobe_is_drawn_with_the_density_it_claims():
+    model = go.KullaConty(go.Conductor(alpha=0.8, fresnel="one"))
+    wo = direction(0.9)
+    s = model.sample(wo, np.random.default_rng(5).random((400_000, 3)))
+    good = s.pdf > 0
+    counts, edges = np.histogram(s.wi[good, 2], bins=20, range=(0, 1))
+    phi = (np.arange(256) + 0.5) / 256 * 2 * np.pi
+    for count, a, b in zip(counts, edges[:-1], edges[1:], strict=True):
+        z = a + (b - a) * quadrature.gauss(8)[0]
+        grid = np.array([[np.sqrt(1 - c * c) * np.cos(p), np.sqrt(1 - c * c) * np.sin(p), c] for c in z for p in phi])
+        density = model.pdf(wo, grid).reshape(8, -1).mean(1) * 2 * np.pi
+        expected = (density @ quadrature.gauss(8)[1]) * (b - a) * len(s.pdf)
+        assert abs(count - expected) < 5 * np.sqrt(expected) + 0.004 * expected
+
+
+def test_the_term_vanishes_as_alpha_does():
+    base = go.Conductor(alpha=2e-4, fresnel="one")
+    wo, wi = direction(0.5), direction(0.4, 2.0)
+    assert np.all(go.KullaConty(base).eval(wo, wi) - base.eval(wo, wi) < 1e-5)
+    smooth = go.KullaConty(go.Conductor(alpha=0.0, fresnel="one"))
+    s = smooth.sample(wo, np.array([[0.3, 0.3, 0.3]]))
+    assert s.delta[0]
+    assert s.weight[0, 0] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_polynomials_meet_the_quadrature():
+    mu = np.linspace(0.01, 1.0, 60)
+    roughness = np.linspace(0.05, 1.0, 37)
+    for ndf, masking, bar in (
+        ("ggx", "smith-correlated", 2e-4),
+        ("beckmann", "smith-correlated", 2e-4),
+        ("beckmann", "smith-separable", 8e-4),
+        ("ggx", "schlick-direct", 2e-4),
+    ):
+        rows = np.array(ops.lookup(curves.isotropic(ndf, masking), ops.inset(roughness, curves.ROWS))).T
+        form = curves.form_of(masking)
+        bend = curves._numpy_knee(form, masking, roughness**2)
+        ours = curves.evaluate(form, rows[:, :-1], bend, np.broadcast_to(mu, (37, 60)))
+        exact = 1.0 - quadrature.moments(ndf, masking, mu, roughness[:, None] ** 2).whole
+        assert np.abs(ours - exact).max() < bar
+
+
+def test_average_fresnel_has_its_closed_forms():
+    assert fresnel_average.schlick(0.04) == pytest.approx(0.04 + 0.96 / 21)
+    n = 1.5  # Walsh1926, as Duntley1942 gives it
+    closed = 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2)
+    closed += n**2 * (n**2 - 1) ** 2 / (n**2 + 1) ** 3 * np.log((n - 1) / (n + 1))
+    closed -= 2 * n**3 * (n**2 + 2 * n - 1) / ((n**2 + 1) * (n**4 - 1))
+    closed += 8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n)
+    assert fresnel_average.dielectric(n) == pytest.approx(closed, abs=1e-7)
+
+
+def test_the_imageworks_fit_is_within_a_percent_of_the_integral():
+    for metal in ("Au", "Ag", "Cu", "Al", "Fe", "Ti"):
+        m = go.Conductor.preset(metal)
+        for eta, k in zip(m.eta, m.k, strict=True):
+            exact = fresnel_average.integral(lambda mu, eta=eta, k=k: fresnel_average.fresnel.conductor(mu, eta, k))
+            assert fresnel_average.imageworks(*fresnel_average.edge_tint(eta, k)) == pytest.approx(exact, abs=0.01)
+
+
+def test_colours_agree_in_a_furnace_and_differ_on_gold():
+    wo, wi = direction(0.5), direction(0.4, 2.0)
+    white = go.Conductor(alpha=0.8, fresnel="one")
+    sheet, bounce = (go.KullaConty(white, color=c).eval(wo, wi) for c in ("sheet", "bounce"))
+    np.testing.assert_allclose(sheet, bounce, rtol=1e-6)
+    gold = go.Conductor.preset("Au", alpha=0.8)
+    sheet, bounce = (go.KullaConty(gold, color=c).eval(wo, wi) for c in ("sheet", "bounce"))
+    assert np.all(sheet > bounce)
+
+
+@pytest.mark.parametrize("alpha", [0.3, 1.0])
+def test_the_walk_returns_what_it_was_given(alpha):
+    for base in (go.Conductor(alpha=alpha, fresnel="one"), go.Dielectric(1.5, alpha)):
+        mean, _ = walk.albedo(base, 0.4, 100_000)
+        np.testing.assert_allclose(mean, 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "base",
+    [go.Conductor(alpha=0.8, fresnel="one"), go.Conductor.preset("Au", alpha=0.8), go.Dielectric(1.5, 0.5)],
+    ids=["white", "gold", "glass"],
+)
+def test_the_walks_eval_has_the_walks_albedo(base):
+    drawn = go.albedo(go.RandomWalk(base), 0.5, method="sampling", samples=1 << 18)
+    mean, error = walk.albedo(base, 0.5, 400_000)
+    assert np.all(np.abs(drawn.value[0] - mean) < 4 * np.hypot(drawn.error[0], error) + 1e-6)
+
+
+def test_bounce_is_nearer_to_the_walk_than_sheet_on_gold():
+    gold = go.Conductor.preset("Au", alpha=0.8)
+    away = {"sheet": 0.0, "bounce": 0.0}
+    for mu in (0.2, 0.5, 0.9):
+        mean, _ = walk.albedo(gold, mu, 400_000)
+        for color in away:
+            away[color] += np.abs(whole_albedo(go.KullaConty(gold, color=color), mu) - mean).sum()
+    assert away["bounce"] < away["sheet"]
+
+
+def test_scaling_methods_close_the_furnace():
+    for cls in (go.Turquin, go.FdezAguera):
+        for alpha in (0.1, 0.6, 1.0):
+            model = cls(go.Conductor(alpha=alpha, fresnel="one"))
+            np.testing.assert_allclose(go.albedo(model, MU).value, 1.0, atol=2e-3)
+
+
+def test_a_constant_environment_stays_constant_when_prefiltered():
+    for level in split_sum.prefilter(np.full((16, 32, 3), 0.7), 4, 64):
+        np.testing.assert_allclose(level, 0.7)
+
+
+def test_recorded_graph_agrees_with_the_64_bit_twin():
+    model = go.KullaConty(go.Conductor.preset("Au", alpha=0.4))
+    graph = model.record("eval")
+    wo, wi = direction(0.5), direction(0.7, 1.0)
+    values = {"self_base_eta": np.array(model.base.eta)[:, None], "self_base_k": np.array(model.base.k)[:, None]}
+    values |= {"self_base_alpha": np.array([[0.4], [0.4]]), "self_base_albedo": np.ones((3, 1))}
+    found = graph.evaluate(wo=wo.T, wi=wi.T, **values)
+    np.testing.assert_allclose(np.asarray(found).ravel(), model.eval(wo, wi, precision="float64").ravel(), rtol=1e-12)
+
+
+def test_bases_that_cannot_be_compensated_are_refused():
+    with pytest.raises(go.InputError, match="Conductor or Dielectric expected"):
+        go.KullaConty(go.Lambert())
+    for cls in (go.Turquin, go.FdezAguera):
+        with pytest.raises(go.InputError, match="transmits"):
+            cls(go.Dielectric())
+    with pytest.raises(go.InputError, match="smith-correlated expected"):
+        go.RandomWalk(go.Conductor(ndf="beckmann"))
+    with pytest.raises(go.InputError, match="unknown color"):
+        go.KullaConty(go.Conductor(), color="gold")
