@@ -234,6 +234,8 @@ def test_mix_is_the_weighted_average() -> None:
     mixed = go.mix(a, b, 0.25).eval(WO, WI, precision="float64")
     expected = 0.75 * a.eval(WO, WI, precision="float64") + 0.25 * b.eval(WO, WI, precision="float64")
     np.testing.assert_allclose(mixed, expected, rtol=1e-13)
+    pdf = 0.75 * a.pdf(WO, WI, precision="float64") + 0.25 * b.pdf(WO, WI, precision="float64")
+    np.testing.assert_allclose(go.mix(a, b, 0.25).pdf(WO, WI, precision="float64"), pdf, rtol=1e-13)
     for weight, alone in ((0.0, a), (1.0, b)):
         s, t = (m.sample(WO, random_numbers(COUNT, 77), precision="float64") for m in (go.mix(a, b, weight), alone))
         np.testing.assert_allclose(s.wi, t.wi, atol=1e-6)  # the stretched number is cut at the largest float32 under 1

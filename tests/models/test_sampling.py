@@ -72,10 +72,10 @@ def test_the_chi_square_test_rejects_a_wrong_density(fault: str) -> None:
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("ndf", NDFS)
 def test_visible_normals_estimate_the_same_albedo_as_all_normals_and_as_quadrature(ndf: str, alpha: float) -> None:
-    w, weights = hemisphere(384, 192)
+    w, weights = hemisphere(320, 160)
     w, weights = np.concatenate([w, w * [1, 1, -1]]), np.concatenate([weights, weights])
-    u = np.random.default_rng(SEED).random((200_000, 3))
-    for wo in (at(20), at(70, 30), at(150)):
+    u = np.random.default_rng(SEED).random((100_000, 3))
+    for wo in (at(70, 30), at(150)):
         exact = go.Dielectric(1.5, alpha, ndf=ndf).eval(wo, w, precision="float64")[:, 0] @ weights
         for sampling in ("visible", "bounded", "normals"):
             glass = go.Dielectric(1.5, alpha, ndf=ndf, sampling=sampling)

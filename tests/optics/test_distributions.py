@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.special
 from gonio import ops
 from gonio.errors import InputError
 from gonio.ops import backend
@@ -120,6 +121,23 @@ def test_visible_normals_follow_their_density_which_integrates_to_one(name: str,
         return ops.where(ops.dot(w, v) > 0.0, ndf.pdf_visible(v, w, widths), 0.0)
 
     assert _chi_square(facing, normals) > SIGNIFICANCE
+
+
+@pytest.mark.parametrize("degrees", [5.0, 45.0, 75.0, 85.0])
+def test_beckmanns_visible_slopes_invert_their_distribution_function(degrees: float) -> None:
+    """With u2 = 1/2 the normal lies in the plane of v, and its slope x has c(x) = u1 c(cot) (Heitz2014b, sec. 5)."""
+    v, u1 = at(degrees), np.linspace(0.01, 0.99, 500)
+    m = distribution("beckmann").sample_visible(
+        vector(v), KIND.float(u1), KIND.float(np.full(500, 0.5)), vector(np.array([1.0, 1.0]))
+    )
+    x = -m.numpy()[0] / m.numpy()[2]
+    np.testing.assert_allclose(m.numpy()[1], 0.0, atol=1e-9)
+    tan = np.tan(np.radians(degrees))
+
+    def c(slope: Any) -> Any:
+        return 0.5 * (1 + scipy.special.erf(slope)) + 0.5 * tan * np.exp(-np.square(slope)) / np.sqrt(np.pi)
+
+    np.testing.assert_allclose(c(x) / c(1 / tan), u1, atol=1e-7)
 
 
 @pytest.mark.parametrize("degrees", [10.0, 60.0, 85.0])

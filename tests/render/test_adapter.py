@@ -152,6 +152,15 @@ def test_transport_mode_reaches_the_model() -> None:
     assert np.array(values[1])[0, 0] == pytest.approx(2.25 * np.array(values[0])[0, 0], rel=1e-5)
 
 
+def test_transport_mode_reaches_native_children() -> None:
+    glass = {"type": "roughdielectric", "distribution": "ggx", "alpha": 0.3, "int_ior": 1.5, "ext_ior": 1.0}
+    nested = mi.load_dict({"type": "gonio_mix", "a": glass, "b": {"type": "gonio_lambert"}, "weight": 0.0})
+    si, wi = _interaction(np.tile(at(20), (1, 1))), mi.Vector3f(mi.Point3f(at(170)))
+    for mode in (mi.TransportMode.Radiance, mi.TransportMode.Importance):
+        alone = mi.load_dict(glass).eval(mi.BSDFContext(mode), si, wi)
+        np.testing.assert_allclose(np.array(nested.eval(mi.BSDFContext(mode), si, wi)), np.array(alone), rtol=1e-5)
+
+
 def test_textures_vary_every_kind_of_parameter() -> None:
     """A checkerboard: two places, two values, each as of a plain plugin."""
 
