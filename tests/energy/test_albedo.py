@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
-
-import gonio as go
 
 
 def test_lambert_and_mirror_have_closed_forms():

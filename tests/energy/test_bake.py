@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import gonio as go
 import numpy as np
 import pytest
-
-import gonio as go
 from gonio.energy import bake as baking
 from gonio.energy import cache, quadrature
 from gonio.render import tables
@@ -18,7 +17,6 @@ REFERENCE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "kull
 
 def read_png(path):
     import mitsuba as mi
-
     from gonio.render import engine
 
     engine.load("cpu")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
-
-import gonio as go
 from gonio import ops
 from gonio.energy import curves, fresnel_average, quadrature, split_sum, walk
 
@@ -70,7 +69,10 @@ def test_kulla_conty_is_reciprocal(base):
     w = v[::-1]
     if not base.transmits:
         v, w = np.abs(v), np.abs(w)
-    index = lambda d: np.where(d[:, 2:] > 0, 1.0, 1.5**2 if base.transmits else 1.0)
+
+    def index(d):
+        return np.where(d[:, 2:] > 0, 1.0, 1.5**2 if base.transmits else 1.0)
+
     forth = model.f(v, w, precision="float64") / index(v)
     back = model.f(w, v, precision="float64") / index(w)
     np.testing.assert_allclose(forth, back, rtol=1e-6, atol=1e-12)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import gonio as go
 import numpy as np
 import pytest
-
-import gonio as go
 from gonio.energy import monte_carlo, quadrature
 
 CENTRES = (np.arange(64) + 0.5) / 64

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import gonio as go
 import numpy as np
 import pytest
+from gonio.energy import quadrature
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
-
-import gonio as go
-from gonio.energy import quadrature
 
 MASKINGS = ("smith-correlated", "smith-separable", "schlick-direct", "schlick-ibl")
 
@@ -50,8 +51,8 @@ def independent(ndf: str, masking: str, mu: float, alpha: float) -> float:
     total = 0.0
     edges = sorted({0.0, max(peak - 4 * alpha, 0.0), peak, min(peak + 4 * alpha, np.pi / 2), np.pi / 2})
     cuts = [np.pi, max(np.pi - 4 * alpha, 0.0), 0.0][::-1]
-    for a, b in zip(edges, edges[1:], strict=False):
-        for p, q in zip(cuts, cuts[1:], strict=False):
+    for a, b in pairwise(edges):
+        for p, q in pairwise(cuts):
             total += integrate.dblquad(integrand, a, b, p, q, epsabs=2e-7, epsrel=2e-7)[0]
     return total
 
