@@ -98,7 +98,7 @@ def bake(
             what, "--spp" if spp < 1 else "--method", "give 1 or more" if spp < 1 else "leave --method out"
         )
 
-    roughness, mu = axes(layout, masking, size)
+    roughness, mu = axes(layout, ndf, masking, size)
     grid = np.broadcast_to(mu, (size, size)), np.broadcast_to(roughness[:, None] ** 2, (size, size))
     arrays: dict[str, np.ndarray] = {}
     errors: dict[str, dict[str, float]] = {}
@@ -132,7 +132,7 @@ def bake(
         "size": size,
         "layout": layout,
         "alpha": "roughness^2",
-        "axes": _axes_text(layout, masking),
+        "axes": _axes_text(layout, ndf, masking),
         "texels": "bilinear between texel centres at (j + 1/2) / N in texture coordinates, clamped at the edges",
         "tables": {name: list(array.shape) for name, array in arrays.items()},
         "error": errors,
@@ -153,30 +153,31 @@ def check_size(size: int) -> None:
         raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {LARGEST}")
 
 
-def axes(layout: str, masking: str, size: int) -> tuple[np.ndarray, np.ndarray]:
+def axes(layout: str, ndf: str, masking: str, size: int) -> tuple[np.ndarray, np.ndarray]:
     """(roughness (N,), mu (N,) or, where stretched, (N, N) by row)."""
     centres = (np.arange(size) + 0.5) / size
     if layout == "linear":
         return centres, centres
     ends = np.linspace(0.0, 1.0, size) if size > 1 else np.ones(1)
-    return ends, stretched_mu(masking, ends[:, None], ends[None, :])
+    return ends, stretched_mu(ndf, masking, ends[:, None], ends[None, :])
 
 
-def stretched_mu(masking: str, roughness: np.ndarray, x: np.ndarray) -> np.ndarray:
+def stretched_mu(ndf: str, masking: str, roughness: np.ndarray, x: np.ndarray) -> np.ndarray:
     """The cosine at a place x in [0, 1] of the stretched axis."""
-    form = curves.form_of(masking)
+    form = curves.form_of(ndf, masking)
     bend = curves._numpy_knee(form, masking, np.maximum(roughness**2, quadrature.SMALLEST_ALPHA))
     top = curves._numpy_squeeze(form, np.ones(1), bend)
     return np.clip(curves._unsqueeze(form, x * top, bend), 0.0, 1.0)
 
 
-def _axes_text(layout: str, masking: str) -> dict[str, str]:
+def _axes_text(layout: str, ndf: str, masking: str) -> dict[str, str]:
     if layout == "linear":
         return {"roughness": "row j at (j + 1/2) / N", "mu": "column j at (j + 1/2) / N"}
     form = {
         "hypot": "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))",
+        "wide": "sqrt(mu / (mu + 4 alpha))",
         "root": "sqrt(mu / (mu + 4 k)), k the masking's",
-    }[curves.form_of(masking)]
+    }[curves.form_of(ndf, masking)]
     return {"roughness": "row j at j / (N - 1)", "mu": f"column j at s(mu) / s(1) = j / (N - 1), s = {form}"}
 
 
@@ -240,7 +241,7 @@ def _interpolation_error(model: BSDF | None, ndf: str, masking: str, roughness: 
             if layout == "linear":
                 mu = ((columns + b + 0.5) / size)[None, :]
             else:
-                mu = stretched_mu(masking, r[:, None], ((columns + b) / (size - 1))[None, :])
+                mu = stretched_mu(ndf, masking, r[:, None], ((columns + b) / (size - 1))[None, :])
             mu, alpha = np.broadcast_arrays(mu, r[:, None] ** 2)
             return _exact(model, ndf, masking, mu, alpha)["E"]
 

@@ -4,7 +4,7 @@ A compensated material needs M at both directions for every pair. Two bilinear l
 whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right variable makes
 one possible. Masking changes where mu is a few alpha, so with
 
-    s(mu) = sqrt(mu / sqrt(mu^2 + (4 alpha)^2))        (metals with Smith's masking; for others see `squeeze`)
+    s(mu) = sqrt(mu / (mu + 4 alpha))        (GGX with Smith's masking; for others see `form_of`)
     x(mu) = 2 s(mu) / s(1) - 1  in [-1, 1]
 
 M is a smooth function of x whatever the width, down to a limit at alpha -> 0. Rows of a table hold the coefficients in x
@@ -25,25 +25,28 @@ from . import cache, quadrature
 from .quadrature import gauss
 
 ROWS = 129  # roughness 0 to 1; linear interpolation between them errs by 3e-5
-DEGREE = 10  # errs by 6e-5 (GGX), 1e-4 (Beckmann), 5e-4 (Beckmann's rational fit, which jumps by 5e-5)
+DEGREE = 10  # errs by 1e-4 (GGX, Beckmann), 5e-4 (Beckmann's rational fit, which jumps by 5e-5)
 CHANNELS = DEGREE + 2  # the last is M_avg
 LOBE_NODES = 64
 NODES_OF_FIT = 64
-VERSION = 2
+VERSION = 3
 
 
 # How mu is bent into s, by form:   s(mu)                              bend
-#   "hypot"  metals, Smith            sqrt(mu / sqrt(mu^2 + bend^2))     8 k = 4 alpha
+#   "wide"   metals, Smith, GGX       sqrt(mu / (mu + bend))             8 k = 4 alpha
+#   "hypot"  metals, Smith, others    sqrt(mu / sqrt(mu^2 + bend^2))     8 k = 4 alpha
 #   "root"   Schlick; glass, thin     sqrt(mu / (mu + bend))             4 k
 #   "ratio"  glass, dense             mu / (mu + bend)                   8 k
 # with k = alpha / 2, or that of schlick-direct. Chosen, like the factors, for the smallest error of the fit.
 
 
-def form_of(masking: str, side: str = "") -> str:
+def form_of(ndf: str, masking: str, side: str = "") -> str:
     """The form of a table: of a metal, or of a side of glass."""
     if side:
         return "root" if side == "thin" else "ratio"
-    return "root" if masking.startswith("schlick") else "hypot"
+    if masking.startswith("schlick"):
+        return "root"
+    return "wide" if ndf == "ggx" else "hypot"
 
 
 def knee(form: str, masking: str, alpha: Any) -> Any:
@@ -58,7 +61,8 @@ def squeeze(form: str, mu: Any, bend: Any) -> Any:
     """s(mu)."""
     if form == "hypot":
         return sqrt(mu / sqrt(sqr(mu) + sqr(bend)))
-    return sqrt(mu / (mu + bend)) if form == "root" else mu / (mu + bend)
+    ratio = mu / (mu + bend)
+    return ratio if form == "ratio" else sqrt(ratio)
 
 
 def _numpy_knee(form: str, masking: str, alpha: np.ndarray) -> np.ndarray:
@@ -121,7 +125,7 @@ def isotropic(ndf: str, masking: str) -> Table:
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
-        form = form_of(masking)
+        form = form_of(ndf, masking)
         return fit(
             form,
             _numpy_knee(form, masking, alpha),
@@ -136,7 +140,7 @@ def isotropic(ndf: str, masking: str) -> Table:
 def lobe(ndf: str, masking: str) -> Table:
     """mu^2 over (roughness, u): the inverse of the share of M mu below mu, to sample the lobe proportional to it."""
     alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
-    form = form_of(masking)
+    form = form_of(ndf, masking)
     bend = _numpy_knee(form, masking, alpha)
     inverse = _inverse(form, isotropic(ndf, masking).values[:, :-1], bend, LOBE_NODES)
     return Table(f"lobe_{ndf}_{masking}".replace("-", "_"), inverse[..., None])
@@ -159,7 +163,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
     """
 
     def build() -> np.ndarray:
-        form = form_of(masking)
+        form = form_of(ndf, masking)
         floor = np.sqrt(quadrature.SMALLEST_ALPHA)
         aspect = np.maximum(np.linspace(0.0, 1.0, ASPECTS), 0.02)
         larger = np.maximum(np.linspace(0.0, 1.0, ASPECT_ROWS), floor) ** 2
@@ -222,7 +226,7 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
         alphas, etas = np.tile(alpha, GLASS_ETAS), np.repeat(eta, GLASS_ROWS)
         sides = []
         for side, ratio in zip(SIDES, (etas, 1.0 / etas), strict=True):
-            form = form_of(masking, side)
+            form = form_of(ndf, masking, side)
 
             def missing(mu: np.ndarray, ratio: np.ndarray = ratio) -> np.ndarray:
                 power = quadrature.glass(ndf, masking, fresnel, mu, alphas[:, None], ratio[:, None])
@@ -243,7 +247,7 @@ def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
-        form = form_of(masking, side)
+        form = form_of(ndf, masking, side)
         bend = _numpy_knee(form, masking, np.tile(alpha, GLASS_ETAS))
         inverse = _inverse(form, table.values.reshape(-1, CHANNELS)[:, :-1], bend, 32)
         name = table.name.replace("missing", "lobe")

@@ -57,7 +57,7 @@ class Metal:
         two = material.turned
         width = sqrt(alpha.x * alpha.y) if two else alpha.x
         found = curves.coefficients(base.ndf, base.masking, width)
-        form = curves.form_of(base.masking)
+        form = curves.form_of(base.ndf, base.masking)
         bend = curves.knee(form, base.masking, width)
         average = lobe_average = maximum(found[-1], 0.0)
         more: dict[str, Any] = {}
@@ -83,7 +83,7 @@ class Metal:
     @staticmethod
     def _isotropic(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction, of the mean of the widths; 0 below the surface."""
-        form = curves.form_of(material.base.masking)
+        form = curves.form_of(material.base.ndf, material.base.masking)
         value = curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
         return where(w.z > 0.0, value, 0.0)
 
@@ -107,7 +107,7 @@ class Metal:
             for step in range(curves.HARMONICS - 2, -1, -1):
                 value = value * y + found["turned"][first + step]
             rows.append(value)
-        form = curves.form_of(base.masking)
+        form = curves.form_of(base.ndf, base.masking)
         bend = curves.knee(form, base.masking, seen)
         top = 2.0 / curves.squeeze(form, 1.0 + 0.0 * bend, bend)
         value = curves.missing(form, tuple(rows), bend, top, maximum(w.z, 1e-6))
@@ -205,9 +205,12 @@ class Glass:
         enters = 1.0 - fresnel_average.of_glass(base)
         total = maximum(m_thin + m_dense, 2.0 * NOTHING)
         some = (m_thin > NOTHING) & (m_dense > NOTHING) & (abs(base.eta - 1.0) > 1e-4)
-        bends = {side: curves.knee(curves.form_of(base.masking, side), base.masking, width) for side in curves.SIDES}
+        bends = {
+            side: curves.knee(curves.form_of(base.ndf, base.masking, side), base.masking, width)
+            for side in curves.SIDES
+        }
         tops = {
-            side: 2.0 / curves.squeeze(curves.form_of(base.masking, side), 1.0 + 0.0 * width, bend)
+            side: 2.0 / curves.squeeze(curves.form_of(base.ndf, base.masking, side), 1.0 + 0.0 * width, bend)
             for side, bend in bends.items()
         }
         tint = _bounces(getattr(material, "color", "bounce"), base.albedo, 1.0 - 0.5 * (m_thin + m_dense))
@@ -237,7 +240,7 @@ class Glass:
         mu = maximum(abs(w.z), 1e-6)
         sides = []
         for side in curves.SIDES:
-            form = curves.form_of(material.base.masking, side)
+            form = curves.form_of(material.base.ndf, material.base.masking, side)
             sides.append(curves.missing(form, found[side], found["bends"][side], found["tops"][side], mu))
         return where(thin, *sides)
 

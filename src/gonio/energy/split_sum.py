@@ -29,10 +29,10 @@ def schlick_table(ndf: str, masking: str) -> Table:
         from .bake import stretched_mu
 
         ends = np.linspace(0.0, 1.0, SIZE)
-        mu = stretched_mu(masking, ends[:, None], ends[None, :])
+        mu = stretched_mu(ndf, masking, ends[:, None], ends[None, :])
         return quadrature.moments(ndf, masking, mu, ends[:, None] ** 2).schlick[..., None]
 
-    key = ("schlick", 1, ndf, masking, SIZE)
+    key = ("schlick", 2, ndf, masking, SIZE)
     return Table(f"schlick_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build, ndf))
 
 
@@ -43,7 +43,7 @@ def reflected(base: Any, f0: Any, whole: Any, wo: Any) -> Any:
     """
     alpha, _ = microfacet.widths(base.alpha)
     width = sqrt(alpha.x * alpha.y)
-    form = curves.form_of(base.masking)
+    form = curves.form_of(base.ndf, base.masking)
     bend = curves.knee(form, base.masking, width)
     mu = maximum(wo.z, 1e-6)
     x = curves.squeeze(form, mu, bend) / curves.squeeze(form, 1.0 + 0.0 * mu, bend)
