@@ -50,8 +50,9 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     s2 = 2.0 * cos_i * a
     p1 = cos2 * a2_b2 + sqr(sin2)
     p2 = s2 * sin2
-    # one division for both: R_s (1 + R_p / R_s) / 2
-    return (s1 - s2) * p1 / ((s1 + s2) * (p1 + p2))
+    # one division for both: R_s (1 + R_p / R_s) / 2; 0/0 is index 0 at normal incidence, which reflects all
+    below = (s1 + s2) * (p1 + p2)
+    return ops.where(below > 0.0, (s1 - s2) * p1 / ops.where(below > 0.0, below, 1.0), 1.0)
 
 
 def r0_dielectric(eta: Any) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .. import ops
-from ..ops import exp, function, log, sqr, sqrt, where
+from ..ops import exp, function, log, minimum, sqr, sqrt, where
 
 # Giles2010, the single-precision polynomial: coefficients in falling powers.
 # fmt: off
@@ -52,8 +52,10 @@ def beta(a: Any, b: Any) -> Any:
     """Euler's beta function B(a, b) for a, b >= 1, without the cancellation of three log-gammas.
 
     Both arguments are moved up by three with B(a, b) = B(a + 1, b) (a + b) / a, then Stirling's series is taken with
-    its leading terms joined into ratios. Relative error under 1e-8 in float64, about 1e-6 in float32.
+    its leading terms joined into ratios. Relative error under 1e-8 in float64, about 1e-6 in float32. Arguments over
+    1e8 count as 1e8: the fourth power of one must stay a float32.
     """
+    a, b = minimum(a, 1e8), minimum(b, 1e8)
     ratio: Any = 1.0
     s = a + b
     for j in range(3):

@@ -42,11 +42,12 @@ class GGX(NDF):
     def D(self, m: Any, alpha: Any) -> Any:
         """GGX density of normals, 1/sr. Written in m_x, m_y: the form in m_z alone cancels at the peak.
 
-        Multiplied through by (alpha_x alpha_y)^2, so that one division is left.
+        Multiplied through by (alpha_x alpha_y)^2, so that one division is left; squared after it, or the gradient's
+        powers of a narrow alpha leave float32.
         """
         area = alpha.x * alpha.y
         stretched = sqr(m.x * alpha.y) + sqr(m.y * alpha.x) + sqr(m.z * area)
-        return where(m.z > 0.0, area * sqr(area) / (ops.pi * sqr(stretched)), 0.0)
+        return where(m.z > 0.0, sqr(area / stretched) * area * ops.inv_pi, 0.0)
 
     @function
     def Lambda(self, v: Any, alpha: Any) -> Any:
