@@ -326,6 +326,17 @@ def test_the_recompilation_test_would_see_a_new_kernel() -> None:
     assert launched(work) == 1
 
 
+@pytest.mark.parametrize("name", ["directSampleLight", "path"])
+def test_ambient_light_adds_its_radiance_times_the_materials_coefficient(name: str) -> None:
+    import gonio.mitsuba  # noqa: F401  (registers gonio_phong)
+
+    phong = {"type": "gonio_phong", "ka": rgb([0.1, 0.2, 0.3])}
+    scene = mi.load_dict(scene_dict(ball=phong))
+    dark, light = (picture(scene, 64, integrator=name, ambient=a, max_depth=2) for a in (None, (2.0, 1.0, 1.0)))
+    assert (light - dark)[11:14, 6:8] == pytest.approx(np.broadcast_to([0.2, 0.2, 0.3], (3, 2, 3)), rel=1e-4)
+    assert np.array_equal(light[20:], dark[20:])  # the floor's material takes none
+
+
 def test_ambient_light_changes_nothing_where_no_material_takes_it() -> None:
     scene = mi.load_dict(scene_dict())
     assert np.array_equal(picture(scene, 4), picture(scene, 4, ambient=(1.0, 1.0, 1.0)))

@@ -222,7 +222,7 @@ class _Path:
 
 
 @cache
-def _waiting_type(variant: str) -> type:
+def _waiting_type(variant: str) -> Any:
     """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a _Path.
 
     A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
@@ -246,7 +246,7 @@ def _waiting_type(variant: str) -> type:
         fields = {name: kind(getattr(rest, name)) for name, kind in kept.items()}
         return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
 
-    waiting = make_dataclass("Waiting", [*kept.items(), *found.items()])
+    waiting: Any = make_dataclass("Waiting", [*kept.items(), *found.items()])
     waiting.pack, waiting.unpack = staticmethod(pack), unpack
     return waiting
 
@@ -274,13 +274,16 @@ class _Transport:
         self.goes_on = (name == "path" and settings.max_depth > 2) or (name == "whitted" and self.follows_delta)
 
     def _ambient(self) -> Any:
-        """The ambient light as a texture (so that it works in spectral variants), None where nothing would use it."""
-        if self.settings.ambient is None or not any(self.settings.ambient):
+        """The ambient light as a texture of radiance, None where nothing would take it."""
+        colour = self.settings.ambient
+        if colour is None or not any(colour):
             return None
-        if not any(shape.bsdf().has_attribute("ambient") for shape in self.scene.shapes()):
+        if not any(dr.any(shape.bsdf().has_attribute("ambient")) for shape in self.scene.shapes()):
             return None
-        texture = self.mi.load_dict({"type": "rgb", "value": list(self.settings.ambient)})
-        return texture
+        # An rgb texture alone is a reflectance and ends at 1; d65 times one is a light, also in spectral variants.
+        scale = max(colour)
+        tint = {"type": "rgb", "value": [c / scale for c in colour]}
+        return self.mi.load_dict({"type": "d65", "color": tint, "scale": scale})
 
     def accumulate(self, pixel: Any, key: Any, first: Any, last: Any, sums: _Sums) -> _Sums:
         """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples.
@@ -409,7 +412,7 @@ class _Transport:
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(bsdf, si, active)
         throughput = throughput * weight
-        if first and self.aovs:
+        if features is not None and self.aovs:
             seen = (*self.rgb(throughput, ray.wavelengths), *si.sh_frame.n)
             features += [dr.select(active, v, 0) for v in seen]
 

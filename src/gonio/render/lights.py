@@ -52,6 +52,12 @@ class Rectangle:
     def area(self) -> Any:
         return self.length0 * self.length1
 
+    def pdf(self, solid_angle: Any, distance: Any, cosine: Any) -> Any:
+        """Density (1/sr) toward a point seen at `distance` under |cosine|: uniform in the solid angle where one is
+        given, uniform on the area where it is 0."""
+        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
+        return dr.select(solid_angle > 0, dr.rcp(solid_angle), by_area)
+
     def hit(self, origin: Any, direction: Any) -> tuple[Any, Any, Any]:
         """Where a ray meets the rectangle: (distance, (u, v) in [0, 1]^2, whether it does)."""
         normal = self.normal
@@ -104,8 +110,7 @@ class SphericalRectangle:
 
     def pdf(self, distance: Any, cosine: Any) -> Any:
         """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
-        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.rectangle.area, 1e-30))
-        return dr.select(self.uniform, dr.rcp(self.solid_angle), by_area)
+        return self.rectangle.pdf(dr.select(self.uniform, self.solid_angle, 0), distance, cosine)
 
     def sample(self, u: Any, v: Any) -> tuple[Any, Any, Any]:
         """A point of the rectangle from two numbers in [0, 1): (point, (u, v) on it in [0, 1]^2, pdf in 1/sr)."""
@@ -142,7 +147,7 @@ def is_rectangle(mi: ModuleType, shape: Any) -> bool:
     return abs(float(dr.dot(rectangle.axis0, rectangle.axis1)[0])) < 1e-4
 
 
-def register(mi: ModuleType) -> None:
+def register(mi: Any) -> None:
     """Make `gonio_area` known to the current variant of Mitsuba. Calling it again does nothing.
 
     The plugin nests as `emitter` in any shape:
@@ -340,7 +345,7 @@ class Lights:
         if self.rectangle is not None:
             away = si.p - origin
             distance = dr.norm(away)
-            return self._rectangle_pdf(solid_angle, distance, dr.abs(dr.dot(away, si.n)) / distance)
+            return self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(away, si.n)) / distance)
         it = dr.zeros(mi.SurfaceInteraction3f)
         it.p = origin
         ds = mi.DirectionSample3f(self.scene, si, it)
@@ -348,10 +353,6 @@ class Lights:
             return self.emitters[0].pdf_direction(it, ds, active)
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
         return ds.emitter.pdf_direction(it, ds, active) * dr.gather(mi.Float, self.by_pointer, number, active)
-
-    def _rectangle_pdf(self, solid_angle: Any, distance: Any, cosine: Any) -> Any:
-        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.rectangle.area, 1e-30))
-        return dr.select(solid_angle > 0, dr.rcp(solid_angle), by_area)
 
     def last_hit(self, ray: Any, origin: Any, solid_angle: Any, active: Any) -> tuple[Any, Any]:
         """What a path's last ray adds: (radiance that arrives along it, density as in `pdf`).
@@ -375,7 +376,7 @@ class Lights:
         shadow.maxt = distance * (1 - mi.math.ShadowEpsilon)
         active &= dr.any(radiance != 0)
         active &= ~self.scene.ray_test(shadow, active)
-        pdf = self._rectangle_pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
+        pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
         return dr.select(active, radiance, 0), pdf
 
 
