@@ -335,7 +335,7 @@ def plot(
     angles: Annotated[str, typer.Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = "",
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help=".png, .pdf, .svg.")] = None,
 ) -> None:
-    """Draw a material: its lobes (polar), a slice over angle, or its albedo curve.
+    """Draw a material: its lobes (polar), a slice over angle, or its albedo curve; or the tables in a baked folder.
 
     The density it is sampled with is drawn dashed over its values.
 
@@ -344,11 +344,120 @@ def plot(
       gonio plot conductor --preset Au --param alpha=.3
       gonio plot phong -p p=32 --kind slice -o phong.pdf
       gonio plot dielectric -p alpha=.2 --kind albedo
+      gonio plot ./tables -o tables.png
     """
+    if os.sep in model or model.endswith(".npz") or Path(model).is_dir():
+        from .viewer import energy_figures
+
+        print(energy_figures.plot_tables(model, output))
+        return
     from .viewer import plots
 
     path = plots.plot(model, param or [], preset, kind, angles, output)
     print(path)
+
+
+@app.command(rich_help_panel=MATERIALS)
+def bake(
+    target: Annotated[str, typer.Argument(metavar="TARGET", help="A distribution (ggx, beckmann), or a material.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")] = Path("tables"),
+    param: Annotated[
+        list[str] | None, typer.Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")
+    ] = None,
+    preset: Annotated[str, typer.Option(metavar="NAME", help="A named preset, such as Au for conductor.")] = "",
+    lut: Annotated[str, typer.Option(metavar="E,Eavg,dfg,glass", help="Which tables.")] = "",
+    size: Annotated[int, typer.Option(metavar="N", help="Texels along each axis.")] = 128,
+    method: Annotated[str, typer.Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature",
+    masking: Annotated[str, typer.Option(metavar="NAME", help="For a distribution.")] = "smith-correlated",
+    spp: Annotated[int, typer.Option(metavar="N", help="Samples a texel, where sampled.")] = 1024,
+    points: Annotated[str, typer.Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley",
+    seed: Annotated[int, typer.Option(metavar="N", help="Of independent points.")] = 0,
+    layout: Annotated[str, typer.Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear",
+    store: Annotated[str, typer.Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E",
+    flip: Annotated[bool, typer.Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Write tables of directional albedo, its average and the split sum, with their measured error.
+
+    \b
+    Examples:
+      gonio bake ggx -o tables
+      gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
+      gonio bake conductor --preset Au --lut E,Eavg -o gold
+    """
+    from .optics.ndf import distributions
+    from .render import tables
+    from .viewer import plots
+
+    what = target if target in distributions() else plots.make(target, param or [], preset)[0]
+    options: dict[str, Any] = {"lut": lut.split(",")} if lut else {}
+    options |= {"size": size, "method": method, "masking": masking, "spp": spp, "points": points, "seed": seed}
+    baked = tables.bake(what, output, layout=layout, store=store, flip=flip, **options)
+    _print_tables(baked.manifest, output, as_json)
+
+
+@app.command(rich_help_panel=MATERIALS)
+def info(
+    path: Annotated[Path, typer.Argument(metavar="DIR", help="A baked folder or tables.npz.")], as_json: Json = False
+) -> None:
+    """Read baked tables back: what they hold, how they were made, how far they err.
+
+    \b
+    Example:
+      gonio info tables
+    """
+    from .render import tables
+
+    _print_tables(tables.describe(path), path, as_json)
+
+
+def _print_tables(manifest: dict[str, Any], path: Path, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"path": str(path), **manifest}))
+        return
+    facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
+    print(f"{path}: {', '.join(facts)}")
+    table = _table("table", "shape", "max error", "rms error", "between nodes")
+    for name, shape in manifest["tables"].items():
+        error = manifest["error"].get(name, {})
+        figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
+        table.add_row(name, " x ".join(map(str, shape)), *figures)
+    _print_rich(table)
+
+
+@app.command(rich_help_panel=MATERIALS)
+def compensation(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write a picture and JSON.")
+    ] = None,
+    walks: Annotated[int, typer.Option(metavar="N", help="Random walks a point of the referee.")] = 200_000,
+    as_json: Json = False,
+) -> None:
+    """Compare the ways to give back lost light: furnace, distance to the random walk, reciprocity, cost.
+
+    \b
+    Example:
+      gonio compensation -o comparison
+    """
+    from .energy import comparison
+
+    found = comparison.compare(walks=walks)
+    if output is not None:
+        from .viewer import energy_figures
+
+        energy_figures.plot_comparison(found, output)
+    if as_json:
+        print(json.dumps(found))
+        return
+    names = list(found["rms"])
+    table = _table("method", *names, "furnace", "recipr.", "cost")
+    print("RMS distance of the albedo to the random walk; largest loss in a white furnace; breach of reciprocity; time")
+    for method in comparison.METHODS:
+        rms = [f"{found['rms'][n][method]:.4f}" if method in found["rms"][n] else "" for n in names]
+        broken = f"{found['reciprocity'][method]:.0e}" if method in found["reciprocity"] else ""
+        furnace = f"{found['furnace']['white'].get(method, 0.0):.0e}"
+        table.add_row(method, *rms, furnace, broken, f"{found['cost'][method]:.2f}")
+    _print_rich(table)
 
 
 @app.command("models", rich_help_panel=MATERIALS)

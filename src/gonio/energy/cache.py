@@ -1,7 +1,7 @@
 """Tables that were computed once: kept in the user's cache folder by a hash of what they are.
 
-The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file that is truncated, altered or not
-ours is rebuilt, with a warning; a folder that cannot be written is no hindrance.
+The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file that is truncated, altered or
+not ours is rebuilt, with a warning; a folder that cannot be written is no hindrance.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
 """What single scattering misses, M(mu) = 1 - E(mu), as one short polynomial a roughness.
 
-A compensated material needs M at both directions for every pair. Two bilinear lookups are eight gathers, dearer than the
-whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right variable makes
-one possible. Masking changes where mu is a few alpha, so with
+A compensated material needs M at both directions for every pair. Two bilinear lookups are eight gathers, dearer than
+the whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right
+variable makes one possible. Masking changes where mu is a few alpha, so with
 
     s(mu) = sqrt(mu / (mu + 4 alpha))        (GGX with Smith's masking; for others see `form_of`)
     x(mu) = 2 s(mu) / s(1) - 1  in [-1, 1]
 
-M is a smooth function of x whatever the width, down to a limit at alpha -> 0. Rows of a table hold the coefficients in x
-at equal steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial
+M is a smooth function of x whatever the width, down to a limit at alpha -> 0. Rows of a table hold the coefficients in
+x at equal steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial
 itself, so that what the table has, energy has exactly. Anisotropic widths add two axes, see `anisotropic`.
 """
 
@@ -157,9 +157,9 @@ TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: powers of x by
 def anisotropic(ndf: str, masking: str) -> Table:
     """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) of a metal with two widths.
 
-    About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from the
-    axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 + alpha_min^2 sin^2.
-    Channel k HARMONICS + j holds the coefficient of x^k y^j.
+    About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from
+    the axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 +
+    alpha_min^2 sin^2. Channel k HARMONICS + j holds the coefficient of x^k y^j.
     """
 
     def build() -> np.ndarray:
@@ -217,7 +217,7 @@ SIDES = ("thin", "dense")
 
 @lru_cache
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """Coefficients over (sqrt(F0), roughness) of rough glass, as light meets it from its thin and from its dense side."""
+    """Coefficients over (sqrt(F0), roughness) of rough glass, for light from its thin and from its dense side."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)

@@ -13,8 +13,23 @@ from ..errors import InputError
 from ..models import BSDF, microfacet
 from ..models.conductor import Conductor
 from ..models.dielectric import Dielectric
-from ..ops import abs, clamp, copysign, inset, lookup, maximum, mean, minimum, safe_div, sincos, sqr, sqrt, vec3, where
-from ..ops import backend
+from ..ops import (
+    abs,
+    backend,
+    clamp,
+    copysign,
+    inset,
+    lookup,
+    maximum,
+    mean,
+    minimum,
+    safe_div,
+    sincos,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
 from ..optics import frame
 from . import curves, fresnel_average
 

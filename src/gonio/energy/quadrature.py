@@ -19,11 +19,11 @@ t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t 
     angle of about cot(theta_o). With b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and
     sinh(a) = (pi/2) / cot(theta_o), the leap takes as long in x as everything else.
 
-**Glass.** Reflection and transmission share the normals that o sees, theta_m < pi/2 + min(delta, 0). F has a root at the
-critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so the root is met at
+**Glass.** Reflection and transmission share the normals that o sees, theta_m < pi/2 + min(delta, 0). F has a root at
+the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so the root is met at
 theta_m = delta +- acos(cos_c / A), where A = |cos delta|^-1 mu is the length of o's projection. The integral is cut
-there and at the boundary of reflection; the azimuths are cut where A = cos_c, beyond which nothing reflects totally. Each
-piece runs in s^2 (3 - 2 s), which makes a root at either end smooth.
+there and at the boundary of reflection; the azimuths are cut where A = cos_c, beyond which nothing reflects totally.
+Each piece runs in s^2 (3 - 2 s), which makes a root at either end smooth.
 
 **The error** of any figure is the same integral with other numbers of nodes.
 """

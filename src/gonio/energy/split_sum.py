@@ -56,8 +56,8 @@ def prefilter(environment: np.ndarray, levels: int = 6, samples: int = 512) -> l
 
     environment  latitude-longitude radiance, (H, W, channels), z up, row 0 toward +z
     Returns `levels` maps, each half as large as the one before, the first the map itself. Texel r holds
-    sum L(i) i.n / sum i.n over GGX normals at n = o = r (Karis2013); each sample reads the mip level whose texels are as
-    wide as the sample's share of solid angle (Krivanek2008), so few samples are enough.
+    sum L(i) i.n / sum i.n over GGX normals at n = o = r (Karis2013); each sample reads the mip level whose texels are
+    as wide as the sample's share of solid angle (Krivanek2008), so few samples are enough.
     """
     source = np.asarray(environment, dtype=np.float64)
     if source.ndim != 3 or min(source.shape) < 1:

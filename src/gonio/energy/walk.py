@@ -7,8 +7,9 @@ every result). A walker at height h going along w meets it again after a distanc
     else it stands at C(h') = C(h) (1 - u)^(-1 / Lambda(w)), for directions up and down alike.
 
 There it meets a normal as -w sees them, and is reflected with the weight F (metal), or reflected or refracted with the
-chances F and 1 - F (glass). A refracted walker is followed in the mirrored frame, where its own medium is above. At each
-meeting the way straight out along the target direction is added, phase function times G1: that makes `value` unbiased.
+chances F and 1 - F (glass). A refracted walker is followed in the mirrored frame, where its own medium is above. At
+each meeting the way straight out along the target direction is added, phase function times G1: that makes `value`
+unbiased.
 """
 
 from __future__ import annotations

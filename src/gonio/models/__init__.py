@@ -1,6 +1,7 @@
 """The materials, one file each. A new one is one new file in this folder: discovery finds it.
 
-Materials that stand on a later room (compensation on `energy`) live in that room's folder `materials`, and are found there.
+Materials that stand on a later room (compensation on `energy`) live in that room's folder `materials`, and are found
+there.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from ... import ops
 from ...models.base import Breach
@@ -16,11 +16,13 @@ class FdezAguera(_Added):
     """f_base + F_ms E_ms / pi: multiple scattering as light from a diffuse surface (FdezAguera2019).
 
     With the split sum FssEss = F0 A(mu_o) + B(mu_o), Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
-    F_ms = FssEss F_avg / (1 - E_ms F_avg). Made for prefiltered lighting, FssEss * radiance + F_ms E_ms * irradiance; as a
-    BSDF the second term is a diffuse lobe that sees wo alone: not reciprocal. Schlick's Fresnel is assumed in it.
+    F_ms = FssEss F_avg / (1 - E_ms F_avg). Made for prefiltered lighting, FssEss * radiance + F_ms E_ms * irradiance;
+    as a BSDF the second term is a diffuse lobe that sees wo alone: not reciprocal. Schlick's Fresnel is assumed in it.
     """
 
-    breaks = {"reciprocity": Breach("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)}
+    breaks: ClassVar[dict[str, Breach]] = {
+        "reciprocity": Breach("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
+    }
     lossless = 2e-3
     _takes_glass = False
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from ... import ops
 from ...models.base import BSDF, Breach, Sample, bsdf
@@ -19,7 +19,9 @@ class Turquin(BSDF):
     """
 
     base: BSDF = bsdf("the material to be compensated; it must not transmit")
-    breaks = {"reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)}
+    breaks: ClassVar[dict[str, Breach]] = {
+        "reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)
+    }
     lossless = 2e-3
 
     def __post_init__(self) -> None:
