@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 import pytest
-
 from gonio.errors import InputError, MachineError
 from gonio.render import denoise, metrics
 

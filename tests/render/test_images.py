@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from gonio.errors import InputError, MachineError
 from gonio.render import images
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from gonio.errors import InputError
 from gonio.render import metrics
 

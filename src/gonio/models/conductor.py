@@ -17,15 +17,15 @@ class Conductor(BSDF):
     lost: at alpha = 1 more than half.
     """
 
-    eta: Value = spectrum(0.0, "real part of the refractive index, over the outside's", low=0.0)
-    k: Value = spectrum(1.0, "imaginary part of the refractive index, over the outside's", low=0.0)
-    alpha: Value = width(0.1, "width of the microfacet distribution; two for anisotropy")
-    rotation: Value = angle(0.0, "turn of the anisotropy's axes about the normal, from dp/du")
-    ndf: str = choice("ggx", "distribution of microfacet normals", microfacet.NDFS)
-    masking: str = choice("smith-correlated", "masking and shadowing", microfacet.MASKINGS)
-    fresnel: str = choice("exact", "Fresnel reflectance", fresnel.KINDS)
-    albedo: Value = spectrum(1.0, "factor on everything reflected", low=0.0, high=1.0, soft_high=True)
-    sampling: str = choice("visible", "which normals are sampled", microfacet.SAMPLINGS)
+    eta: Value = spectrum(default=0.0, doc="real part of the refractive index, over the outside's", low=0.0)
+    k: Value = spectrum(default=1.0, doc="imaginary part of the refractive index, over the outside's", low=0.0)
+    alpha: Value = width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
+    rotation: Value = angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
+    ndf: str = choice(default="ggx", doc="distribution of microfacet normals", choices=microfacet.NDFS)
+    masking: str = choice(default="smith-correlated", doc="masking and shadowing", choices=microfacet.MASKINGS)
+    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=fresnel.KINDS)
+    albedo: Value = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
+    sampling: str = choice(default="visible", doc="which normals are sampled", choices=microfacet.SAMPLINGS)
 
     @classmethod
     def preset(cls, name: str, **parameters: Any) -> Conductor:

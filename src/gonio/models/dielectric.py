@@ -22,15 +22,17 @@ class Dielectric(BSDF):
     eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
     """
 
-    eta: Value = number(1.5, "index inside over index outside", low=0.2, high=5.0)
-    alpha: Value = width(0.1, "width of the microfacet distribution; two for anisotropy")
-    rotation: Value = angle(0.0, "turn of the anisotropy's axes about the normal, from dp/du")
-    ndf: str = choice("ggx", "distribution of microfacet normals", microfacet.NDFS)
-    masking: str = choice("smith-correlated", "masking and shadowing", microfacet.MASKINGS)
-    fresnel: str = choice("exact", "Fresnel reflectance", fresnel.KINDS)
-    albedo: Value = spectrum(1.0, "factor on everything reflected or transmitted", low=0.0, high=1.0, soft_high=True)
-    transmission: bool = flag(True, "whether refracted light goes on, or is lost")
-    sampling: str = choice("visible", "which normals are sampled", microfacet.SAMPLINGS)
+    eta: Value = number(default=1.5, doc="index inside over index outside", low=0.2, high=5.0)
+    alpha: Value = width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
+    rotation: Value = angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
+    ndf: str = choice(default="ggx", doc="distribution of microfacet normals", choices=microfacet.NDFS)
+    masking: str = choice(default="smith-correlated", doc="masking and shadowing", choices=microfacet.MASKINGS)
+    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=fresnel.KINDS)
+    albedo: Value = spectrum(
+        default=1.0, doc="factor on everything reflected or transmitted", low=0.0, high=1.0, soft_high=True
+    )
+    transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
+    sampling: str = choice(default="visible", doc="which normals are sampled", choices=microfacet.SAMPLINGS)
 
     @classmethod
     def preset(cls, name: str, **parameters: Any) -> Dielectric:

@@ -14,7 +14,7 @@ class Lambert(BSDF):
     Energy conserving for albedo <= 1, reciprocal. Sampled by the cosine.
     """
 
-    albedo: Value = spectrum(0.5, "share of light that is reflected", low=0.0, high=1.0, soft_high=True)
+    albedo: Value = spectrum(default=0.5, doc="share of light that is reflected", low=0.0, high=1.0, soft_high=True)
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """albedo / pi |cos theta_i| above the surface."""

@@ -12,7 +12,7 @@ from .base import BSDF, Sample, Value, spectrum
 class Mirror(BSDF):
     """Ideal reflection: all light leaves at theta_o = theta_i, phi_o = phi_i + pi: a delta lobe (course notes, B)."""
 
-    albedo: Value = spectrum(1.0, "share of light that is reflected", low=0.0, high=1.0, soft_high=True)
+    albedo: Value = spectrum(default=1.0, doc="share of light that is reflected", low=0.0, high=1.0, soft_high=True)
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """0: a delta lobe has no finite value."""

@@ -13,7 +13,7 @@ class Mix(BSDF):
 
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")
-    weight: Value = number(0.5, "share of b", low=0.0, high=1.0)
+    weight: Value = number(default=0.5, doc="share of b", low=0.0, high=1.0)
 
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """(1 - weight) a + weight b."""

@@ -19,8 +19,10 @@ class OrenNayar(BSDF):
     the formula is used as it stands. It loses energy as sigma grows; interreflections are left out.
     """
 
-    albedo: Value = spectrum(0.5, "share of light that a groove's side reflects", low=0.0, high=1.0, soft_high=True)
-    sigma: Value = number(0.3, "standard deviation of the grooves' slope angle", low=0.0, unit="rad")
+    albedo: Value = spectrum(
+        default=0.5, doc="share of light that a groove's side reflects", low=0.0, high=1.0, soft_high=True
+    )
+    sigma: Value = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
 
     @function
     def _shape(self, wo: Any, wi: Any) -> Any:

@@ -21,11 +21,11 @@ class _Empirical(BSDF):
     grazing light. Shared by the two highlights.
     """
 
-    kd: Value = spectrum(0.5, "diffuse coefficient", low=0.0)
-    ks: Value = spectrum(0.3, "specular coefficient", low=0.0)
-    p: Value = number(32.0, "falloff of the highlight", low=0.0)
-    ka: Value = spectrum(0.0, "ambient coefficient: ka times the scene's ambient light is added", low=0.0)
-    check_sum: bool = flag(False, "require ka + kd + ks = 1")
+    kd: Value = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
+    ks: Value = spectrum(default=0.3, doc="specular coefficient", low=0.0)
+    p: Value = number(default=32.0, doc="falloff of the highlight", low=0.0)
+    ka: Value = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
+    check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
 
     breaks: ClassVar[dict[str, Breach]] = {
         "reciprocity": Breach(

@@ -27,7 +27,7 @@ class KullaConty(_Added):
     (E_avg = .835 at roughness .05): compensation then lays a false bright rim on smooth surfaces.
     """
 
-    color: str = choice("bounce", "colour of the light that is given back", COLORS)
-    average: str = choice("exact", "how F_avg is found", fresnel_average.KINDS)
+    color: str = choice(default="bounce", doc="colour of the light that is given back", choices=COLORS)
+    average: str = choice(default="exact", doc="how F_avg is found", choices=fresnel_average.KINDS)
     # of a white furnace: metals keep 5e-4 (Beckmann's rational fit), glass 2e-3 and near eta = 1.1 1.4e-2
     lossless = 0.015

@@ -22,7 +22,7 @@ class RandomWalk(_Added):
     """
 
     stochastic = True
-    seed: Value = number(0.0, "shifts the random numbers")
+    seed: Value = number(default=0.0, doc="shifts the random numbers")
 
     def __post_init__(self) -> None:
         super().__post_init__()
