@@ -274,8 +274,8 @@ def missing(form: str, found: tuple[Any, ...], bend: Any, top: Any, mu: Any) -> 
 
     found  from `coefficients`;  bend, top  `knee` at this width, and 2 / s(1)
     """
-    x = squeeze(form, mu, bend) * top - 1.0
+    x = ops.fma(squeeze(form, mu, bend), top, -1.0)
     total = found[DEGREE]
     for power in range(DEGREE - 1, -1, -1):
-        total = total * x + found[power]
+        total = ops.fma(total, x, found[power])
     return ops.maximum(total, 0.0)

@@ -97,14 +97,13 @@ class Metal:
 
     @staticmethod
     def _isotropic(material: Any, found: dict[str, Any], w: Any) -> Any:
-        """M at a direction, of the mean of the widths; 0 below the surface."""
+        """M at a direction above the surface, of the mean of the widths."""
         form = curves.form_of(material.base.ndf, material.base.masking)
-        value = curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
-        return where(w.z > 0.0, value, 0.0)
+        return curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
 
     @staticmethod
     def missing(material: Any, found: dict[str, Any], w: Any) -> Any:
-        """M at a direction; 0 below the surface."""
+        """M at a direction above the surface."""
         if not material.turned:
             return Metal._isotropic(material, found, w)
         base, alpha = material.base, found["alpha"]
@@ -120,24 +119,23 @@ class Metal:
             first = power * curves.HARMONICS
             value = found["turned"][first + curves.HARMONICS - 1]
             for step in range(curves.HARMONICS - 2, -1, -1):
-                value = value * y + found["turned"][first + step]
+                value = ops.fma(value, y, found["turned"][first + step])
             rows.append(value)
         form = curves.form_of(base.ndf, base.masking)
         bend = curves.knee(form, base.masking, seen)
         top = 2.0 / curves.squeeze(form, 1.0 + 0.0 * bend, bend)
-        value = curves.missing(form, tuple(rows), bend, top, maximum(w.z, 1e-6))
-        return where(w.z > 0.0, value, 0.0)
+        return curves.missing(form, tuple(rows), bend, top, maximum(w.z, 1e-6))
 
     @staticmethod
     def added(material: Any, found: dict[str, Any], wo: Any, wi: Any, mode: str) -> Any:
         """f_add f_ms |cos theta_i|."""
         m_o, m_i = Metal.missing(material, found, wo), Metal.missing(material, found, wi)
-        return found["added"] * (m_o * m_i * wi.z)
+        return found["added"] * where((wo.z > 0.0) & (wi.z > 0.0), m_o * m_i * wi.z, 0.0)
 
     @staticmethod
     def share(material: Any, found: dict[str, Any], wo: Any) -> Any:
         """Probability of the broad lobe: the power it carries over all the power, at the mean colour."""
-        m_o = where(found["scale"] > 0.0, Metal._isotropic(material, found, wo), 0.0)
+        m_o = where((found["scale"] > 0.0) & (wo.z > 0.0), Metal._isotropic(material, found, wo), 0.0)
         given = m_o * found["ratio"]
         return safe_div(given, given + (1.0 - m_o))
 

@@ -40,6 +40,7 @@ __all__ = [
     "erf",
     "exp",
     "floor",
+    "fma",
     "function",
     "get_precision",
     "inset",
@@ -155,6 +156,13 @@ def sincos(x: Any) -> tuple[Any, Any]:
     if is_drjit(x):
         return drjit().sincos(x)
     return sin(x), cos(x)
+
+
+def fma(a: Any, b: Any, c: Any) -> Any:
+    """a b + c in one operation, rounded once; recorded as the two that it is."""
+    if is_drjit(a) or is_drjit(b) or is_drjit(c):
+        return drjit().fma(a, b, c)
+    return a * b + c
 
 
 def sqr(x: Any) -> Any:
