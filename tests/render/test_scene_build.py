@@ -395,3 +395,13 @@ def test_picture_agrees_with_the_course_framework_s_and_is_not_mirrored(mi):
     assert np.median(error) < 0.005
     mirrored = np.abs(blocks(picture[:, ::-1]) - reference) / np.maximum(reference, 1e-2)
     assert np.median(mirrored) > 0.1
+
+
+def test_two_lamps_that_are_alike_are_two_lamps(build):
+    lamp = {
+        "type": "areaLight",
+        "energy": [5, 5, 5],
+        "shape": {"type": "parallelogram", "base": [0, 3, 0], "edge0": [1, 0, 0], "edge1": [0, 0, 1]},
+    }
+    other = {**lamp, "shape": {**lamp["shape"], "base": [2, 3, 0]}}
+    assert len(build([{"type": "sphere", "center": [0, 0, 0], "radius": 1}], [lamp, other]).emitters()) == 2

@@ -331,6 +331,11 @@ def _adapter_class(mi: ModuleType) -> type:
         def has_attribute(self, name: str, active: Any = True) -> Any:
             return mi.Bool(name == "ambient" and hasattr(type(self.model), "ambient"))
 
+        def eval_attribute(self, name: str, si: Any, active: Any = True) -> Any:
+            if name != "ambient" or not hasattr(type(self.model), "ambient"):
+                return mi.Spectrum(0.0)
+            return mi.Spectrum(self.at(si, active).ambient) & active
+
         def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
             if name != "ambient" or not hasattr(type(self.model), "ambient"):
                 return mi.Color3f(0.0)

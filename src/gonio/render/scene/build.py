@@ -87,7 +87,8 @@ class _Builder:
 
     def light(self, light: Any, where: str, name: str) -> Any:
         if isinstance(light, schema.AreaLight):
-            emitter = {"type": "gonio_area", "radiance": {"type": "rgb", "value": rgb(light.energy)}}
+            # Mitsuba merges Python plugins whose properties are equal: the tag keeps two like lamps apart
+            emitter = {"type": "gonio_area", "radiance": {"type": "rgb", "value": rgb(light.energy)}, "tag": name}
             return self.shape(light.shape, f"{where}/shape", name, emitter)
         if isinstance(light, schema.SpotLight):
             intensity = {"type": "rgb", "value": rgb(light.energy)}
