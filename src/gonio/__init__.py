@@ -31,7 +31,7 @@ _PLACES = {
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
-    from . import models, render
+    from . import models, render, verify
     from .energy import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError, MachineError
     from .models import BSDF, Sample, model
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(name)
-    if name in ("models", "render"):  # packages that can be called: go.models(), go.render(scene)
+    if name in ("models", "render", "verify"):  # packages that can be called: go.models(), go.render(scene)
         return import_module("." + name, __name__)
     if name in _PLACES:
         return getattr(import_module("." + _PLACES[name], __name__), name)
@@ -73,4 +73,5 @@ __all__ = [
     "models",
     "render",
     "set_precision",
+    "verify",
 ]

@@ -1,0 +1,65 @@
+"""Directions by their angles, and the pairs of directions that the pointwise laws are judged on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+
+
+def at(theta: float | np.ndarray, phi: float | np.ndarray = 0.0) -> np.ndarray:
+    """Unit vectors (..., 3) at theta from +z and azimuth phi, both in degrees; exactly (0, 0, 1) at theta = 0."""
+    t, p = np.broadcast_arrays(np.radians(theta), np.radians(phi))
+    # from the nearer pole: sin(pi) is not 0 in floating point
+    below = t > 0.5 * np.pi
+    turned = np.where(below, np.radians(180.0 - np.asarray(theta, float)), t)
+    z = np.where(below, -np.cos(turned), np.cos(turned))
+    return np.stack([np.sin(turned) * np.cos(p), np.sin(turned) * np.sin(p), z], axis=-1)
+
+
+def angles(w: np.ndarray) -> np.ndarray:
+    """(theta, phi) of unit vectors (..., 3), degrees, phi in [0, 360)."""
+    w = np.asarray(w, float)
+    theta = np.degrees(np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2]))
+    return np.stack([theta, np.degrees(np.arctan2(w[..., 1], w[..., 0])) % 360.0], axis=-1)
+
+
+def text(w: np.ndarray) -> str:
+    """ "theta,phi" of one direction, degrees, as `--at` takes it."""
+    theta, phi = angles(w)
+    return f"{theta:.9g},{phi:.9g}"
+
+
+def parse(pair: str) -> tuple[np.ndarray, np.ndarray]:
+    """(wo, wi) of "theta_o,phi_o/theta_i,phi_i" in degrees; InputError where it is none."""
+    try:
+        (to, po), (ti, pi) = ([float(x) for x in part.split(",")] for part in pair.split("/"))
+    except ValueError:
+        hint = "give theta_o,phi_o/theta_i,phi_i in degrees, such as 30,0/45,180"
+        raise InputError(f"'{pair}' is no pair of directions", "--at", hint) from None
+    return at(to, po), at(ti, pi)
+
+
+def uniform(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Uniform unit vectors (count, 3) on the whole sphere."""
+    z = rng.uniform(-1.0, 1.0, count)
+    phi = rng.uniform(0.0, 2.0 * np.pi, count)
+    r = np.sqrt((1.0 - z) * (1.0 + z))
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
+
+
+def on_side(w: np.ndarray, side: int) -> np.ndarray:
+    """The directions mirrored to one side of the surface: +1 above, -1 below."""
+    w = w.copy()
+    w[:, 2] = side * np.abs(w[:, 2])
+    return w
+
+
+def numbers(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Uniform (count, 3) in [0, 1) that float32 holds exactly, so that no rounding reaches 1."""
+    return rng.random((count, 3), dtype=np.float32).astype(np.float64)
+
+
+def single(w: np.ndarray) -> np.ndarray:
+    """The directions as float32 holds them, in float64: both precisions then see the same input."""
+    return w.astype(np.float32).astype(np.float64)

@@ -1,0 +1,306 @@
+"""Pearson's chi-square test of a model's samples against its pdf, in cells that follow the samples.
+
+A lobe of width .005 fills a hundred-thousandth of the sphere: fixed cells would hold it in one, or number millions. So
+a first, small draw (the pilot) places the edges, and a second, independent one is counted: 100 rows a side of the
+surface and 200 columns a row, at quantiles of the pilot, at equal steps, and at growing distances from its middle for
+the tails. The coordinates are (1 - |z|, a pseudo-angle of (x, y)): equal areas, no transcendental function, and no
+cancellation near the pole. Sampling, binning and counting are one kernel, in which nothing is stored but the counts.
+
+What fails, is a delta sample, or lands where no cell is, is counted too: its expectation is 1 - int pdf.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..ops import backend
+from ..render.sampler import mix, unit
+from . import directions, statistics
+from .subject import Subject, guarded
+
+ROWS, COLUMNS = 100, 200  # a side of the surface: 20 000 cells
+COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
+PILOT = 1 << 15
+LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
+
+_NODES = {n: np.polynomial.legendre.leggauss(n) for n in (2, 4)}
+
+
+class Grid(NamedTuple):
+    """Cells of several wo.
+
+    wo     (N, 3)
+    sides  which sides of the surface have cells
+    rows   edges of 1 - |z|, (N, sides, ROWS + 1), float32
+    columns  edges of the pseudo-angle, (N, sides, ROWS, COLUMNS + 1), float32
+    """
+
+    wo: np.ndarray
+    sides: tuple[int, ...]
+    rows: np.ndarray
+    columns: np.ndarray
+
+
+class Expectation(NamedTuple):
+    """Probability of each cell (N, sides, ROWS, COLUMNS), and the integral of the pdf over all (N,)."""
+
+    cells: np.ndarray
+    total: np.ndarray
+
+
+class Counts(NamedTuple):
+    """Samples in each cell (N, sides, ROWS, COLUMNS), all others (N,), and how many were drawn for each wo."""
+
+    cells: np.ndarray
+    others: np.ndarray
+    drawn: int
+
+
+class Outcome(NamedTuple):
+    """p-values of one wo: of all cells, of coarse ones, and of the number of samples that are in none."""
+
+    fine: float
+    coarse: float
+    others: float
+
+
+# --------------------------------------------------------------------------- the cells
+
+
+def place(subject: Subject, wo: np.ndarray, seed: int) -> Grid | None:
+    """Cells where the pilot's samples are; None where there is no sample with a density."""
+    rng = np.random.default_rng([seed, 11])
+    many = np.repeat(wo, PILOT, axis=0)
+    drawn = subject.sample(many, directions.numbers(rng, len(many)), precision="float32")
+    good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
+    if not good.any():
+        return None
+    wi, good = drawn.wi.reshape(len(wo), PILOT, 3), good.reshape(len(wo), PILOT)
+    sides = tuple(s for s in (1, -1) if np.any(s * wi[good][:, 2] > 0.0) or _claims(subject, wo, s))
+    rows = np.empty((len(wo), len(sides), ROWS + 1), np.float32)
+    columns = np.empty((len(wo), len(sides), ROWS, COLUMNS + 1), np.float32)
+    for i in range(len(wo)):
+        for j, side in enumerate(sides):
+            mine = wi[i][good[i] & (side * wi[i][:, 2] > 0.0)]
+            height, turn = _height(mine), _turn(mine)
+            order = np.argsort(height)
+            height, turn = height[order], turn[order]
+            rows[i, j] = _edges(height, 0.0, 1.0, ROWS)
+            for r, (a, b) in enumerate(zip(rows[i, j][:-1], rows[i, j][1:], strict=True)):
+                first, last = np.searchsorted(height, [a, b])
+                more = max(300 - (last - first), 0) // 2  # neighbours say where a row with few samples has its own
+                columns[i, j, r] = _edges(turn[max(first - more, 0) : last + more], 0.0, 4.0, COLUMNS)
+    return Grid(wo, sides, rows, columns)
+
+
+def _claims(subject: Subject, wo: np.ndarray, side: int) -> bool:
+    """Whether the pdf claims anything on that side."""
+    rng = np.random.default_rng(3)
+    wi = directions.on_side(directions.uniform(rng, 256 * len(wo)), side)
+    return bool(np.any(subject.pdf(np.repeat(wo, 256, axis=0), wi, precision="float32") > 0.0))
+
+
+def _height(w: np.ndarray) -> np.ndarray:
+    """1 - |z|, from x and y: nothing cancels near the pole."""
+    return (w[:, 0] ** 2 + w[:, 1] ** 2) / (1.0 + np.abs(w[:, 2]))
+
+
+def _turn(w: np.ndarray) -> np.ndarray:
+    """Pseudo-angle in [0, 4]: monotone in the azimuth, y / (|x| + |y|) in the first quarter."""
+    reach = np.abs(w[:, 0]) + np.abs(w[:, 1])
+    t = w[:, 1] / np.where(reach > 0, reach, 1.0)
+    return np.where(w[:, 0] < 0, 2.0 - t, np.where(w[:, 1] < 0, 4.0 + t, t))
+
+
+def _azimuth(turn: np.ndarray) -> np.ndarray:
+    """The azimuth in [0, 2 pi] of a pseudo-angle in [0, 4]."""
+    quarter = np.minimum(np.floor(turn), 3.0)
+    t = turn - quarter
+    return 0.5 * np.pi * quarter + np.arctan2(t, 1.0 - t)
+
+
+def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
+    """count + 1 edges over [low, high]: half at quantiles, a quarter evenly, a quarter at growing distances."""
+    inside = values[(values > low) & (values < high)]
+    if len(inside) < 20:
+        return np.linspace(low, high, count + 1).astype(np.float32)
+    even, far = count // 4, count // 4
+    own = np.quantile(inside, np.linspace(0.0, 1.0, count + 1 - even - far))
+    first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
+    steps = np.geomspace(1.0, 1e4, far // 2)
+    tails = [middle + max(last - middle, 1e-7) * steps, middle - max(middle - first, 1e-7) * steps]
+    spread = np.concatenate([own, np.linspace(low, high, even + 2)[1:-1], *tails])
+    edges = np.sort(np.clip(spread, low, high))
+    # clipped tails leave several edges at an end: cells of no width, which count nothing and expect nothing
+    edges = np.concatenate([[low], edges, np.full(max(count - len(edges), 0), high)])[: count + 1]
+    edges[-1] = high
+    return edges.astype(np.float32)
+
+
+# --------------------------------------------------------------------------- what the pdf expects
+
+
+def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
+    """The pdf's integral over every cell; cells whose value is off by more than their noise allows are divided.
+
+    tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
+    """
+    n, sides = len(grid.wo), len(grid.sides)
+    a = np.repeat(grid.rows[..., :-1].astype(float)[..., None], COLUMNS, axis=-1).ravel()
+    b = np.repeat(grid.rows[..., 1:].astype(float)[..., None], COLUMNS, axis=-1).ravel()
+    azimuth = _azimuth(grid.columns.astype(float))
+    c, d = azimuth[..., :-1].ravel(), azimuth[..., 1:].ravel()
+    row, side, _, _ = np.unravel_index(np.arange(len(a)), (n, sides, ROWS, COLUMNS))
+    side = np.array(grid.sides)[side]
+    cells = np.zeros(len(a))
+    owner = np.flatnonzero((b > a) & (d > c))
+    box = np.stack([a, b, c, d], -1)[owner]
+    for depth in range(9):
+        four = _gauss(subject, grid.wo[row[owner]], side[owner], box, 4)
+        two = _gauss(subject, grid.wo[row[owner]], side[owner], box, 2)
+        # the error of four nodes is far below the difference: for smooth cells its square, over the value
+        off = np.abs(four - two) * 0.3
+        allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
+        divide = (off > allowed) & (depth < 8)
+        np.add.at(cells, owner[~divide], four[~divide])
+        if not divide.any():
+            break
+        box, owner = box[divide], np.repeat(owner[divide], 4)
+        m, q = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
+        lo_a, hi_a, lo_c, hi_c = box.T
+        parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
+        box = np.stack([np.stack(p, -1) for p in parts], 1).reshape(-1, 4)
+    cells = cells.reshape(n, sides, ROWS, COLUMNS)
+    return Expectation(cells, cells.sum((1, 2, 3)))
+
+
+def _gauss(subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int) -> np.ndarray:
+    """int pdf over boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere."""
+    x, w = _NODES[order]
+    x, w = 0.5 * (x + 1.0), 0.5 * w
+    s, t = np.meshgrid(x, x, indexing="ij")
+    weights = np.outer(w, w).ravel()
+    result = np.empty(len(box))
+    chunk = (1 << 22) // order**2
+    for start in range(0, len(box), chunk):
+        a, b, c, d = box[start : start + chunk].T[..., None]
+        height, phi = a + (b - a) * s.ravel(), c + (d - c) * t.ravel()
+        r = np.sqrt(height * (2.0 - height))
+        z = (1.0 - height) * side[start : start + chunk, None]
+        wi = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1).reshape(-1, 3)
+        value = subject.pdf(np.repeat(wo[start : start + chunk], order**2, axis=0), wi)
+        value = value.reshape(-1, order**2) @ weights
+        result[start : start + chunk] = value * ((b - a) * (d - c))[:, 0]
+    return result
+
+
+# --------------------------------------------------------------------------- what the samples say
+
+
+def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
+    """Draw 2^log_samples for each wo and count them, in one kernel."""
+    dr = backend.drjit()
+    kind = backend.types("float32")
+    UInt = kind.module.UInt32
+    n, sides = len(grid.wo), len(grid.sides)
+    total = n << log_samples
+    model = subject.bound()
+    index = dr.arange(UInt, total)
+    which = index >> dr.opaque(UInt, log_samples)
+    table = [kind.float(np.ascontiguousarray(c)) for c in grid.wo.T]
+    wo = kind.vec3(*[dr.gather(kind.float, c, which) for c in table])
+    u = random_numbers(kind, index, seed)
+    s = guarded(subject.model, "sample", lambda: model.sample(wo, u))
+    wi, pdf, delta = s[0], s[2], kind.bool(s[3])
+    reach = dr.abs(wi.x) + dr.abs(wi.y)
+    turn = wi.y / dr.select(reach > 0.0, reach, 1.0)
+    turn = dr.select(wi.x < 0.0, 2.0 - turn, dr.select(wi.y < 0.0, 4.0 + turn, turn))
+    height = (wi.x * wi.x + wi.y * wi.y) / (1.0 + dr.abs(wi.z))
+    above = wi.z > 0.0
+    if sides == 2:
+        group = which * 2 + dr.select(above, UInt(0), UInt(1))
+        inside = wi.z != 0.0
+    else:
+        group = which
+        inside = above if grid.sides[0] > 0 else wi.z < 0.0
+    counted = inside & (pdf > 0.0) & ~delta
+    row_edges, column_edges = (kind.float(np.ascontiguousarray(e.ravel())) for e in (grid.rows, grid.columns))
+    row = _find(dr, kind, row_edges, group * (ROWS + 1), ROWS, height)
+    line = group * ROWS + row
+    column = _find(dr, kind, column_edges, line * (COLUMNS + 1), COLUMNS, turn)
+    counts = dr.zeros(UInt, n * sides * ROWS * COLUMNS)
+    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), line * COLUMNS + column, counted)
+    dr.eval(counts)
+    cells = counts.numpy().astype(np.int64).reshape(n, sides, ROWS, COLUMNS)
+    drawn = 1 << log_samples
+    return Counts(cells, drawn - cells.sum((1, 2, 3)), drawn)
+
+
+def random_numbers(kind: Any, index: Any, seed: int) -> Any:
+    """Three independent numbers in [0, 1) for each index: counters hashed, no state; another seed, another stream."""
+    dr = backend.drjit()
+    UInt = kind.module.UInt32
+    key = mix(mix(index, dr.opaque(UInt, seed & 0xFFFFFFFF)), UInt(0x9E3779B9))
+    return kind.vec3(*[unit(mix(key, UInt(word))) for word in (0x51633E2D, 0x68BC21EB, 0x02E5BE93)])
+
+
+def _find(dr: Any, kind: Any, edges: Any, start: Any, cells: int, value: Any) -> Any:
+    """The cell of a value: the last whose lower edge is not above it."""
+    return dr.binary_search(0, cells - 1, lambda i: dr.gather(kind.float, edges, start + i + 1) <= value)
+
+
+# --------------------------------------------------------------------------- the two compared
+
+
+def compare(expected: Expectation, counts: Counts, row: int) -> Outcome:
+    """p-values of one wo."""
+    n = counts.drawn
+    e, o = expected.cells[row] * n, counts.cells[row]
+    sides = e.shape[0]
+    coarse = (sides, ROWS // COARSE[0], COARSE[0], COLUMNS // COARSE[1], COARSE[1])
+    fine = _pearson(e.ravel(), o.ravel(), n)
+    broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
+    return Outcome(fine, broad, _others(float(expected.total[row]), float(counts.others[row]), n))
+
+
+def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
+    """Chi-square of cells, small ones pooled; conditional on how many lie in any cell, which `_others` judges."""
+    inside, seen = expected.sum(), observed.sum()
+    if seen < LEAST or inside <= 0.0:
+        return 1.0 if abs(seen - inside) < 6.0 * np.sqrt(max(seen, inside, 1.0)) else 0.0
+    expected = expected * (seen / inside)
+    order = np.argsort(expected, kind="stable")
+    e, o = expected[order], observed[order]
+    cumulative = np.cumsum(e)
+    # one pool for all that is below the least expectation: its cells are many and their sum is what they tell
+    small = np.searchsorted(e, LEAST)
+    while small < len(e) and small and cumulative[small - 1] < LEAST:
+        small += 1
+    if small:
+        e = np.concatenate([[cumulative[small - 1]], e[small:]])
+        o = np.concatenate([[o[:small].sum()], o[small:]])
+    if len(e) < 2:
+        return 1.0
+    if e[0] <= 0.0:
+        return 0.0 if o[0] else 1.0
+    return statistics.chi_square_tail(float(np.sum((o - e) ** 2 / e)), len(e) - 1)
+
+
+QUADRATURE = 3e-5  # what float32 pdfs summed over thousands of cells may be off by
+
+
+def _others(total: float, others: float, drawn: int) -> float:
+    """p-value of how many samples lie in no cell, expected 1 - int pdf.
+
+    The integral is known to `QUADRATURE` only: the expectation nearest to what was seen within that counts.
+    """
+    share = float(np.clip(others / drawn, 1.0 - total - QUADRATURE, 1.0 - total + QUADRATURE))
+    if share <= 0.0:
+        return 1.0 if others == 0 else 0.0
+    return statistics.binomial_two_sided(others, drawn, min(share, 1.0))
+
+
+Density = Callable[[np.ndarray, np.ndarray], np.ndarray]

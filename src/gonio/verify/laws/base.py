@@ -1,0 +1,99 @@
+"""What a law is, and what several of them share: pairs of directions, and how far rounding alone moves a value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from .. import directions
+from ..report import Finding
+from ..subject import Subject
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+
+class Law:
+    """A law: asked of a subject, it returns a Finding, or raises DoesNotApply.
+
+    number   its place in the report
+    name     how it is called on the command line and in `breaks`
+    title    the law as a sentence
+    meaning  what its violation means for a picture
+    """
+
+    number: ClassVar[int] = 0
+    name: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    meaning: ClassVar[str] = ""
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        raise NotImplementedError
+
+
+def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (wo, wi) on which the subject may have something to say, (count, 3) each.
+
+    They are rounded to what float32 holds, so that both precisions see the same; with `exact` they are not, and unit
+    to 64 bits.
+
+    A third uniform on the sphere, a third with wi where the model samples (narrow lobes), a third near grazing.
+    """
+    rng = np.random.default_rng([seed, 1])
+    sides = np.array(subject.sides or (1,))
+    wo = directions.uniform(rng, count)
+    wo[:, 2] = np.abs(wo[:, 2]) * rng.choice(sides, count)
+    wi = directions.uniform(rng, count)
+    if not subject.transmits:
+        wi[:, 2] = np.copysign(wi[:, 2], wo[:, 2])
+    third = count // 3
+    grazing = slice(2 * third, count)
+    for w in (wo[grazing], wi[grazing]):
+        squeeze = 10.0 ** rng.uniform(-3.0, 0.0, len(w))
+        w[:, 2] *= squeeze
+        w /= np.linalg.norm(w, axis=1, keepdims=True)
+    if not exact:
+        wo, wi = directions.single(wo), directions.single(wi)
+    drawn = subject.sample(wo[third : 2 * third], directions.numbers(rng, third))
+    good = (drawn.pdf > 0.0) & np.all(np.isfinite(drawn.wi), axis=1)
+    wi[third : 2 * third][good] = drawn.wi[good]
+    return wo, wi if exact else directions.single(wi)
+
+
+ROUNDINGS = 4
+
+
+def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray, seed: int = 0) -> np.ndarray:
+    """How far a value moves when both directions are turned by one rounding of float32 (6e-8), (N, channels).
+
+    Narrow lobes magnify the rounding of a half vector by 1 / alpha; no float32 code can do better than this.
+    """
+    rng = np.random.default_rng([seed, 2])
+    value = function(wo, wi)
+    moved = np.zeros_like(value)
+    for _ in range(ROUNDINGS):
+        a, b = (w + 2.0**-24 * rng.uniform(-1.0, 1.0, w.shape) for w in (wo, wi))
+        moved = np.maximum(moved, np.abs(function(a, b) - value))
+    return moved
+
+
+def relative(a: np.ndarray, b: np.ndarray, noise: Any = 0.0, floor: float = 0.0) -> np.ndarray:
+    """(|a - b| - noise) / max(|a|, |b|, floor), never below 0."""
+    size = np.maximum(np.maximum(np.abs(a), np.abs(b)), floor)
+    return np.maximum(np.abs(a - b) - noise, 0.0) / np.where(size > 0.0, size, 1.0)
+
+
+def worst_of(error: np.ndarray) -> tuple[int, float]:
+    """Row and size of the largest entry of (N,) or (N, channels); what is no number counts as infinite."""
+    flat = np.where(np.isfinite(error), error, np.inf)
+    flat = flat if flat.ndim == 1 else flat.max(1)
+    row = int(np.argmax(flat)) if len(flat) else 0
+    return row, float(flat[row]) if len(flat) else 0.0
+
+
+def pair_in_words(wo: np.ndarray, wi: np.ndarray) -> str:
+    """Both directions in degrees."""
+    (to, po), (ti, pi) = directions.angles(wo), directions.angles(wi)
+    return f"wo at {to:.4g}, {po:.4g}; wi at {ti:.4g}, {pi:.4g} degrees"

@@ -1,0 +1,177 @@
+"""Energy: nothing gives back more than it receives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError
+from .. import cubature, directions, statistics
+from ..report import Finding, Trial
+from ..subject import Subject
+from .base import Law
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+GAIN = 1e-3
+GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where Fresnel and masking go wrong first
+
+
+class Energy(Law):
+    """Directional albedo of power <= 1 for every wo, by quadrature of eval and by the model's own sampling alike.
+
+    albedo(wo) = int f*(wo, wi) |cos theta_i| dwi over both sides, f* without the radiance factor of transmission.
+    """
+
+    number = 3
+    name = "energy"
+    title = "directional albedo <= 1; quadrature and sampling agree"
+    meaning = (
+        "Above 1, every bounce adds light and interiors glow; what a white furnace loses is missing from each bounce."
+    )
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        wo = _views(subject, effort)
+        finding = Finding(
+            figure=0.0,
+            tolerance=GAIN,
+            reason="a quarter of an 8-bit step; the integrals are ten times more accurate",
+        )
+        value, error = _quadrature(subject, wo, effort, seed)
+        mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed)
+        curves: dict[str, Any] = {"wo": wo, "quadrature": value, "error": error, "sampling": mean, "noise": noise}
+        excess = value.max(1) - error.max(1) - 1.0
+        row = int(np.argmax(excess))
+        finding.figure = float(max(excess[row], 0.0))
+        channel = int(np.argmax(value[row]))
+        theta = directions.angles(wo)[:, 0]
+        finding.worst = f"wo at {theta[row]:.4g} degrees, channel {channel}: albedo {value[row, channel]:.5f}"
+        finding.shown = f"albedo {value.min():.4f} to {value.max():.4f}"
+        for i in range(len(wo)):
+            p = _agreement(value[i], error[i], mean[i], noise[i], heavy[i])
+
+            def again(i: int = i) -> float:
+                second = _sampling(subject, wo[i : i + 1], effort.furnace_samples, seed + 7919)
+                return _agreement(value[i], error[i], *(part[0] for part in second))
+
+            text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
+            finding.trials.append(Trial(p, text, again))
+        white = _white(subject)
+        if white is not None:
+            self._furnace(white, wo, effort, seed, finding, curves)
+        finding.data = curves
+        return finding
+
+    def _furnace(
+        self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: dict[str, Any]
+    ) -> None:
+        """The same with every albedo 1 and F = 1: its loss is what the model forgets."""
+        value, error = _quadrature(white, wo, effort, seed)
+        curves["furnace"] = value
+        gain = float((value - error).max() - 1.0)
+        theta = directions.angles(wo)[:, 0]
+        if gain > finding.figure:
+            finding.figure = gain
+            finding.worst = f"white furnace, wo at {theta[int(np.argmax(value.max(1)))]:.4g} degrees: {value.max():.5f}"
+        lost = 1.0 - value.mean(1)
+        above = wo[:, 2] > 0.0
+        order = np.argsort(wo[above, 2])
+        mu, loss = wo[above, 2][order], lost[above][order]
+        average = (
+            float(np.trapezoid(2.0 * mu * loss, mu) / max(np.trapezoid(2.0 * mu, mu), 1e-9)) if len(mu) > 1 else 0.0
+        )
+        where = int(np.argmax(lost))
+        finding.notes.append(
+            f"white furnace loses {average:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
+        )
+        curves["loss"] = average
+        claim = getattr(white.model, "lossless", None)
+        if claim is not None and lost[where] > claim + float(error.max()):
+            finding.problems.append(
+                f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, at most {claim:g} is claimed"
+            )
+
+
+def _views(subject: Subject, effort: Effort) -> np.ndarray:
+    """Equal steps in the cosine, and grazing ones, from each side that answers."""
+    mu = (np.arange(effort.furnace) + 0.5) / effort.furnace
+    theta = np.concatenate([np.degrees(np.arccos(mu)), GRAZING])
+    found = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
+    return directions.single(np.concatenate(found))
+
+
+def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """int eval dwi of power plus the delta lobes' share, and the error of both, (N, channels)."""
+    ideal = _deltas(subject, wo, seed)
+    if not subject.has_density:
+        return ideal, np.full_like(ideal, 1e-6)
+    if subject.stochastic:
+        return _uniformly(subject, wo, effort.furnace_samples, seed)
+    integral = cubature.integrate(subject, lambda o, i: subject.eval(o, i, "importance"), wo, effort.accuracy, seed)
+    return integral.value + ideal, integral.error + effort.accuracy
+
+
+def _deltas(subject: Subject, wo: np.ndarray, seed: int) -> np.ndarray:
+    """Sum over the delta directions that sampling finds of weight times probability, (N, channels)."""
+    count = 512
+    u = directions.numbers(np.random.default_rng([seed, 31]), count)
+    u[:, 0] = (np.arange(count) + 0.5) / count  # the lobe's number: no lobe of 1 / 512 is missed
+    s = subject.sample(np.repeat(wo, count, axis=0), np.tile(u, (len(wo), 1)), "importance")
+    result = np.zeros((len(wo), s.weight.shape[1]))
+    chosen = (s.delta & (s.pdf > 0.0)).reshape(len(wo), count)
+    for i in np.flatnonzero(chosen.any(1)):
+        rows = i * count + np.flatnonzero(chosen[i])
+        _, first = np.unique(np.round(s.wi[rows], 4), axis=0, return_index=True)
+        result[i] = np.sum(s.weight[rows[first]] * s.pdf[rows[first], None], axis=0)
+    return result
+
+
+def _uniformly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """A stochastic eval: mean over uniform wi, with three standard errors for its error."""
+    values, errors = [], []
+    for i, one in enumerate(wo):
+        wi = directions.uniform(np.random.default_rng([seed, 41, i]), count)
+        value = subject.eval(np.tile(one, (count, 1)), wi, "importance") * 4.0 * np.pi
+        values.append(value.mean(0))
+        errors.append(3.0 * value.std(0) / np.sqrt(count))
+    return np.array(values), np.array(errors)
+
+
+def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean weight of power, its standard error, and the largest single contribution, (N, channels) each."""
+    means, errors, largest = [], [], []
+    rows = max(1, (1 << 21) // count)
+    for start in range(0, len(wo), rows):
+        part = wo[start : start + rows]
+        u = directions.numbers(np.random.default_rng([seed, 51, start]), count * len(part))
+        s = subject.sample(np.repeat(part, count, axis=0), u, "importance", "float32")
+        weight = np.where((s.pdf > 0.0)[:, None], s.weight, 0.0).reshape(len(part), count, -1)
+        means.append(weight.mean(1))
+        errors.append(weight.std(1) / np.sqrt(count))
+        largest.append(weight.max(1) / count)
+    return np.concatenate(means), np.concatenate(errors), np.concatenate(largest)
+
+
+def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np.ndarray, heavy: np.ndarray) -> float:
+    """p-value of the channels' mean; a single sample that rivals the noise says that the noise is not known."""
+    spread = float(np.hypot(noise.mean(), 1e-6))
+    if float(heavy.mean()) > 0.2 * spread:
+        spread += float(heavy.mean())
+    distance = max(abs(float(value.mean() - mean.mean())) - float(error.mean()), 0.0)
+    return statistics.normal_two_sided(distance / spread)
+
+
+def _white(subject: Subject) -> Subject | None:
+    """The subject with every albedo 1 and F = 1; None where it has neither."""
+    changes: dict[str, Any] = {}
+    for name, parameter in subject.parameters.items():
+        if parameter.kind == "spectrum" and parameter.high == 1.0:
+            changes[name] = 1.0
+        elif parameter.kind == "choice" and name == "fresnel" and "one" in parameter.choices:
+            changes[name] = "one"
+    try:
+        return subject.replace(**changes) if changes else None
+    except InputError:
+        return None

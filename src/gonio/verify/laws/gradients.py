@@ -1,0 +1,118 @@
+"""Gradients: autodiff says what finite differences say."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...models import BSDF, Parameter
+from ...models.base import converter
+from ...ops import backend
+from ..report import DoesNotApply, Finding
+from ..subject import Subject, guarded
+from .base import Law, pair_in_words, pairs, relative, worst_of
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+TOLERANCE = 1e-4
+STEP = 1e-4  # of the parameter's size: with five points the truncation is its fourth power, the rounding 1e-16 / 1e-4
+
+
+class Gradients(Law):
+    """d eval / d parameter by forward autodiff equals five-point differences, for every differentiable parameter."""
+
+    number = 8
+    name = "gradients"
+    title = "autodiff equals finite differences for every parameter"
+    meaning = "Fitting and inverse rendering walk the wrong way, or stop where nothing is solved."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        if not isinstance(subject.model, BSDF):
+            raise DoesNotApply("differences need 64 bits, which this renderer's variant does not have")
+        if subject.stochastic:
+            raise DoesNotApply("the model is stochastic: single values are random")
+        if not subject.has_density:
+            raise DoesNotApply("all lobes are deltas, which have no value to differentiate")
+        wo, wi = pairs(subject, effort.pairs // 8, seed)
+        worst, place, name, tried = -1.0, 0, "", []
+        skipped = 0.0
+        for label, parameter in _numeric(subject.model):
+            exact, differences, smooth, least = _derivatives(subject.model, label, parameter, wo, wi)
+            if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
+                continue
+            tried.append(label)
+            skipped = max(skipped, 1.0 - float(smooth.mean()))
+            floor = max(1e-6 * float(np.max(np.abs(differences[smooth]), initial=0.0)), least)
+            row, size = worst_of(relative(exact, differences, 0.0, floor) * smooth[:, None])
+            if size > worst:
+                worst, place, name = size, row, label
+        if not tried:
+            raise DoesNotApply("no parameter changes a value")
+        return Finding(
+            figure=worst,
+            tolerance=TOLERANCE,
+            reason="differences of float64 values are good to about 1e-6 here; edges, where two steps disagree, are left out",
+            worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
+            at=(wo[place], wi[place]),
+            notes=[f"tried: {', '.join(tried)}; {skipped:.2%} of the pairs lie on edges"],
+        )
+
+
+def _numeric(model: BSDF) -> list[tuple[str, Parameter]]:
+    return [(name, p) for name, p in model.parameters().items() if p.numeric]
+
+
+def _size(value: Any) -> float:
+    try:
+        size = float(np.max(np.abs(np.asarray(value, float))))
+    except (TypeError, ValueError):
+        return 1.0
+    return size if size > 0.0 else 1.0
+
+
+def _derivatives(
+    model: BSDF, name: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """By autodiff and by differences, (N, channels) each, where two different steps agree (N,), and the
+    derivative below which there is none.
+    """
+    dr = backend.drjit()
+    kind = backend.types("float64")
+    convert = converter(kind)
+    a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
+
+    def value(shift: Any) -> Any:
+        def moved(p: Parameter, v: Any) -> Any:
+            if p is not parameter and p != parameter:
+                return convert(p, v)
+            if p.kind == "angle":
+                # the bound value is (cos, sin), or nothing at all where the angle is 0
+                angle = backend.float_of(v, kind) + shift
+                s, c = dr.sincos(angle)
+                return kind.vec2(c, s)
+            return convert(p, v) + shift
+
+        bound = model.bind(lambda p, v: moved(p, v))
+        return guarded(model, "eval", lambda: bound.eval(a, b, "radiance"))
+
+    def number(shift: float) -> np.ndarray:
+        return np.array(backend.to_numpy(value(dr.opaque(kind.float, shift)), len(wo)), float)
+
+    delta = dr.opaque(kind.float, 0.0)
+    dr.enable_grad(delta)
+    result = value(delta)
+    if dr.grad_enabled(result):
+        dr.forward(delta)
+        exact = np.array(backend.to_numpy(dr.grad(result), len(wo)), float)
+    else:
+        exact = np.zeros((len(wo), 3))
+    step = STEP * _size(getattr(model, name))
+    one, two, half = (number(s * step) - number(-s * step) for s in (1.0, 2.0, 0.5))
+    wide = (8.0 * one - two) / (12.0 * step)
+    narrow = (8.0 * half - one) / (6.0 * step)
+    # a percent more of the parameter that changes a value by less than its hundred-millionth changes nothing
+    least = 1e-6 * float(np.max(np.abs(number(0.0)), initial=0.0)) / _size(getattr(model, name))
+    noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.max(np.abs(narrow), initial=0.0)), 1e-2 * least)
+    return exact, narrow, np.all(np.abs(wide - narrow) <= noise, axis=1), least

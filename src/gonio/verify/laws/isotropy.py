@@ -1,0 +1,101 @@
+"""Isotropy, or anisotropy along the axes that are declared."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..report import DoesNotApply, Finding
+from ..subject import Subject
+from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+EXACT = 1e-6
+SINGLE = 2e-3
+VISIBLE = 1e-3  # an anisotropy below this is none
+
+
+class Isotropy(Law):
+    """An isotropic f depends on theta_o, theta_i and |phi_o - phi_i| only; an anisotropic one is wider along the axis
+    whose width is larger.
+    """
+
+    number = 6
+    name = "isotropy"
+    title = "isotropic, or anisotropic along the axes, as declared"
+    meaning = "Highlights turn with the mesh's tangents where they should not, or stretch the wrong way."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        if not subject.has_density:
+            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+        if subject.stochastic:
+            raise DoesNotApply("the model is stochastic; its samples are compared with its pdf by another law")
+        exact = subject.best == "float64"
+        wo, wi = pairs(subject, effort.pairs, seed, exact)
+        turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
+        turned = _turned(wo, turn), _turned(wi, turn)
+        mirrored = wo * np.array([1.0, -1.0, 1.0]), wi * np.array([1.0, -1.0, 1.0])
+        error = np.zeros(len(wo))
+        for a, b in (turned, mirrored):
+            error = np.maximum(error, self._difference(subject, (wo, wi), (a, b), exact))
+        row, size = worst_of(error)
+        finding = Finding(
+            figure=size,
+            tolerance=EXACT if exact else SINGLE,
+            reason="a turn rounds a direction at 1e-16; formulas that cancel lose up to ten digits"
+            if exact
+            else "float32: beyond 8 roundings of the directions, the rest is the model's own sums",
+            worst=pair_in_words(wo[row], wi[row]),
+            at=(wo[row], wi[row]),
+        )
+        if subject.isotropic:
+            return finding
+        finding.shown = f"changes by {size:.2g} when turned"
+        finding.tolerance, finding.figure = 0.0, 0.0
+        finding.reason = "declared anisotropic: a turn must show, and the wider axis must be the declared one"
+        if size < VISIBLE:
+            finding.problems.append(f"declared anisotropic, but a turn changes it by no more than {size:.1e}")
+        self._axes(subject, finding)
+        return finding
+
+    def _difference(
+        self, subject: Subject, first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], exact: bool
+    ) -> np.ndarray:
+        there, back = subject.eval(*first), subject.eval(*second)
+        if exact:
+            floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
+            return relative(there, back, 0.0, floor).max(1)
+        noise = rounding(subject.eval, *first) + rounding(subject.eval, *second)
+        floor = 1e-6 * float(np.percentile(np.abs(there[np.isfinite(there)]), 99.0))
+        return relative(there, back, 8.0 * noise, floor).max(1)
+
+    def _axes(self, subject: Subject, finding: Finding) -> None:
+        """Second moments of eval over wi, seen from the normal, along the two axes: ordered as the two widths are."""
+        pair = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "alpha"), None)
+        if not isinstance(pair, tuple | list):
+            return
+        turn = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "angle"), 0.0)
+        phi0 = float(turn or 0.0)
+        theta = np.geomspace(1e-4, 0.499 * np.pi, 400)
+        phi = np.arange(64) * 2.0 * np.pi / 64
+        t, p = np.meshgrid(theta, phi, indexing="ij")
+        wi = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
+        value = subject.eval(np.tile([0.0, 0.0, 1.0], (len(wi), 1)), wi).mean(1)
+        # d omega = sin theta d theta d phi, and geometric steps in theta carry a factor theta
+        weight = value * (np.sin(t) * t).ravel() * np.sin(t).ravel() ** 2
+        along, across = np.sum(weight * np.cos(p.ravel() - phi0) ** 2), np.sum(weight * np.sin(p.ravel() - phi0) ** 2)
+        finding.notes.append(
+            f"second moments along x and y: {along / (along + across):.3f}, {across / (along + across):.3f}"
+        )
+        if (along - across) * (float(pair[0]) - float(pair[1])) < 0.0:
+            finding.problems.append(
+                f"widths {pair[0]:g}, {pair[1]:g}, but the lobe is wider along {'x' if along > across else 'y'}: axes swapped"
+            )
+
+
+def _turned(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], -1)

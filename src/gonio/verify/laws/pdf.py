@@ -1,0 +1,170 @@
+"""The pdf: what `sample` does is what `pdf` says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import directions, histogram, statistics
+from ..report import Finding, Trial
+from ..subject import Subject
+from .base import Law, pair_in_words, pairs
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+ABOVE = (
+    (0.0, 0.0),
+    (12.0, 20.0),
+    (30.0, 110.0),
+    (45.0, 200.0),
+    (60.0, 300.0),
+    (75.0, 45.0),
+    (85.0, 160.0),
+    (89.5, 250.0),
+)
+BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
+EXCESS = 1e-3
+SUPPORT = 1e-4
+
+
+class Pdf(Law):
+    """int pdf dwi = 1 - failed samples, pdf > 0 where eval > 0, and samples are spread as the pdf says (chi-square)."""
+
+    number = 4
+    name = "pdf"
+    title = "pdf integrates to 1, covers eval, and is what sample does"
+    meaning = "Multiple importance sampling weighs samples wrongly: energy is lost or gained, or noise never ends."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        parts = [({}, subject)]
+        parts += [({"alpha": width}, subject.replace(alpha=width)) for width in _widths(subject, effort)]
+        finding = Finding(
+            figure=0.0,
+            tolerance=EXCESS,
+            reason="int pdf is known to 1e-4; failed samples make it less than 1, never more",
+        )
+        lowest, shown = 2.0, ""
+        for settings, part in parts:
+            name = ", ".join(f"{k} = {v:g}" for k, v in settings.items())
+            _deltas(part, name, finding, seed)
+            if not part.has_density:
+                continue
+            for outcome in _chi_square(part, effort, seed):
+                wo = outcome["wo"]
+                place = f"{name + ': ' if name else ''}wo at {directions.text(wo).replace(',', ', ')} degrees"
+                for kind in ("fine", "coarse", "others"):
+                    p = getattr(outcome["p"], kind)
+                    finding.trials.append(Trial(p, f"{_KINDS[kind]}, {place}", _Again(part, wo, kind, effort, seed)))
+                    if p < lowest:
+                        lowest = p
+                        finding.data = {
+                            key: outcome[key]
+                            for key in ("expected", "observed", "rows", "columns", "drawn", "wo", "sides")
+                        }
+                        finding.settings, finding.worst = settings, place
+                excess = max(outcome["total"] - 1.0, 0.0)
+                if excess > finding.figure:
+                    finding.figure = excess
+        shown = "" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
+        finding.shown = shown or "deltas only"
+        _support(subject, finding, effort, seed)
+        return finding
+
+
+_KINDS = {"fine": "cells", "coarse": "coarse cells", "others": "share of samples in no cell against 1 - int pdf"}
+
+
+class _Again:
+    """The same test with another seed: other cells, other samples."""
+
+    def __init__(self, subject: Subject, wo: np.ndarray, kind: str, effort: Effort, seed: int) -> None:
+        self.subject, self.wo, self.kind, self.effort, self.seed = subject, wo, kind, effort, seed
+
+    def __call__(self) -> float:
+        outcomes = _chi_square(self.subject, self.effort, self.seed + 7919, self.wo[None])
+        return min((getattr(outcome["p"], self.kind) for outcome in outcomes), default=1.0)
+
+
+def _widths(subject: Subject, effort: Effort) -> list[float]:
+    """Other widths to try, where there is a width to change."""
+    parameter = subject.parameters.get("alpha")
+    if parameter is None or parameter.kind not in ("alpha", "float"):
+        return []
+    return [width for width in effort.widths if parameter.low <= width <= parameter.high]
+
+
+def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[dict[str, Any]]:
+    if wo is None:
+        grid_of = [*(ABOVE if 1 in subject.sides else ()), *(BELOW if -1 in subject.sides else ())]
+        wo = directions.single(np.array([directions.at(*angles) for angles in grid_of]).reshape(-1, 3))
+    if not len(wo):
+        return []
+    grid = histogram.place(subject, wo, seed)
+    if grid is None:
+        return []
+    expected = histogram.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
+    counts = histogram.count(subject, grid, effort.log_samples, seed)
+    return [
+        {
+            "wo": wo[i],
+            "p": histogram.compare(expected, counts, i),
+            "total": float(expected.total[i]),
+            "expected": expected.cells[i] * counts.drawn,
+            "observed": counts.cells[i],
+            "rows": grid.rows[i],
+            "columns": grid.columns[i],
+            "drawn": counts.drawn,
+            "sides": grid.sides,
+        }
+        for i in range(len(wo))
+    ]
+
+
+def _deltas(subject: Subject, name: str, finding: Finding, seed: int) -> None:
+    """Delta samples come as often as their pdf, which is a probability, says: each direction that occurs is a test."""
+    where = [*(ABOVE[::2] if 1 in subject.sides else ()), *(BELOW[1::2] if -1 in subject.sides else ())]
+    count = 1 << 16
+
+    def frequencies(angles: tuple[float, float], seed: int) -> list[tuple[np.ndarray, float]]:
+        wo = np.tile(directions.single(directions.at(*angles)[None]), (count, 1))
+        s = subject.sample(wo, directions.numbers(np.random.default_rng([seed, 21]), count), precision="float32")
+        chosen = s.delta & (s.pdf > 0.0)
+        if not chosen.any():
+            return []
+        keys = np.round(s.wi[chosen], 4)
+        found = []
+        for key in np.unique(keys, axis=0)[:8]:
+            mine = np.all(keys == key, axis=1)
+            probability = float(s.pdf[chosen][mine].mean())
+            found.append((key, statistics.binomial_two_sided(float(mine.sum()), count, min(probability, 1.0))))
+        return found
+
+    for angles in where:
+        for i, (key, p) in enumerate(frequencies(angles, seed)):
+
+            def again(angles: tuple[float, float] = angles, i: int = i) -> float:
+                second = frequencies(angles, seed + 7919)
+                return second[i][1] if i < len(second) else 0.0
+
+            text = f"{name + ': ' if name else ''}delta toward {directions.text(key)} from {angles[0]:g} degrees"
+            finding.trials.append(Trial(p, text, again))
+
+
+def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:
+    """eval > 0 where pdf = 0 is light that sampling never finds."""
+    if not subject.has_density:
+        return
+    wo, wi = pairs(subject, effort.pairs, seed)
+    value, pdf = subject.eval(wo, wi, precision=subject.best).max(1), subject.pdf(wo, wi, precision=subject.best)
+    wanting = (value > 0.0) & ~(pdf > 0.0)
+    total = float(np.sum(value[np.isfinite(value)]))
+    share = float(np.sum(value[wanting & np.isfinite(value)])) / total if total > 0.0 else 0.0
+    if np.any(pdf < 0.0):
+        row = int(np.argmin(pdf))
+        finding.problems.append(f"pdf is negative: {pdf[row]:.3g} with {pair_in_words(wo[row], wi[row])}")
+    if share > SUPPORT:
+        row = int(np.argmax(np.where(wanting, value, 0.0)))
+        finding.problems.append(f"eval > 0 where pdf = 0: {share:.2%} of all light, {pair_in_words(wo[row], wi[row])}")
+        finding.at = (wo[row], wi[row])

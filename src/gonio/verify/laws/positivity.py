@@ -1,0 +1,198 @@
+"""Non-negative and finite, everywhere and at the ends of every range."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...models import BSDF
+from ...models.base import converter
+from ...ops import backend
+from .. import directions
+from ..report import Finding
+from ..subject import Fault, Subject, guarded
+from .base import Law, pair_in_words, pairs
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+THETA = (0.0, 1e-3, 1.0, 30.0, 60.0, 89.0, 89.9, 89.99, 89.9999, 90.0)
+PHI = (0.0, 90.0, 137.0, 180.0)
+CORNERS = (0.0, 1e-7, 0.5, 0.99999994)  # 0, the least that counts, the middle, and the largest float32 below 1
+NEGATIVE = 1e-6  # of the largest value: float32 sums that cancel end this far below 0
+
+
+class Positivity(Law):
+    """eval, pdf and weight are finite and >= 0, and so are their gradients finite, to 89.9999 degrees and at extremes."""
+
+    number = 1
+    name = "positivity"
+    title = "non-negative and finite, at extremes and in gradients"
+    meaning = (
+        "One NaN blackens a pixel for good and spreads with every filter; negative light darkens its surroundings."
+    )
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        wo, wi, u = _grid(subject, effort, seed)
+        variants = [({}, subject), *_extremes(subject)]
+        finding = Finding(
+            figure=0.0,
+            tolerance=0.0,
+            reason="a single one is one too many",
+            notes=[f"{len(variants)} settings: the given one and the ends of each range"],
+        )
+        checked = 0
+        for changes, together in _batches(subject, variants, len(wo)):
+            many = [np.tile(part, (len(changes), 1)) for part in (wo, wi, u)]
+            for precision in together.precisions:
+                for what, values, a, b, rows in _values(together, *many, precision):
+                    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
+                    wrong = ~np.isfinite(values) | (values < (-NEGATIVE * largest if what != "wi" else -np.inf))
+                    checked += values.size
+                    if not wrong.any():
+                        continue
+                    finding.figure += int(wrong.sum())
+                    row = int(np.flatnonzero(wrong.any(1))[0])
+                    changed = changes[rows[row] // len(wo)]
+                    text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}{_words(changed)}"
+                    finding.problems.append(
+                        f"{text}: {int(wrong.sum())} values, first at {pair_in_words(a[row], b[row])}"
+                    )
+                    if finding.at is None:
+                        finding.at, finding.settings, finding.worst = (
+                            (a[row], b[row]),
+                            changed,
+                            pair_in_words(a[row], b[row]),
+                        )
+            if isinstance(together.model, BSDF) and not together.stochastic:
+                for name, row in _bad_gradients(together, many[0], many[1]):
+                    finding.figure += 1
+                    place = pair_in_words(many[0][row], many[1][row])
+                    changed = changes[row // len(wo)]
+                    finding.problems.append(f"the gradient of eval by {name} is not finite{_words(changed)}: {place}")
+                    if finding.at is None:
+                        finding.at, finding.settings, finding.worst = (many[0][row], many[1][row]), changed, place
+        finding.shown = f"{finding.figure:g} of {checked:.3g}"
+        del finding.problems[6:]
+        return finding
+
+
+def _words(changed: dict[str, Any]) -> str:
+    return "".join(f", {name} = {value}" for name, value in changed.items())
+
+
+def _batches(
+    subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
+) -> list[tuple[list[dict[str, Any]], Subject]]:
+    """Settings that go together in one call, one parameter value a ray; one by one where the subject takes no arrays."""
+    changes = [changed for changed, _ in variants]
+    names = dict.fromkeys(name for changed in changes for name in changed)
+    columns = {}
+    for name in names:
+        given = getattr(subject.model, name, None)
+        if subject.parameters[name].kind == "alpha" and isinstance(given, tuple | list):
+            pairs_ = [(c.get(name, given)) if np.ndim(c.get(name, given)) else (c[name],) * 2 for c in changes]
+            columns[name] = tuple(np.repeat([float(p[k]) for p in pairs_], count) for k in (0, 1))
+        else:
+            values = np.broadcast_arrays(*[np.asarray(c.get(name, given), float) for c in changes])
+            if np.ndim(values[0]) == 0 and subject.parameters[name].kind == "spectrum":
+                values = [np.full(3, float(v)) for v in values]
+            columns[name] = np.repeat(np.array(values), count, axis=0)
+    if isinstance(subject.model, BSDF) and columns:
+        try:
+            together = subject.replace(**columns)
+            probe = directions.at(np.full(len(changes) * count, 30.0), 10.0)
+            together.eval(probe, probe)
+            return [(changes, together)]
+        except (Fault, InputError):
+            pass
+    return [([changed], variant) for changed, variant in variants]
+
+
+def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs: extreme angles with each other, both sides whether it answers there or not, and random ones."""
+    theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
+    pair = np.array(list(itertools.product(theta, theta, PHI)))
+    random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)
+    wo = np.concatenate([directions.at(pair[:, 0], 20.0), random_o])
+    wi = np.concatenate([directions.at(pair[:, 1], 20.0 + pair[:, 2]), random_i])
+    corners = np.array(list(itertools.product(CORNERS, repeat=3)))
+    u = directions.numbers(np.random.default_rng([seed, 9]), len(wo))
+    u[: len(pair)] = np.resize(corners, (len(pair), 3))
+    return directions.single(wo), directions.single(wi), u
+
+
+def _values(
+    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: str
+) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """What is looked at: its name, the values (n, channels), the directions they belong to, and their rows."""
+    rows = np.arange(len(wo))
+    yield "eval", subject.eval(wo, wi, precision=precision), wo, wi, rows
+    yield "pdf", subject.pdf(wo, wi, precision)[:, None], wo, wi, rows
+    s = subject.sample(wo, u, precision=precision)
+    shown = np.where(np.isfinite(s.wi), s.wi, 0.0)
+    yield "weight", s.weight, wo, shown, rows
+    yield "a sample's pdf", s.pdf[:, None], wo, shown, rows
+    drawn = s.pdf > 0.0
+    yield "wi", s.wi[drawn], wo[drawn], shown[drawn], rows[drawn]
+
+
+def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
+    """The subject with one parameter at an end of its range, for each parameter and end."""
+    found = []
+    for name, parameter in subject.parameters.items():
+        if not parameter.numeric or parameter.kind == "angle":
+            continue
+        ends: list[float] = []
+        if parameter.kind == "alpha" or name.startswith("alpha"):
+            ends = [0.0, 1e-4, 1.0]
+        elif name == "eta" or name.endswith("ior"):
+            ends = [1.0001, 4.0]
+        else:
+            low = parameter.low if np.isfinite(parameter.low) else 0.0
+            ends = [low, parameter.high if np.isfinite(parameter.high) else max(low, 1.0) * 100.0]
+        for end in ends:
+            try:
+                found.append(({name: end}, subject.replace(**{name: end})))
+            except InputError:
+                continue  # the model refuses the value: it need not answer for it
+    return found
+
+
+def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tuple[str, int]]:
+    """Parameters whose gradient of the summed values is not finite, each with a row where."""
+    dr = backend.drjit()
+    kind = backend.types("float32")
+    convert = converter(kind)
+    leaves: dict[str, list[Any]] = {}
+
+    def watched(parameter: Any, value: Any) -> Any:
+        bound = convert(parameter, value)
+        if bound is not None and backend.is_drjit(bound):
+            # one entry a ray, so that the gradient says which
+            bound = bound + dr.zeros(kind.float, len(wo))
+            dr.enable_grad(bound)
+            leaves.setdefault(parameter.name, []).append(bound)
+        return bound
+
+    model = subject.model.bind(watched)
+    # values hold to the horizon itself, their slopes, which are powers of the cosine steeper, to 89.9999 degrees
+    shallow = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) < 1.5e-6
+    wo, wi = np.where(shallow[:, None], [0.6, 0.0, 0.8], wo), np.where(shallow[:, None], [0.0, 0.6, 0.8], wi)
+    a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
+    value = guarded(subject.model, "eval", lambda: model.eval(a, b, "radiance"))
+    if not dr.grad_enabled(value):
+        return []
+    dr.backward(dr.sum(dr.sum(value, axis=0)))
+    found = []
+    for name, bounds in leaves.items():
+        for bound in bounds:
+            gradient = np.asarray(dr.grad(bound).numpy())
+            wrong = ~np.isfinite(gradient.reshape(-1, gradient.shape[-1])).all(0)
+            if wrong.any():
+                found.append((name, int(np.argmax(wrong)) if len(wrong) == len(wo) else 0))
+    return found

@@ -1,0 +1,61 @@
+"""Precision: 32 bits say what 64 bits say."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..report import DoesNotApply, Finding
+from ..subject import Subject
+from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+TOLERANCE = 1e-3
+ALLOWED = 8.0  # roundings of the directions that float32 code may show
+
+
+class Precision(Law):
+    """eval and pdf in float32 are those in float64, but for what a rounding of the directions does to the value."""
+
+    number = 9
+    name = "precision"
+    title = "float32 says what float64 says"
+    meaning = "Speckles and rings that come and go with distance, angle and roughness."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        if "float64" not in subject.precisions:
+            raise DoesNotApply("there is no 64-bit variant of it to compare with")
+        if subject.stochastic:
+            raise DoesNotApply("the model is stochastic: single values are random")
+        if not subject.has_density:
+            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+        wo, wi = pairs(subject, effort.pairs, seed)
+        worst, place, name, plain = -1.0, 0, "", 0.0
+        curve = None
+        for what in ("eval", "pdf"):
+
+            def values(a: np.ndarray, b: np.ndarray, p: str = "float64", what: str = what) -> np.ndarray:
+                return subject.eval(a, b, precision=p) if what == "eval" else subject.pdf(a, b, p)[:, None]
+
+            quick, exact = values(wo, wi, "float32"), values(wo, wi)
+            noise = ALLOWED * rounding(values, wo, wi)
+            floor = 1e-6 * float(np.percentile(np.abs(exact), 99.0))
+            plain = max(plain, float(np.percentile(relative(quick, exact, 0.0, floor), 99.9)))
+            error = relative(quick, exact, noise, floor)
+            if what == "eval":
+                curve = relative(quick, exact, 0.0, floor).max(1)
+            row, size = worst_of(error)
+            if size > worst:
+                worst, place, name = size, row, what
+        return Finding(
+            figure=worst,
+            tolerance=TOLERANCE,
+            reason=f"beyond {ALLOWED:g} roundings (6e-8) of the directions, what is left is sums that cancel",
+            shown=f"{worst:.1e}; 99.9 % within {plain:.1e}",
+            worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
+            at=(wo[place], wi[place]),
+            data={"error": curve, "cos_o": np.abs(wo[:, 2]), "cos_i": np.abs(wi[:, 2])},
+        )

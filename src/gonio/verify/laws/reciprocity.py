@@ -1,0 +1,131 @@
+"""Reciprocity: light may be followed either way."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import directions, statistics
+from ..report import DoesNotApply, Finding, Trial
+from ..subject import Subject
+from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+EXACT = 1e-6
+SINGLE = 2e-3
+STEPS = 24  # of the map, in each angle
+REPEATS = 4096  # of a stochastic model's values
+
+
+class Reciprocity(Law):
+    """f(wo, wi) / eta_o^2 = f(wi, wo) / eta_i^2, eta the index on each direction's side (Veach1997, eq. 5.14)."""
+
+    number = 2
+    name = "reciprocity"
+    title = "f(wo, wi) = f(wi, wo); in transmission f / eta^2"
+    meaning = (
+        "Pictures differ between path tracing, light tracing and photon mapping; bidirectional methods are biased."
+    )
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        if not subject.has_density:
+            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+        eta = _eta(subject, seed)
+        if subject.stochastic:
+            return self._expected(subject, effort, seed, eta)
+        exact = subject.best == "float64"
+        wo, wi = pairs(subject, effort.pairs, seed, exact)
+        # f divides by the cosine: within .006 degrees of grazing that is all rounding
+        keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 1e-4
+        wo, wi = wo[keep], wi[keep]
+        error = _difference(subject, wo, wi, eta, exact)
+        row, size = worst_of(error)
+        single = (
+            "float32 values: an error beyond 8 roundings of the directions is the model's; the rest is its own sums"
+        )
+        return Finding(
+            figure=size,
+            tolerance=EXACT if exact else SINGLE,
+            reason="float64 rounds at 1e-16; formulas that cancel lose up to ten digits" if exact else single,
+            worst=pair_in_words(wo[row], wi[row]),
+            at=(wo[row], wi[row]),
+            data={"map": _map(subject, eta, exact), "below": subject.transmits},
+        )
+
+    def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
+        """A stochastic model: means over many values of each pair, both ways."""
+        wo, wi = pairs(subject, 24, seed)
+        trials, worst, place = [], 0.0, 0
+        for i, (a, b) in enumerate(zip(wo, wi, strict=True)):
+            there, back = _mean(subject, a, b), _mean(subject, b, a)
+            scale = _scale(a[None], b[None], eta)[0]
+            difference = there[0] * scale - back[0]
+            noise = np.hypot(there[1] * scale, back[1])
+            if noise <= 0.0:
+                continue
+
+            def again(a: np.ndarray = a, b: np.ndarray = b, scale: float = scale) -> float:
+                x, y = _mean(subject, a, b), _mean(subject, b, a)
+                return statistics.normal_two_sided((x[0] * scale - y[0]) / np.hypot(x[1] * scale, y[1]))
+
+            p = statistics.normal_two_sided(difference / noise)
+            trials.append(Trial(p, pair_in_words(a, b), again))
+            if abs(difference) / noise > worst:
+                worst, place = abs(difference) / noise, i
+        return Finding(
+            figure=worst,
+            tolerance=np.inf,
+            reason="the model is stochastic: expectations are compared, by their p-values",
+            shown=f"{worst:.2f} standard errors",
+            worst=pair_in_words(wo[place], wi[place]),
+            at=(wo[place], wi[place]),
+            trials=trials,
+        )
+
+
+def _mean(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> tuple[float, float]:
+    values = subject.f(np.tile(wo, (REPEATS, 1)), np.tile(wi, (REPEATS, 1))).mean(1)
+    return float(values.mean()), float(values.std() / np.sqrt(REPEATS))
+
+
+def _eta(subject: Subject, seed: int) -> float:
+    """Index below over index above, as the model's own samples say; 1 where nothing is transmitted."""
+    if not subject.transmits:
+        return 1.0
+    rng = np.random.default_rng([seed, 4])
+    wo = directions.on_side(directions.uniform(rng, 4096), 1)
+    drawn = subject.sample(wo, directions.numbers(rng, 4096))
+    through = (drawn.pdf > 0.0) & (drawn.wi[:, 2] < 0.0)
+    return float(np.median(drawn.eta[through])) if through.any() else 1.0
+
+
+def _scale(wo: np.ndarray, wi: np.ndarray, eta: float) -> np.ndarray:
+    """(eta_i / eta_o)^2, what f(wo, wi) must be multiplied with to be f(wi, wo)."""
+    through = wo[:, 2] * wi[:, 2] < 0.0
+    return np.where(through, np.where(wo[:, 2] > 0.0, eta**2, eta**-2), 1.0)
+
+
+def _difference(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, exact: bool) -> np.ndarray:
+    scale = _scale(wo, wi, eta)[:, None]
+    there, back = subject.f(wo, wi) * scale, subject.f(wi, wo)
+    if exact:
+        # a value that is a billionth of the largest is as good as zero
+        floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
+        return relative(there, back, 0.0, floor)
+    noise = rounding(lambda a, b: subject.f(a, b) * scale, wo, wi) + rounding(subject.f, wi, wo)
+    floor = 1e-6 * float(np.percentile(np.abs(there[np.isfinite(there)]), 99.0))
+    return relative(there, back, 8.0 * noise, floor)
+
+
+def _map(subject: Subject, eta: float, exact: bool) -> np.ndarray:
+    """The largest relative difference over azimuths, by (theta_o, theta_i), for pictures."""
+    below = subject.transmits
+    theta = (np.arange(STEPS) + 0.5) / STEPS * (180.0 if below else 90.0)
+    phi = np.arange(8) * 45.0 + 11.0
+    to, ti, p = np.meshgrid(theta, theta, phi, indexing="ij")
+    wo, wi = directions.at(to.ravel(), 7.0), directions.at(ti.ravel(), 7.0 + p.ravel())
+    error = _difference(subject, *((wo, wi) if exact else (directions.single(wo), directions.single(wi))), eta, exact)
+    return error.max(1).reshape(to.shape).max(2)

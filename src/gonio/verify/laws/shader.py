@@ -1,0 +1,24 @@
+"""Shader parity: the door for the day that models are written out as shader code."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..report import DoesNotApply, Finding
+from ..subject import Subject
+from .base import Law
+
+if TYPE_CHECKING:
+    from ..run import Effort
+
+
+class Shader(Law):
+    """The shader code that is written from a model gives the model's values."""
+
+    number = 10
+    name = "shader"
+    title = "shader code gives the same values"
+    meaning = "The engine's picture differs from the offline reference."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        raise DoesNotApply("no shader code is written yet")

@@ -1,0 +1,257 @@
+"""What the laws are held against: a BSDF behind its protocol, with the facts that it declares about itself.
+
+A subject answers `eval`, `pdf` and `sample` on NumPy arrays, in the precisions it has, and hands out a bound copy for
+wavefronts of Dr.Jit arrays. An exception inside the BSDF comes out as a `Fault` that names the line; so does an answer
+of the wrong shape. Nothing here knows which material it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import shlex
+import traceback
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..models import BSDF, Parameter, Sample, models
+from ..models.base import Breach, converter
+from ..ops import backend
+from . import directions
+
+
+class Fault(Exception):
+    """The BSDF itself failed: an exception inside it, or an answer that no BSDF may give."""
+
+    def __init__(self, what: str, where: str = "") -> None:
+        self.what, self.where = what, where
+        super().__init__(f"{what} ({where})" if where else what)
+
+
+@dataclasses.dataclass(frozen=True)
+class Subject:
+    """A BSDF on trial.
+
+    model     what speaks the protocol
+    target    how it was named: "conductor", "glass.py:Glass", "mitsuba:plastic"
+    settings  the parameters that were set, by name, for titles and commands
+    """
+
+    model: Any
+    target: str
+    settings: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    # ------------------------------------------------------------------ facts
+
+    @property
+    def title(self) -> str:
+        """The target with its settings: "conductor, alpha = 0.3"."""
+        return ", ".join([self.target, *(f"{name} = {_short(value)}" for name, value in self.settings.items())])
+
+    @property
+    def transmits(self) -> bool:
+        return bool(self.model.transmits)
+
+    @property
+    def isotropic(self) -> bool:
+        return bool(self.model.isotropic)
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether `eval` and the weight are random numbers with the right expectation."""
+        return bool(getattr(self.model, "stochastic", False))
+
+    @property
+    def precisions(self) -> tuple[str, ...]:
+        """The precisions it can be evaluated in, the most precise last."""
+        return tuple(getattr(self.model, "precisions", backend.PRECISIONS))
+
+    @property
+    def best(self) -> str:
+        return self.precisions[-1]
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        return self.model.parameters()
+
+    @property
+    def breaches(self) -> dict[str, Breach]:
+        """Laws that it declares to break."""
+        return self.model.breaches()
+
+    @functools.cached_property
+    def sides(self) -> tuple[int, ...]:
+        """The sides of the surface from which it answers: (1,), (1, -1), or () where nothing comes back at all."""
+        rng = np.random.default_rng(5)
+        found = []
+        for side in (1, -1):
+            wo = directions.single(directions.on_side(directions.uniform(rng, 512), side))
+            wi = directions.single(directions.uniform(rng, 512))
+            lit = np.any(self.eval(wo, wi, precision="float32") > 0.0)
+            if lit or np.any(self.sample(wo, directions.numbers(rng, 512), precision="float32").pdf > 0.0):
+                found.append(side)
+        return tuple(found)
+
+    @functools.cached_property
+    def has_density(self) -> bool:
+        """Whether some lobe is no delta: it gives values, or samples with a density."""
+        rng = np.random.default_rng(6)
+        wo, wi = (directions.single(directions.uniform(rng, 2048)) for _ in range(2))
+        if np.any(self.eval(wo, wi, precision="float32") > 0.0):
+            return True
+        drawn = self.sample(wo, directions.numbers(rng, 2048), precision="float32")
+        return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
+
+    def replace(self, **values: Any) -> Subject:
+        """The same BSDF with other parameter values."""
+        model = self.model
+        if hasattr(model, "replace"):
+            changed = model.replace(**values)
+        else:
+            fields = {field.name: getattr(model, field.name) for field in dataclasses.fields(model)}
+            changed = type(model)(**{**fields, **values})
+        return Subject(changed, self.target, {**self.settings, **values})
+
+    def command(self, *more: str) -> str:
+        """A command line that puts this BSDF on trial again."""
+        parts = ["gonio", "verify", self.target]
+        for name, value in self.settings.items():
+            parts += ["--param", f"{name}={_short(value)}"]
+        return " ".join(part if part == "verify" else shlex.quote(part) for part in [*parts, *more])
+
+    # ------------------------------------------------------------------ the protocol
+
+    def eval(self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: str | None = None) -> np.ndarray:
+        """f |cos theta_i| of rows (N, 3): (N, channels) in float64."""
+        value = self._call("eval", wo, wi, mode=mode, precision=precision or self.best)
+        return self._shaped("eval", value, len(wo), 2)
+
+    def pdf(self, wo: np.ndarray, wi: np.ndarray, precision: str | None = None) -> np.ndarray:
+        """Density, (N,) in float64."""
+        value = self._call("pdf", wo, wi, precision=precision or self.best)
+        return self._shaped("pdf", value, len(wo), 1)
+
+    def sample(self, wo: np.ndarray, u: np.ndarray, mode: str = "radiance", precision: str | None = None) -> Sample:
+        """Directions, weights, densities and flags of rows (N, 3), in float64 and bool."""
+        s = self._call("sample", wo, u, mode=mode, precision=precision or self.best)
+        if not isinstance(s, tuple) or len(s) != 5:
+            raise Fault(f"sample returned {type(s).__name__}, a Sample expected", _place(self.model, "sample"))
+        n = len(wo)
+        return Sample(
+            self._shaped("sample: wi", s[0], n, 2),
+            self._shaped("sample: weight", s[1], n, 2),
+            self._shaped("sample: pdf", s[2], n, 1),
+            np.broadcast_to(np.asarray(s[3]).astype(bool), (n,)),
+            self._shaped("sample: eta", s[4], n, 1),
+        )
+
+    def f(self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: str | None = None) -> np.ndarray:
+        """The BSDF without the cosine, 1/sr; 0 where cos theta_i = 0."""
+        value = self.eval(wo, wi, mode, precision)
+        cos = np.abs(wi[:, 2:])
+        return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0.0)
+
+    def bound(self, precision: str = "float32") -> Any:
+        """The model for wavefronts of Dr.Jit arrays of that precision: values are opaque, a new one compiles nothing."""
+        if isinstance(self.model, BSDF):
+            return self.model.bind(converter(backend.types(precision)))
+        return self.model
+
+    def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:
+        if not (self.transmits or method == "sample" or "mode" not in more):
+            more["mode"] = "radiance"  # both modes are one, and one kernel is enough
+        takes = inspect.signature(getattr(self.model, method)).parameters
+        if "mode" in more and "mode" not in takes and not isinstance(self.model, BSDF):
+            del more["mode"]
+        return guarded(self.model, method, lambda: getattr(self.model, method)(first, second, **more))
+
+    def _shaped(self, what: str, value: Any, count: int, dimensions: int) -> np.ndarray:
+        array = np.asarray(value)
+        expected = f"({count},)" if dimensions == 1 else f"({count}, channels)"
+        place = _place(self.model, what.split(":")[0])
+        if array.dtype.kind not in "fiu" or array.ndim != dimensions or (array.ndim and array.shape[0] != count):
+            raise Fault(f"{what} returned shape {array.shape}, {expected} expected", place)
+        if what in ("eval", "sample: weight") and array.shape[1] not in (1, 3, 4):
+            raise Fault(f"{what} returned {array.shape[1]} channels, those of a spectrum expected", place)
+        if what == "sample: wi" and array.shape[1] != 3:
+            raise Fault(f"{what} returned {array.shape[1]} components, 3 expected", place)
+        return array.astype(np.float64)
+
+
+def guarded(model: Any, method: str, run: Any) -> Any:
+    """What `run` returns; an exception inside the model comes out as a Fault that names its line."""
+    try:
+        return run()
+    except (Fault, InputError, KeyboardInterrupt, TimeoutError):
+        raise
+    except Exception as error:
+        text = str(error).strip().splitlines()
+        raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from error
+
+
+def _line(model: Any, error: Exception) -> str:
+    """file:line of the innermost frame inside the model's own file, else of the innermost frame at all."""
+    frames = traceback.extract_tb(error.__traceback__)
+    try:
+        own = Path(inspect.getsourcefile(type(model)) or "").name
+    except TypeError:
+        own = ""
+    inside = [f for f in frames if own and Path(f.filename).name == own] or frames
+    return f"{Path(inside[-1].filename).name}:{inside[-1].lineno}" if inside else ""
+
+
+def _place(model: Any, method: str) -> str:
+    try:
+        function = inspect.unwrap(getattr(type(model), method))
+        return f"{Path(inspect.getsourcefile(function) or '').name}:{function.__code__.co_firstlineno}"
+    except (AttributeError, TypeError):
+        return ""
+
+
+def of(model: Any) -> Subject:
+    """The subject of a model that Python holds: named by its class, with the parameters that are not the default."""
+    if isinstance(model, Subject):
+        return model
+    if not isinstance(model, BSDF):
+        raise InputError(f"{type(model).__name__} given, a material expected", "verify", "give a gonio.BSDF")
+    settings = {}
+    for name, parameter in model.parameters().items():
+        value = getattr(model, name)
+        if parameter.required or not _same(value, parameter.default):
+            settings[name] = value
+    return Subject(model, _name(type(model)), settings)
+
+
+def _name(cls: type) -> str:
+    """How the command line finds a class: a model's name, else FILE.py:CLASS."""
+    if cls in models().values():
+        return cls.name  # type: ignore[attr-defined]
+    try:
+        return f"{inspect.getsourcefile(cls)}:{cls.__qualname__}"
+    except (TypeError, OSError):
+        return cls.__qualname__
+
+
+def _same(a: Any, b: Any) -> bool:
+    try:
+        return bool(np.all(np.asarray(a) == np.asarray(b)))
+    except (TypeError, ValueError):
+        return False
+
+
+def _short(value: Any) -> str:
+    """A value as --param takes it."""
+    if isinstance(value, BSDF):
+        inner = ",".join(f"{k}={_short(v)}" for k, v in of(value).settings.items())
+        return f"{value.name}({inner})" if inner else value.name
+    if isinstance(value, bool | np.bool_):
+        return str(bool(value)).lower()
+    if np.ndim(value):
+        return ",".join(f"{v:.6g}" for v in np.asarray(value).ravel())
+    if isinstance(value, float | int | np.floating | np.integer):
+        return f"{value:.6g}"
+    return str(value)
