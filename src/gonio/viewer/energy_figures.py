@@ -48,16 +48,18 @@ def plot_comparison(found: dict[str, Any], folder: Path) -> Path:
     axes = figure.subplots(2, len(comparison.MATERIALS))
     roughness = found["roughness"]
     middle = len(found["mu"]) // 2
-    styles = {"random walk": {"color": "black", "marker": "o", "linestyle": "none", "fillstyle": "none"}}
+    colours = {m: f"C{index}" for index, m in enumerate(comparison.METHODS)}
+    walk = {"color": "black", "marker": "o", "linestyle": "none", "fillstyle": "none"}
     for column, name in enumerate(comparison.MATERIALS):
         by_method = {m: np.asarray(v) for m, v in found["albedo"][name].items()}
         referee = by_method["random walk"]
         for method, value in by_method.items():
-            style = styles.get(method, {"linestyle": "--" if method == "plain" else "-"})
+            line = {"color": colours[method], "linestyle": "--" if method in ("plain", "fdez-aguera") else "-"}
+            style = walk if method == "random walk" else line
             axes[0, column].plot(roughness, value[:, middle].mean(-1), label=method, **style)
             if method not in ("random walk", "plain"):
                 distance = np.sqrt(np.mean((value - referee) ** 2, axis=(1, 2)))
-                axes[1, column].plot(roughness, distance, label=method)
+                axes[1, column].plot(roughness, distance, label=method, **line)
         axes[0, column].set(title=name, xlabel="roughness", ylim=(0, 1.05))
         axes[1, column].set(xlabel="roughness")
     axes[0, 0].set_ylabel(f"albedo at mu = {found['mu'][middle]:g}, mean of channels")
