@@ -43,11 +43,9 @@ def test_rough_glass_gains_no_power(ndf: str, eta: float) -> None:
             assert 0.15 < albedo.max() <= 1 + 2e-4, (alpha, degrees)
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", [name for name in SMALL if "energy" not in SMALL[name].breaks])
 def test_mean_weight_of_samples_is_at_most_one(name: str) -> None:
     material = SMALL[name]
-    if "energy" in material.breaks:
-        pytest.skip(str(material.breaks["energy"]))
     u = np.random.default_rng(SEED).random((50_000, 3))
     for degrees in (5, 70, 120):
         weight = material.sample(np.tile(at(degrees), (len(u), 1)), u, "importance").weight.max(axis=1)
