@@ -267,7 +267,7 @@ def _glass(
     for side, ratio in (("thin", eta), ("dense", 1.0 / eta)):
         ratio = np.broadcast_to(ratio, shape)
         name = f"E_glass_{side}"
-        arrays[name] = sum(quadrature.glass(ndf, masking, fresnel, cos, alpha, ratio))  # type: ignore[arg-type]
+        arrays[name] = sum(quadrature.glass(ndf, masking, fresnel, cos, alpha, ratio))  # type: ignore[assignment]
         judge = quadrature.glass(
             ndf, masking, fresnel, cos[some], alpha[some], ratio[some], nodes=quadrature.GLASS_JUDGE
         )
@@ -319,7 +319,7 @@ def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict
     if store not in ("E", "1-E"):
         raise InputError(f"unknown '{store}'", "--store", "E or 1-E")
     size = baked.manifest["size"]
-    pictures = {}
+    pictures: dict[str, np.ndarray] = {}
     for name in ("E", "E_avg"):
         if name not in baked.arrays:
             continue

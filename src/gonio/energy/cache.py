@@ -43,7 +43,7 @@ def _fingerprint(key: tuple, ndf: str) -> str:
 
     modules = {m.__name__: m for m in (fresnel, masking, special, base, ggx, quadrature)}
     own = inspect.getmodule(type(distribution(ndf)))
-    modules[own.__name__] = own  # type: ignore[union-attr]
+    modules[type(distribution(ndf)).__module__] = own  # type: ignore[assignment]
     text = "".join(inspect.getsource(modules[name]) for name in sorted(modules))
     return hashlib.sha256((repr(key) + text).encode()).hexdigest()
 

@@ -71,7 +71,7 @@ def compare(
     found: dict[str, dict[str, np.ndarray]] = {name: {} for name in MATERIALS}
     for name in MATERIALS:
         for method in METHODS:
-            rows = []
+            rows: list[Any] = []
             for r in roughness:
                 base = material(name, r * r)
                 if method == "random walk":

@@ -175,7 +175,11 @@ def generator(wo: Any, wi: Any, seed: Any) -> Any:
         state = (state ^ bits) * UInt(0x85EBCA6B)
         state = (state ^ (state >> 15)) * UInt(0xC2B2AE35)
         state = state ^ (state >> 13)
-    return kind.module.PCG32(size=dr.width(state), initstate=kind.module.UInt64(state), initseq=kind.module.UInt64(1))
+    count = dr.width(state)
+    # equal pairs in one call differ by their lane
+    lane = dr.arange(UInt, count) * UInt(0x9E3779B1)
+    state = (state ^ lane ^ (lane >> 16)) * UInt(0x85EBCA6B)
+    return kind.module.PCG32(size=count, initstate=kind.module.UInt64(state ^ (state >> 13)))
 
 
 def albedo(base: Any, mu: float, walks: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

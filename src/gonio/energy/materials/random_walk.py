@@ -26,12 +26,13 @@ class RandomWalk(_Added):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.base.ndf, self.base.masking) != ("ggx", "smith-correlated"):
-            what = f"{self.base.ndf} with {self.base.masking} given, ggx with smith-correlated expected"
+        base: Any = self.base
+        if (base.ndf, base.masking) != ("ggx", "smith-correlated"):
+            what = f"{base.ndf} with {base.masking} given, ggx with smith-correlated expected"
             raise InputError(what, "RandomWalk.base", "the walk's first bounce is exactly that")
 
     def _extra(self, found: Any, wo: Any, wi: Any, mode: str) -> Any:
-        base = self.base
+        base: Any = self.base
         alpha, smooth = microfacet.widths(base.alpha)
         wo, wi = frame.rotate(wo, base.rotation), frame.rotate(wi, base.rotation)
         rng = walk.generator(wo, wi, self.seed)
