@@ -24,9 +24,9 @@ def page(name: str, model: type) -> str:
         lines.append(f"| `{p.name}` | {p.kind} | {allowed} | {p.unit or '-'} | {default} | {p.doc} |")
     for law, breach in model.breaks.items():
         lines += ["", f"Breaks **{law}** by nature: {breach.reason}."]
-    source = Path(inspect.getsourcefile(model) or "").name
+    source = "src/" + model.__module__.replace(".", "/") + ".py"
     plugin = "gonio_" + name.replace("-", "_")
-    lines += ["", f"Mitsuba plugin `{plugin}`. Source: `src/gonio/models/{source}`.", ""]
+    lines += ["", f"Mitsuba plugin `{plugin}`. Source: `{source}`.", ""]
     return "\n".join(lines)
 
 
