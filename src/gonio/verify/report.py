@@ -18,7 +18,7 @@ from .subject import Subject
 
 SCHEMA = "gonio-verify/1"
 SIGNIFICANCE = 0.01  # of one false rejection in a whole report
-CONFIRMATION = 0.01  # of the second seed's test
+CONFIRMATION = 0.001  # of the second seed's test: a real error shows there as well, chance does not
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = "pass", "fail", "breaks as declared", "does not apply"
 

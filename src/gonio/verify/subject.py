@@ -92,7 +92,7 @@ class Subject:
             wo = directions.single(directions.on_side(directions.uniform(rng, 512), side))
             wi = directions.single(directions.uniform(rng, 512))
             lit = np.any(self.eval(wo, wi, precision="float32") > 0.0)
-            if lit or np.any(self.sample(wo, directions.numbers(rng, 512), precision="float32").pdf > 0.0):
+            if lit or np.any(self.sample(wo, directions.numbers(rng, 512), precision="float32").weight > 0.0):
                 found.append(side)
         return tuple(found)
 

@@ -12,6 +12,7 @@ from ...ops import (
     erf,
     exp,
     function,
+    is_single,
     log,
     maximum,
     minimum,
@@ -31,6 +32,19 @@ from .ggx import slant2
 _INV_SQRT_PI = ops.pi**-0.5
 STEPS = 2  # of Newton's method: the cumulated density is then met to 3e-8
 
+# G1 = a N(a) / M(a) for a = 1 / (alpha tan) < 4 (1 - G1 is 2e-10 there), rising powers: our own fit of the exact G1, by
+# least squares of the relative error, reweighted toward the largest at 4000 Chebyshev points.
+_G1_OVER = (3.54490742, -0.11616595, 1.10290261, 0.09772537, 0.10158618, 0.03505152)
+_G1_UNDER = (1.0, 1.73967429, 1.25322189, 0.54497537, 0.22630499, 0.08571726, 0.03586975)
+
+
+def _horner(x: Any, coefficients: tuple[float, ...]) -> Any:
+    """The polynomial with these coefficients, in rising powers."""
+    value: Any = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        value = value * x + c
+    return value
+
 
 class Beckmann(NDF):
     """D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4).
@@ -44,10 +58,12 @@ class Beckmann(NDF):
     def D(self, m: Any, alpha: Any) -> Any:
         """Beckmann density of normals, 1/sr."""
         z2 = sqr(m.z)
-        # tan^2 / alpha^2 over 80 leaves exp under 2e-35: the floor keeps z^4 from vanishing in float32
-        z2 = maximum(z2, 1e-9)
-        exponent = (sqr(m.x / alpha.x) + sqr(m.y / alpha.y)) / z2
-        return where(m.z > 0.0, exp(-exponent) / (ops.pi * alpha.x * alpha.y * sqr(z2)), 0.0)
+        slope2 = sqr(m.x / alpha.x) + sqr(m.y / alpha.y)
+        # tan^2 / alpha^2 over 80 leaves exp under 2e-35; there z^4 may vanish in float32, and its gradient sooner
+        lit = (m.z > 0.0) & (slope2 < 80.0 * z2)
+        z2 = where(lit, z2, 1.0)
+        exponent = where(lit, slope2, 0.0) / z2
+        return where(lit, exp(-exponent) / (ops.pi * alpha.x * alpha.y * sqr(z2)), 0.0)
 
     def _cotangent(self, v: Any, alpha: Any) -> Any:
         """|v.z| / slant = 1 / (alpha tan), held below 1e9."""
@@ -58,6 +74,14 @@ class Beckmann(NDF):
         """(erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), a = 1 / (alpha tan) (Heitz2014)."""
         a = maximum(self._cotangent(v, alpha), 1e-15)
         return maximum(0.5 * (erf(a) - 1.0) + exp(-sqr(a)) * (0.5 * _INV_SQRT_PI) / a, 0.0)
+
+    @function
+    def G1(self, v: Any, alpha: Any) -> Any:
+        """1 / (1 + Lambda); in float32 by a rational function, within 8e-8 of it, at half the cost of erf and exp."""
+        if not is_single(v.z):
+            return 1.0 / (1.0 + self.Lambda(v, alpha))
+        a = self._cotangent(v, alpha)
+        return where(a < 4.0, a * _horner(a, _G1_OVER) / _horner(a, _G1_UNDER), 1.0)
 
     @function
     def G1_customary(self, v: Any, alpha: Any) -> Any:
@@ -105,15 +129,19 @@ class Beckmann(NDF):
             excess = 0.5 * (1.0 + b) + tan_v * exp(-sqr(x)) * (0.5 * _INV_SQRT_PI) - target
             b = b - excess / maximum(0.5 * (1.0 - x * tan_v), 1e-4)
         b = clamp(b, low, high)
-        slope_x = self._polish(erfinv(b), tan_v, target)
-        slope_y = self._polish(erfinv(clamp(2.0 * u2 - 1.0, -0.99999988, 0.99999988)), 0.0 * u2, u2)
+        slope_x, slope_y = erfinv(b), erfinv(clamp(2.0 * u2 - 1.0, -0.99999988, 0.99999988))
+        if not is_single(u1):
+            slope_x, slope_y = self._polish(slope_x, tan_v, target), self._polish(slope_y, 0.0 * u2, u2)
         x = (cos_phi * slope_x - sin_phi * slope_y) * alpha.x
         y = (sin_phi * slope_x + cos_phi * slope_y) * alpha.y
         return normalize(vec3(-x, -y, 1.0 + 0.0 * x))
 
     @function
     def _polish(self, x: Any, tan_v: Any, target: Any) -> Any:
-        """One step of Newton's method in x on c(x) = target: takes the 3e-7 of `erfinv` out of the float64 twin."""
+        """One step of Newton's method in x on c(x) = target: takes the 3e-7 of `erfinv` out of the float64 twin.
+
+        In float32 `erfinv` is exact to the last digits, and the step would be rounding.
+        """
         gauss = exp(-sqr(x)) * _INV_SQRT_PI
         excess = 0.5 * (1.0 + erf(x)) + 0.5 * tan_v * gauss - target
         slope = gauss * (1.0 - x * tan_v)

@@ -1,0 +1,38 @@
+"""Mistakes in refraction."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from gonio.models.dielectric import Dielectric
+from gonio.ops import where
+from gonio.optics import fresnel
+
+
+class RightGlass(Dielectric):
+    """The sound one."""
+
+    caught_by: ClassVar[str] = ""
+
+
+class WrongScaling(Dielectric):
+    """The factor of radiance, (eta_o / eta_i)^2, stands in the wrong mode."""
+
+    caught_by: ClassVar[str] = "reciprocity"
+
+    def _carried(self, reflects: Any, eta: Any, mode: str) -> Any:
+        return self._squeeze(reflects, eta) if mode == "radiance" else 1.0
+
+
+class FresnelInsideOut(Dielectric):
+    """Fresnel's formula is given the index of the other side: total reflection from outside."""
+
+    caught_by: ClassVar[str] = "reciprocity"
+
+    def reflectance(self, cos_o: Any, cos_t: Any, eta: Any) -> Any:
+        inverse = 1.0 / eta
+        turned = fresnel.cos_transmitted(cos_o, inverse)
+        return where(cos_t > 0.0, fresnel.dielectric(cos_o, turned, inverse), 1.0)
+
+
+GLASS = [RightGlass, WrongScaling, FresnelInsideOut]

@@ -1,0 +1,45 @@
+"""The law that the verifier can fail: every classic mistake is caught, and by the law that is meant to catch it."""
+
+from __future__ import annotations
+
+import pytest
+from gonio.verify import verify
+
+from broken.facets import FACETS
+from broken.glass import GLASS
+from broken.surfaces import SURFACES
+
+CONTROLS = [*FACETS, *SURFACES, *GLASS]
+BROKEN = [cls for cls in CONTROLS if cls.caught_by]
+SOUND = [cls for cls in CONTROLS if not cls.caught_by]
+
+
+def test_there_are_enough_controls_and_every_judging_law_has_one() -> None:
+    assert len(BROKEN) >= 20
+    caught = {cls.caught_by for cls in BROKEN}
+    expected = {
+        "positivity",
+        "reciprocity",
+        "energy",
+        "pdf",
+        "weight",
+        "isotropy",
+        "linearity",
+        "gradients",
+        "precision",
+    }
+    assert caught == expected
+
+
+@pytest.mark.parametrize("control", BROKEN, ids=lambda cls: cls.__name__)
+def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> None:
+    report = verify(control(), effort="quick", laws=[control.caught_by])
+    verdict = report[control.caught_by]
+    assert verdict.failed and not report.passed and report.exit_code == 1
+    assert verdict.why and verdict.command and verdict.meaning
+
+
+@pytest.mark.parametrize("control", SOUND, ids=lambda cls: cls.__name__)
+def test_the_sound_twin_passes_every_law(control: type) -> None:
+    report = verify(control(), effort="quick")
+    assert report.passed, str(report)
