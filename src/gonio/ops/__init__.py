@@ -44,6 +44,7 @@ __all__ = [
     "function",
     "get_precision",
     "inset",
+    "is_single",
     "isfinite",
     "log",
     "lookup",
@@ -149,6 +150,11 @@ def isfinite(x: Any) -> Any:
     if isinstance(x, Node):
         return graph.emit("isfinite", "bool", x)
     return drjit().isfinite(x)
+
+
+def is_single(x: Any) -> bool:
+    """Whether x is computed in float32, so that steps below its last digits can be left out; False for symbols."""
+    return is_drjit(x) and drjit().itemsize_v(x) == 4
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
