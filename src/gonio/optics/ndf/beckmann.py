@@ -59,8 +59,8 @@ class Beckmann(NDF):
         """Beckmann density of normals, 1/sr."""
         z2 = sqr(m.z)
         slope2 = sqr(m.x / alpha.x) + sqr(m.y / alpha.y)
-        # tan^2 / alpha^2 over 80 leaves exp under 2e-35; there z^4 may vanish in float32, and its gradient sooner
-        lit = (m.z > 0.0) & (slope2 < 80.0 * z2)
+        # tan^2 / alpha^2 over 700 leaves exp under 1e-304; there z^4 may vanish in float32, and its gradient sooner
+        lit = (m.z > 0.0) & (slope2 < 700.0 * z2)
         z2 = where(lit, z2, 1.0)
         exponent = where(lit, slope2, 0.0) / z2
         return where(lit, exp(-exponent) / (ops.pi * alpha.x * alpha.y * sqr(z2)), 0.0)
