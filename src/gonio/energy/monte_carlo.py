@@ -73,7 +73,7 @@ def estimate(
     kind = backend.types(precision)
     arrays = np.broadcast_arrays(np.asarray(mu, float), np.asarray(alpha, float))
     shape, count = arrays[0].shape, arrays[0].size
-    mu_, alpha_ = [kind.float(np.ascontiguousarray(a).ravel()) for a in arrays]
+    mu_, alpha_ = [backend.float_of(a.ravel(), kind) for a in arrays]
     sin_o = dr.sqrt((1.0 - mu_) * (1.0 + mu_))
     wo = ops.vec3(sin_o, 0.0 * sin_o, mu_)
     widths = kind.vec2(alpha_, alpha_)

@@ -104,7 +104,21 @@ def float_of(value: Any, kind: Types) -> Any:
         return dr.opaque(kind.float, float(array))
     if array.ndim != 1:
         raise InputError(f"a value of shape {array.shape}, expected a number or (N,)", "parameter")
-    return kind.float(np.ascontiguousarray(array))
+    return kind.float(aligned(array, np.float64 if kind.float.__name__.endswith("64") else np.float32))
+
+
+def aligned(array: np.ndarray, dtype: Any) -> np.ndarray:
+    """A copy at an address that is a multiple of 64.
+
+    Dr.Jit takes NumPy's memory as it lies and writes its alignment into the kernel: arrays that NumPy puts now here,
+    now there would compile the same code again and again.
+    """
+    size = array.size * np.dtype(dtype).itemsize
+    raw = np.empty(size + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    aligned = raw[start : start + size].view(dtype)
+    aligned[:] = array
+    return aligned
 
 
 def vector_of(value: Any, size: int, kind: Types) -> Any:
