@@ -32,7 +32,7 @@ _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
     from . import models, render, verify
-    from .energy import Albedo, albedo
+    from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError, MachineError
     from .models import BSDF, Sample, model
     from .ops import get_precision, set_precision

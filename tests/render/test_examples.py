@@ -1,0 +1,40 @@
+"""The example scenes: each renders, and the shading balls show what they are there to show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SCENES = sorted(path.relative_to(EXAMPLES).as_posix() for path in EXAMPLES.glob("*/*.json"))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_example_renders(name: str) -> None:
+    picture = go.render(EXAMPLES / name, size=(48, 32), spp=2)
+    assert picture.shape == (32, 48, 3)
+    assert np.isfinite(picture).all() and picture.min() >= 0 and picture.max() > 0
+
+
+def test_the_compensated_row_is_the_brighter_the_rougher() -> None:
+    picture = go.render(EXAMPLES / "shading-balls", size=(256, 106), spp=32)
+    ratios = []
+    for ball in range(5):
+        x = round(256 * (0.5 + (ball - 2) * 0.1665))
+        upper, lower = (picture[row - 8 : row + 8, x - 8 : x + 8].mean() for row in (31, 74))
+        ratios.append(upper / lower)
+    assert 0.8 < ratios[0] < 1.25  # both rows alike where the balls are smooth, but for their places
+    assert ratios[2] > 1.05
+    assert ratios[4] > ratios[3] > ratios[2]
+
+
+def test_the_compensated_row_vanishes_in_a_white_furnace() -> None:
+    picture = go.render(EXAMPLES / "white-furnace", size=(256, 106), spp=64) / 0.5
+    upper, lower = picture[:52], picture[54:]
+    blocks = upper[:48].reshape(6, 8, 32, 8, 3).mean(axis=(1, 3))
+    assert abs(upper.mean() - 1) < 5e-4
+    assert np.abs(blocks - 1).max() < 0.03  # noise of 4096 paths
+    assert lower[20, 214].mean() < 0.7  # the roughest plain ball keeps less than 70 %
