@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .errors import GonioError, GonioWarning, InputError
+from .errors import GonioError, GonioWarning, InputError, did_you_mean
 
 if TYPE_CHECKING:
     from .render.run import Progress, Request, Result
@@ -385,11 +385,18 @@ def bake(
       gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
       gonio bake conductor --preset Au --lut E,Eavg -o gold
     """
+    from .models import models as known_models
     from .optics.ndf import distributions
     from .render import tables
     from .viewer import plots
 
-    what = target if target in distributions() else plots.make(target, param or [], preset)[0]
+    if target in distributions():
+        what: Any = target
+    else:
+        known = [*distributions(), *known_models()]
+        if target.replace("_", "-") not in known:
+            raise InputError(f"unknown distribution or material '{target}'", "TARGET", did_you_mean(target, known))
+        what = plots.make(target, param or [], preset)[0]
     options: dict[str, Any] = {"lut": lut.split(",")} if lut else {}
     options |= {"size": size, "method": method, "masking": masking, "spp": spp, "points": points, "seed": seed}
     baked = tables.bake(what, output, layout=layout, store=store, flip=flip, **options)
