@@ -60,7 +60,7 @@ def times() -> None:
             subprocess.run(command, check=True, capture_output=True)
             seconds.append(time.perf_counter() - start)
         print(
-            f"gonio verify conductor {' '.join(options):8} {plain.median(seconds[1:]):6.2f} s  (first {seconds[0]:.2f} s)"
+            f"gonio verify conductor {' '.join(options):8} {plain.median(seconds[1:]):6.2f} s, first {seconds[0]:.2f} s"
         )
 
 
@@ -76,7 +76,7 @@ def speed() -> None:
             seconds.append(time.perf_counter() - start)
         rate = (len(wo) << 21) / plain.median(seconds[1:]) / 1e6
         print(
-            f"chi-square, GGX conductor, alpha {alpha:<5} {rate:6.1f} M samples/s, binning included, 20 000 cells a direction"
+            f"chi-square, GGX conductor, alpha {alpha:<5} {rate:6.1f} M samples/s, binning included, 20 000 cells each"
         )
 
 
@@ -91,9 +91,8 @@ def controls() -> None:
     for cls in broken:
         report = verify(cls(), effort="quick", laws=[cls.caught_by])
         caught += not report.passed
-        print(
-            f"{cls.__name__:24} {cls.caught_by:12} {'caught' if not report.passed else 'MISSED'}  {report[cls.caught_by].shown}"
-        )
+        word = "MISSED" if report.passed else "caught"
+        print(f"{cls.__name__:24} {cls.caught_by:12} {word} {report[cls.caught_by].shown}")
     print(f"negative controls caught by the intended law: {caught} of {len(broken)}")
 
 

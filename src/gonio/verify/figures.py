@@ -92,7 +92,10 @@ def pdf(data: dict[str, Any]) -> tuple[str, str]:
     )
     _label(axes[2], "x of wi", "y of wi", "difference")
     figure.colorbar(shown, ax=axes[2], shrink=0.85, label="standard deviations").outline.set_visible(False)
-    caption = f"{data['drawn']:,} samples for the direction whose test came out lowest, seen from above, around the lobe. The difference is noise where the law holds."
+    caption = (
+        f"{data['drawn']:,} samples for the direction whose test came out lowest, seen from above, around the lobe. "
+        "The difference is noise where the law holds."
+    )
     return _svg(figure), caption
 
 

@@ -31,8 +31,8 @@ h1 { font-size: 30px; font-weight: 650; margin: 0; letter-spacing: -.01em }
 h2 { font-size: 22px; margin: 56px 0 8px; font-weight: 650 }
 h3 { font-size: 17px; margin: 0; font-weight: 620 }
 p { margin: 6px 0 } .soft { color: var(--soft) } code, pre { font: 13px/1.5 ui-monospace, Menlo, Consolas, monospace; }
-pre { margin: 6px 0; padding: 8px 12px; background: color-mix(in srgb, var(--line) 45%, transparent); border-radius: 6px;
-  overflow-x: auto; user-select: all }
+pre { margin: 6px 0; padding: 8px 12px; background: color-mix(in srgb, var(--line) 45%, transparent);
+  border-radius: 6px; overflow-x: auto; user-select: all }
 .verdict { font-size: 13px; font-weight: 650; color: var(--card); border-radius: 999px; padding: 2px 11px;
   white-space: nowrap }
 .pass { background: var(--pass) } .fail { background: var(--fail) } .declared { background: var(--declared) }
@@ -42,10 +42,12 @@ th { text-align: left; font-weight: 550; color: var(--soft); font-size: 13px }
 td, th { padding: 7px 12px 7px 0; border-bottom: 1px solid var(--line); vertical-align: top }
 td:nth-child(1) { color: var(--soft); width: 28px; font-variant-numeric: tabular-nums }
 td a { color: inherit; text-decoration-color: var(--line); text-underline-offset: 3px }
-section { background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 18px 22px; margin: 16px 0 }
+section { background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 18px 22px;
+  margin: 16px 0 }
 section header { display: flex; justify-content: space-between; gap: 16px; align-items: baseline }
 dl { display: grid; grid-template-columns: 96px 1fr; gap: 3px 14px; margin: 10px 0 0; font-size: 15px }
-dt { color: var(--soft) } dd { margin: 0; min-width: 0 } figure { margin: 16px 0 0 } figure img { width: 100%; height: auto }
+dt { color: var(--soft) } dd { margin: 0; min-width: 0 } figure { margin: 16px 0 0 }
+figure img { width: 100%; height: auto }
 figcaption { font-size: 13.5px; color: var(--soft); margin-top: 4px }
 """
 
@@ -96,7 +98,8 @@ def page(report: Report) -> str:
         "<meta name=viewport content='width=device-width, initial-scale=1'>",
         f"<title>{html.escape(title)}: report card</title><style>{STYLE}</style><main>",
         f"<header><h1>{html.escape(title)} <span class='verdict {kind}'>{word}</span></h1>",
-        f"<p class=soft>Report card by Gonio: effort {report.effort}, seed {report.seed}, {report.seconds:.1f} s. {tests}</p>",
+        f"<p class=soft>Report card by Gonio: effort {report.effort}, seed {report.seed}, {report.seconds:.1f} s. ",
+        f"{tests}</p>",
         "</header>",
     ]
     if len(report.cards) > 1:
@@ -159,8 +162,10 @@ def _detail(v: Verdict, anchor: str) -> str:
     if picture is not None:
         svg, caption = picture
         source = base64.b64encode(svg.encode()).decode()
-        drawn = f"<figure><img alt='{html.escape(caption)}' src='data:image/svg+xml;base64,{source}'><figcaption>{html.escape(caption)}</figcaption></figure>"
-    return f"<section id='{anchor}'><header><h3>{v.number}. {html.escape(v.title)}</h3>{_pill(v)}</header><dl>{text}</dl>{drawn}</section>"
+        image = f"<img alt='{html.escape(caption)}' src='data:image/svg+xml;base64,{source}'>"
+        drawn = f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>"
+    head = f"<header><h3>{v.number}. {html.escape(v.title)}</h3>{_pill(v)}</header>"
+    return f"<section id='{anchor}'>{head}<dl>{text}</dl>{drawn}</section>"
 
 
 __all__: list[Any] = ["check_writable", "page", "write"]

@@ -120,7 +120,7 @@ def _subjects(target: Any) -> list[Subject]:
     if isinstance(target, list | tuple):
         return [one for item in target for one in _subjects(item)]
     if isinstance(target, str):
-        from . import targets
+        from .targets import resolve
 
-        return targets.resolve(target)
+        return resolve(target)
     return [subject.of(target)]

@@ -60,7 +60,7 @@ def poisson_tail(count: float, mean: float) -> float:
 
 
 def binomial_two_sided(count: float, trials: float, probability: float) -> float:
-    """How likely a count as far from trials * probability is; normal where both expectations are large, else Poisson."""
+    """How likely a count as far from its expectation is: normal where both outcomes are many, else Poisson."""
     mean = trials * probability
     rest = trials - mean
     if min(mean, rest) >= 25.0:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import directions
 from ..report import Finding
-from ..subject import Subject
+from ..subject import Fault, Subject
 
 if TYPE_CHECKING:
     from ..run import Effort
@@ -56,7 +56,10 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
         w /= np.linalg.norm(w, axis=1, keepdims=True)
     if not exact:
         wo, wi = directions.single(wo), directions.single(wi)
-    drawn = subject.sample(wo[third : 2 * third], directions.numbers(rng, third))
+    try:
+        drawn = subject.sample(wo[third : 2 * third], directions.numbers(rng, third))
+    except Fault:  # for the laws of sampling to report; the others do without
+        return wo, wi
     good = (drawn.pdf > 0.0) & np.all(np.isfinite(drawn.wi), axis=1)
     wi[third : 2 * third][good] = drawn.wi[good]
     return wo, wi if exact else directions.single(wi)

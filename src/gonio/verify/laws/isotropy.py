@@ -91,9 +91,8 @@ class Isotropy(Law):
             f"second moments along x and y: {along / (along + across):.3f}, {across / (along + across):.3f}"
         )
         if (along - across) * (float(pair[0]) - float(pair[1])) < 0.0:
-            finding.problems.append(
-                f"widths {pair[0]:g}, {pair[1]:g}, but the lobe is wider along {'x' if along > across else 'y'}: axes swapped"
-            )
+            wider = "x" if along > across else "y"
+            finding.problems.append(f"widths {pair[0]:g}, {pair[1]:g}, but wider along {wider}: axes swapped")
 
 
 def _turned(w: np.ndarray, angle: np.ndarray) -> np.ndarray:

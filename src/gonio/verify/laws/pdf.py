@@ -38,7 +38,7 @@ class Pdf(Law):
     meaning = "Multiple importance sampling weighs samples wrongly: energy is lost or gained, or noise never ends."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        parts = [({}, subject)]
+        parts: list[tuple[dict[str, Any], Subject]] = [({}, subject)]
         parts += [({"alpha": width}, subject.replace(alpha=width)) for width in _widths(subject, effort)]
         finding = Finding(
             figure=0.0,

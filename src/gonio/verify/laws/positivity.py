@@ -27,7 +27,7 @@ NEGATIVE = 1e-6  # of the largest value: float32 sums that cancel end this far b
 
 
 class Positivity(Law):
-    """eval, pdf and weight are finite and >= 0, and so are their gradients finite, to 89.9999 degrees and at extremes."""
+    """eval, pdf and weight are finite and >= 0, and the gradients finite, to 89.9999 degrees and at extremes."""
 
     number = 1
     name = "positivity"
@@ -47,9 +47,9 @@ class Positivity(Law):
         )
         checked = 0
         for changes, together in _batches(subject, variants, len(wo)):
-            many = [np.tile(part, (len(changes), 1)) for part in (wo, wi, u)]
+            many_o, many_i, many_u = (np.tile(part, (len(changes), 1)) for part in (wo, wi, u))
             for precision in together.precisions:
-                for what, values, a, b, rows in _values(together, *many, precision):
+                for what, values, a, b, rows in _values(together, many_o, many_i, many_u, precision):
                     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
                     wrong = ~np.isfinite(values) | (values < (-NEGATIVE * largest if what != "wi" else -np.inf))
                     checked += values.size
@@ -59,9 +59,8 @@ class Positivity(Law):
                     row = int(np.flatnonzero(wrong.any(1))[0])
                     changed = changes[rows[row] // len(wo)]
                     text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}{_words(changed)}"
-                    finding.problems.append(
-                        f"{text}: {int(wrong.sum())} values, first at {pair_in_words(a[row], b[row])}"
-                    )
+                    place = pair_in_words(a[row], b[row])
+                    finding.problems.append(f"{text}: {int(wrong.sum())} values, first at {place}")
                     if finding.at is None:
                         finding.at, finding.settings, finding.worst = (
                             (a[row], b[row]),
@@ -69,13 +68,13 @@ class Positivity(Law):
                             pair_in_words(a[row], b[row]),
                         )
             if isinstance(together.model, BSDF) and not together.stochastic:
-                for name, row in _bad_gradients(together, many[0], many[1]):
+                for name, row in _bad_gradients(together, many_o, many_i):
                     finding.figure += 1
-                    place = pair_in_words(many[0][row], many[1][row])
+                    place = pair_in_words(many_o[row], many_i[row])
                     changed = changes[row // len(wo)]
                     finding.problems.append(f"the gradient of eval by {name} is not finite{_words(changed)}: {place}")
                     if finding.at is None:
-                        finding.at, finding.settings, finding.worst = (many[0][row], many[1][row]), changed, place
+                        finding.at, finding.settings, finding.worst = (many_o[row], many_i[row]), changed, place
         finding.shown = f"{finding.figure:g} of {checked:.3g}"
         del finding.problems[6:]
         return finding
@@ -88,17 +87,17 @@ def _words(changed: dict[str, Any]) -> str:
 def _batches(
     subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
 ) -> list[tuple[list[dict[str, Any]], Subject]]:
-    """Settings that go together in one call, one parameter value a ray; one by one where the subject takes no arrays."""
+    """Settings that go together in one call, one value a ray; one by one where the subject takes no arrays."""
     changes = [changed for changed, _ in variants]
     names = dict.fromkeys(name for changed in changes for name in changed)
-    columns = {}
+    columns: dict[str, Any] = {}
     for name in names:
         given = getattr(subject.model, name, None)
         if subject.parameters[name].kind == "alpha" and isinstance(given, tuple | list):
             pairs_ = [(c.get(name, given)) if np.ndim(c.get(name, given)) else (c[name],) * 2 for c in changes]
             columns[name] = tuple(np.repeat([float(p[k]) for p in pairs_], count) for k in (0, 1))
         else:
-            values = np.broadcast_arrays(*[np.asarray(c.get(name, given), float) for c in changes])
+            values: list[Any] = list(np.broadcast_arrays(*[np.asarray(c.get(name, given), float) for c in changes]))
             if np.ndim(values[0]) == 0 and subject.parameters[name].kind == "spectrum":
                 values = [np.full(3, float(v)) for v in values]
             columns[name] = np.repeat(np.array(values), count, axis=0)

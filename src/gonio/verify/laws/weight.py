@@ -19,7 +19,7 @@ SINGLE = 2e-3
 
 
 class Weight(Law):
-    """weight = eval / pdf for the very wi that was sampled; delta lobes are declared, and have neither value nor pdf."""
+    """weight = eval / pdf at the very wi that was sampled; declared deltas have neither value nor pdf."""
 
     number = 5
     name = "weight"

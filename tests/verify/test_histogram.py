@@ -1,0 +1,64 @@
+"""The chi-square test: uniform p-values where the hypothesis holds, small ones where it does not."""
+
+from __future__ import annotations
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.verify import directions, histogram, statistics, subject
+
+WO = directions.single(directions.at(np.array([0.0, 45.0, 89.5]), np.array([0.0, 20.0, 200.0])))
+
+
+def outcomes(model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO) -> list[histogram.Outcome]:
+    one = subject.of(model)
+    grid = histogram.place(one, wo, seed)
+    assert grid is not None
+    expected = histogram.expect(one, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
+    counts = histogram.count(one, grid, log_samples, seed)
+    assert np.all(counts.cells.sum((1, 2, 3)) + counts.others == counts.drawn)
+    return [histogram.compare(expected, counts, row) for row in range(len(wo))]
+
+
+@pytest.mark.parametrize("alpha", [0.005, 0.1, 1.0])
+def test_a_right_model_is_not_rejected_at_any_width(alpha: float) -> None:
+    lowest = min(min(o) for o in outcomes(go.Conductor.preset("Au", alpha=alpha), 20, 4))
+    assert lowest > statistics.sidak(0.001, 9)
+
+
+def test_there_are_as_many_cells_as_promised() -> None:
+    one = subject.of(go.Lambert(0.5))
+    grid = histogram.place(one, WO, 1)
+    assert grid is not None
+    assert grid.rows.shape[2] - 1 >= 100 and grid.columns.shape[3] - 1 >= 200
+
+
+def test_the_kernel_counts_where_numpy_counts() -> None:
+    one = subject.of(go.Conductor(alpha=0.3))
+    grid = histogram.place(one, WO[1:2], 1)
+    assert grid is not None
+    counts = histogram.count(one, grid, 14, 5)
+    from gonio.ops import backend
+
+    kind = backend.types("float32")
+    index = backend.drjit().arange(kind.module.UInt32, 1 << 14)
+    u = np.array(histogram.random_numbers(kind, index, 5).numpy()).T
+    s = one.sample(np.repeat(WO[1:2], len(u), 0), u, precision="float32")
+    wi = s.wi[s.pdf > 0].astype(np.float32)
+    height, turn = histogram._height(wi), histogram._turn(wi)
+    row = np.clip(np.searchsorted(grid.rows[0, 0], height, "right") - 1, 0, histogram.ROWS - 1)
+    expected = np.bincount(row, minlength=histogram.ROWS)
+    # a sample on an edge may be rounded to either side
+    assert np.abs(counts.cells[0, 0].sum(1) - expected).sum() <= 6
+    assert turn.min() >= 0 and turn.max() <= 4
+
+
+@pytest.mark.slow
+def test_p_values_over_a_hundred_seeds_are_uniform() -> None:
+    found: list[list[float]] = [[], []]
+    for seed in range(100):
+        for o in outcomes(go.Conductor.preset("Au", alpha=0.2), 17, seed, WO[1:2]):
+            found[0].append(o.fine)
+            found[1].append(o.coarse)
+    for values in found:
+        assert statistics.uniformity(np.array(values)) > 0.01

@@ -1,0 +1,158 @@
+"""Verdicts: declared breaches, Sidak's correction, confirmation, isolation of failures, the files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio import ops
+from gonio.models.base import Breach
+from gonio.verify import report, verify
+from gonio.verify.report import Finding, Trial, decide
+from gonio.verify.subject import of
+
+
+class Law:
+    """A law of no consequence."""
+
+    number, name, title, meaning = 99, "energy", "a law", "nothing"
+
+
+def finding(figure: float = 0.0, **more: Any) -> Finding:
+    return Finding(figure=figure, tolerance=0.1, reason="because", **more)
+
+
+def verdict(found: Finding, breaks: dict[str, Breach] | None = None, threshold: float = 1e-3) -> report.Verdict:
+    class Declares(go.Lambert):
+        """Lambert with declared breaches."""
+
+    Declares.breaks = breaks or {}
+    return decide(Law, of(Declares(0.5)), found, threshold, 1)
+
+
+def test_a_figure_within_its_tolerance_passes_and_one_over_it_fails() -> None:
+    assert verdict(finding(0.1)).status == "pass"
+    assert verdict(finding(0.2)).status == "fail"
+    assert verdict(finding(np.nan)).status == "fail"
+
+
+def test_a_rejection_counts_only_when_a_second_seed_confirms_it() -> None:
+    chance = verdict(finding(trials=[Trial(1e-6, "here", lambda: 0.4)]))
+    assert chance.status == "pass" and "chance" in chance.notes[0]
+    true = verdict(finding(trials=[Trial(1e-6, "here", lambda: 1e-5)]))
+    assert true.status == "fail" and "here" in true.why[0]
+
+
+def test_a_p_value_over_the_corrected_threshold_is_not_asked_again() -> None:
+    def never() -> float:
+        raise AssertionError
+
+    assert verdict(finding(trials=[Trial(0.005, "here", never)])).status == "pass"
+
+
+def test_a_declared_breach_is_no_failure_unless_it_is_larger_or_absent() -> None:
+    declared = {"energy": Breach("by nature", 0.5)}
+    assert verdict(finding(0.4), declared).status == "breaks as declared"
+    larger = verdict(finding(0.8), declared)
+    assert larger.status == "fail" and "more than the declared" in larger.why[0]
+    absent = verdict(finding(0.0), declared)
+    assert absent.status == "fail" and "is not" in absent.why[0]
+    assert verdict(finding(0.0), {"energy": Breach("maybe", 0.5, certain=False)}).status == "pass"
+    # a statistical rejection is never what was declared
+    both = finding(0.4, trials=[Trial(1e-6, "here", lambda: 1e-6)])
+    assert verdict(both, declared).status == "fail"
+
+
+def test_the_threshold_is_corrected_over_the_whole_report() -> None:
+    one = verify(go.Lambert(0.5), effort="quick", laws=["pdf"])
+    two = verify([go.Lambert(0.5), go.Lambert(0.6)], effort="quick", laws=["pdf"])
+    assert two.tests == 2 * one.tests
+    assert 1.0 - (1.0 - two.threshold) ** two.tests == pytest.approx(report.SIGNIFICANCE)
+
+
+def test_phong_breaks_what_it_declares_and_exits_with_0() -> None:
+    found = verify(go.Phong(), effort="quick", laws=["reciprocity", "energy"])
+    assert [v.status for v in found.cards[0].verdicts] == ["breaks as declared"] * 2
+    assert found.passed and found.exit_code == 0
+    dim = verify(go.Phong(kd=0.1, ks=0.0), effort="quick", laws=["reciprocity", "energy"])
+    assert [v.status for v in dim.cards[0].verdicts] == ["pass"] * 2
+
+
+def test_same_seed_same_report() -> None:
+    first, second = (verify(go.Conductor(alpha=0.3), effort="quick", laws=["pdf", "energy"], seed=5) for _ in range(2))
+    assert [v.p for v in first.cards[0].verdicts] == [v.p for v in second.cards[0].verdicts]
+    other = verify(go.Conductor(alpha=0.3), effort="quick", laws=["pdf"], seed=6)
+    assert other["pdf"].p != first["pdf"].p
+
+
+class Stops(go.Lambert):
+    """An exception in pdf; eval is sound."""
+
+    def pdf(self, wo: Any, wi: Any) -> Any:
+        return {}["missing"]
+
+
+def test_a_failing_law_hides_no_other_and_names_the_line() -> None:
+    found = verify(Stops(0.5), effort="quick")
+    statuses = {v.law: v.status for v in found.cards[0].verdicts}
+    assert statuses["pdf"] == "fail" and statuses["reciprocity"] == "pass" and statuses["linearity"] == "pass"
+    assert "KeyError in" in found["pdf"].why[0] and "test_report.py:" in found["pdf"].why[0]
+
+
+class Random(go.Lambert):
+    """Lambert through a coin: the value is twice the mean or nothing."""
+
+    stochastic: ClassVar[bool] = True
+
+    def _coin(self, w: Any) -> Any:
+        from gonio.verify.histogram import random_numbers
+
+        dr = ops.backend.drjit()
+        kind = ops.backend.types_like(type(w.x))
+        Random.calls += 1
+        index = dr.arange(kind.module.UInt32, max(dr.width(w), 1))
+        return ops.where(random_numbers(kind, index, Random.calls).x < 0.5, kind.float(2.0), kind.float(0.0))
+
+    calls: ClassVar[int] = 0
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return go.Lambert.eval.__wrapped__(self, wo, wi, mode) * self._coin(wo)
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        s = go.Lambert.sample(self, wo, u, mode)
+        pdf = go.Lambert.pdf(self, wo, s.wi)
+        weight = self.albedo * ops.where(pdf > 0.0, self._coin(wo), 0.0)
+        return s._replace(weight=weight, pdf=pdf)
+
+
+def test_a_stochastic_model_is_judged_by_its_expectations() -> None:
+    found = verify(Random(0.5), effort="quick")
+    assert found.passed, str(found)
+    assert found["weight"].p is not None and found["reciprocity"].p is not None
+    assert found["precision"].status == "does not apply"
+
+
+def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
+    from gonio.verify import page
+
+    found = verify(
+        go.Dielectric(alpha=0.3), effort="quick", laws=["reciprocity", "energy", "pdf", "precision", "shader"]
+    )
+    page.write(found, tmp_path / "deep" / "down")
+    data = json.loads((tmp_path / "deep/down/report.json").read_text())
+    assert data["schema"] == "gonio-verify/1" and data["seed"] == 1
+    assert [v["law"] for v in data["cards"][0]["verdicts"]] == ["reciprocity", "energy", "pdf", "precision", "shader"]
+    for v in data["cards"][0]["verdicts"][:4]:
+        assert v["reason"] and v["meaning"] and v["command"].startswith("gonio verify dielectric --param alpha=0.3")
+    html = (tmp_path / "deep/down/report.html").read_text()
+    assert html.count("<img") == 4 and "http" not in html.replace("http://www.w3.org", "")
+    assert sorted(p.name for p in (tmp_path / "deep/down").iterdir()) == ["report.html", "report.json"]
+
+
+def test_a_report_prints_as_the_terminal_shows_it() -> None:
+    text = str(verify(go.Lambert(0.5), effort="quick", laws=["reciprocity"]))
+    assert "reciprocity" in text and "all laws hold" in text
