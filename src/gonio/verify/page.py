@@ -47,7 +47,7 @@ section { background: var(--card); border: 1px solid var(--line); border-radius:
 section header { display: flex; justify-content: space-between; gap: 16px; align-items: baseline }
 dl { display: grid; grid-template-columns: 96px 1fr; gap: 3px 14px; margin: 10px 0 0; font-size: 15px }
 dt { color: var(--soft) } dd { margin: 0; min-width: 0 } figure { margin: 16px 0 0 }
-figure img { width: 100%; height: auto }
+figure img { max-width: 100%; height: auto }
 figcaption { font-size: 13.5px; color: var(--soft); margin-top: 4px }
 """
 

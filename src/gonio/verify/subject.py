@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import GonioError, InputError
 from ..models import BSDF, Parameter, Sample, models
 from ..models.base import Breach, converter
 from ..ops import backend
@@ -190,7 +190,7 @@ def guarded(model: Any, method: str, run: Any) -> Any:
     """What `run` returns; an exception inside the model comes out as a Fault that names its line."""
     try:
         return run()
-    except (Fault, InputError, KeyboardInterrupt, TimeoutError):
+    except (Fault, GonioError, KeyboardInterrupt, TimeoutError):
         raise
     except Exception as error:
         text = str(error).strip().splitlines()

@@ -76,7 +76,7 @@ def _explain(verdict: Verdict, console: Any) -> None:
     from rich.text import Text
 
     console.print(Text(f"{verdict.law}: ", style="bold red").append(verdict.title, style="default not bold"))
-    rows = [("why", line) for line in verdict.why]
+    rows = [("why", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
     rows += [
         ("worst", verdict.worst),
         ("means", verdict.meaning),

@@ -61,6 +61,8 @@ class Energy(Law):
         white = _white(subject)
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
+        if finding.figure > GAIN:
+            finding.shown = f"gain {finding.figure:.4f}"
         finding.data = curves
         return finding
 
@@ -164,11 +166,15 @@ def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np
 
 
 def _white(subject: Subject) -> Subject | None:
-    """The subject with every albedo 1 and F = 1; None where it has neither."""
+    """The subject with every albedo 1 and F = 1, in inner materials too; None where it has neither."""
     changes: dict[str, Any] = {}
     for name, parameter in subject.parameters.items():
         if parameter.kind == "spectrum" and parameter.high == 1.0:
             changes[name] = 1.0
+        elif parameter.kind == "bsdf":
+            inner = _white(Subject(getattr(subject.model, name), name))
+            if inner is not None:
+                changes[name] = inner.model
         elif parameter.kind == "choice" and name == "fresnel" and "one" in parameter.choices:
             changes[name] = "one"
     try:

@@ -45,7 +45,7 @@ class Pdf(Law):
             tolerance=EXCESS,
             reason="int pdf is known to 1e-4; failed samples make it less than 1, never more",
         )
-        lowest, shown = 2.0, ""
+        lowest, largest = 2.0, ""
         for settings, part in parts:
             name = ", ".join(f"{k} = {v:g}" for k, v in settings.items())
             _deltas(part, name, finding, seed)
@@ -64,11 +64,19 @@ class Pdf(Law):
                             for key in ("expected", "observed", "rows", "columns", "drawn", "wo", "sides")
                         }
                         finding.settings, finding.worst = settings, place
+                for side, e, o in zip(outcome["sides"], outcome["expected"], outcome["observed"], strict=True):
+                    claimed = float(e.sum()) / outcome["drawn"]
+                    if claimed > EXCESS and not o.any():
+                        word = "above" if side > 0 else "below"
+                        text = f"pdf puts {claimed:.2g} of all samples {word} the surface, where none falls, {place}"
+                        finding.notes[:] = finding.notes or [text]
                 excess = max(outcome["total"] - 1.0, 0.0)
                 if excess > finding.figure:
                     finding.figure = excess
-        shown = "" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
-        finding.shown = shown or "deltas only"
+                    largest = f"int pdf = {outcome['total']:.4g}, {place}"
+        finding.shown = "deltas only" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
+        if finding.figure > EXCESS:
+            finding.shown = largest
         _support(subject, finding, effort, seed)
         return finding
 

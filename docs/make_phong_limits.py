@@ -1,0 +1,255 @@
+"""Write docs/phong-limits.md and its pictures: when does the Phong model go wrong? Answered by the verifier.
+
+python docs/make_phong_limits.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+import numpy as np
+from gonio.ops import dot, sqr, where
+from gonio.optics.frame import mirror
+from gonio.verify import Report, cubature, directions, subject, verify
+from matplotlib.figure import Figure
+
+HERE = Path(__file__).parent
+PICTURES = HERE / "phong-limits"
+COLORS = ("#b3403a", "#c98a2b", "#3f7d4f", "#2b5d8a")
+
+
+class EvenPower(go.Phong):
+    """Phong as it is often typed in: pow(dot(v, r), 4), without max(0, ...)."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        base = dot(wo, mirror(wi))
+        return self.kd * where(above, wi.z, 0.0) + self.ks * where(above, sqr(sqr(base)), 0.0)
+
+
+class NoHorizon(go.Phong):
+    """Phong without asking on which side the light is: n.l may be negative, and the highlight shines through."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        base = dot(wo, mirror(wi))
+        seen = wo.z > 0.0
+        return self.kd * where(seen, wi.z, 0.0) + self.ks * where(seen, go.ops.pow(base, self.p), 0.0)
+
+
+def plane(theta: np.ndarray) -> np.ndarray:
+    """Directions in the plane of incidence, theta from -180 to 180 degrees."""
+    t = np.radians(theta)
+    return np.stack([np.sin(t), 0.0 * t, np.cos(t)], -1)
+
+
+def canvas(columns: int = 1, height: float = 3.2) -> tuple[Figure, Any]:
+    figure = Figure(figsize=(4.7 * columns, height), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, columns))
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(labelsize=8)
+    return figure, axes
+
+
+def save(figure: Figure, name: str) -> None:
+    figure.savefig(PICTURES / f"{name}.svg", metadata={"Date": None})
+
+
+def slice_of(model: go.BSDF, view: float, theta: np.ndarray) -> np.ndarray:
+    """eval in the plane of incidence for a viewer at `view` degrees."""
+    wo = np.tile(plane(np.array([view])), (len(theta), 1))
+    return np.asarray(model.eval(wo, plane(theta), precision="float64")).mean(1)  # type: ignore[call-arg]
+
+
+def verdict(report: Report, law: str) -> str:
+    v = report[law]
+    text = "; ".join(w.replace(str(HERE.parent), ".") for w in v.why) or v.shown
+    return f"**{law}: {v.status}** ({text})"
+
+
+def even_power() -> str:
+    theta = np.linspace(-89.9, 89.9, 721)
+    figure, (axis,) = canvas()
+    sound, typed = go.Phong(kd=0.0, ks=0.5, p=4.0), EvenPower(kd=0.0, ks=0.5, p=4.0)
+    axis.plot(theta, slice_of(typed, 60.0, theta), color=COLORS[0], label="pow(v.r, 4)")
+    axis.plot(theta, slice_of(sound, 60.0, theta), color=COLORS[3], label="pow(max(0, v.r), 4)")
+    axis.axvline(60.0, color="#888", lw=0.8, ls=":")
+    axis.text(58.0, 0.42, "viewer", ha="right", fontsize=8, color="#666")
+    axis.set_xlabel("angle of the light, degrees", fontsize=9)
+    axis.set_ylabel("reflected, light of intensity 1", fontsize=9)
+    axis.legend(frameon=False, fontsize=8)
+    save(figure, "even-power")
+    report = verify(typed, effort="quick", laws=["pdf"])
+    return verdict(report, "pdf")
+
+
+def below() -> str:
+    theta = np.linspace(-180.0, 180.0, 1441)
+    figure, (axis,) = canvas()
+    axis.axvspan(-180, -90, color="#000", alpha=0.05)
+    axis.axvspan(90, 180, color="#000", alpha=0.05)
+    for model, color, label in (
+        (NoHorizon(kd=0.3, ks=0.5, p=8.0), COLORS[0], "no test"),
+        (go.Phong(kd=0.3, ks=0.5, p=8.0), COLORS[3], "0 where n.l < 0"),
+    ):
+        axis.plot(theta, slice_of(model, 75.0, theta), color=color, label=label)
+    axis.axhline(0.0, color="#888", lw=0.6)
+    axis.set_xlabel("angle of the light, degrees (grey: below the surface)", fontsize=9)
+    axis.set_ylabel("reflected", fontsize=9)
+    axis.legend(frameon=False, fontsize=8)
+    save(figure, "below")
+    return verdict(verify(NoHorizon(kd=0.3, ks=0.5, p=8.0), effort="quick", laws=["positivity"]), "positivity")
+
+
+def reflected_power(model: go.BSDF, theta: np.ndarray) -> np.ndarray:
+    """Power that leaves in all directions, over the power that a parallel beam at theta brings."""
+    one = subject.of(model)
+
+    def leaving(light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        return one.eval(view, light) / light[:, 2:] * np.maximum(view[:, 2:], 0.0)
+
+    return cubature.integrate(one, leaving, directions.at(theta, 0.0), 1e-4).value.mean(1)
+
+
+def energy() -> tuple[str, list[str]]:
+    theta = np.array([0.0, 15, 30, 45, 55, 65, 72, 78, 82, 85, 87])
+    figure, axes = canvas(2)
+    rows = []
+    for p, color in zip((1.0, 4.0, 16.0, 64.0), COLORS, strict=True):
+        model = go.Phong(kd=0.0, ks=1.0, p=p)
+        report = verify(model, effort="quick", laws=["energy", "reciprocity"])
+        data = report["energy"].data
+        angle = directions.angles(data["wo"])[:, 0]
+        order = np.argsort(angle)
+        axes[0].plot(angle[order], data["quadrature"][order].mean(1), color=color, label=f"p = {p:g}")
+        power = reflected_power(model, theta)
+        axes[1].plot(theta, power, color=color, label=f"p = {p:g}")
+        v = report["energy"]
+        most = float(data["quadrature"].max())
+        rows.append(
+            f"| {p:g} | {most:.3f} | {power[0]:.3f} | {power[-1]:.2f} | {v.status} | {report['reciprocity'].status} |"
+        )
+    for axis, title in zip(
+        axes, ("seen by the viewer: int eval dwi", "seen by the light: power out / power in"), strict=True
+    ):
+        axis.axhline(1.0, color="#888", lw=0.8, ls=":")
+        axis.set_xlabel("angle, degrees", fontsize=9)
+        axis.set_title(title, fontsize=9, loc="left")
+        axis.legend(frameon=False, fontsize=8)
+    axes[1].set_yscale("log")
+    save(figure, "energy")
+    return "", rows
+
+
+def reciprocity() -> str:
+    report = verify(go.Phong(), effort="quick", laws=["reciprocity"])
+    figure, axes = canvas(1, 3.6)
+    image = axes[0].imshow(
+        report["reciprocity"].data["map"], origin="lower", extent=(0, 90, 0, 90), cmap="magma", vmin=0, vmax=1
+    )
+    axes[0].set_xlabel("angle of wi, degrees", fontsize=9)
+    axes[0].set_ylabel("angle of wo, degrees", fontsize=9)
+    figure.colorbar(image, label="relative difference of f")
+    save(figure, "reciprocity")
+    return verdict(report, "reciprocity")
+
+
+def edge() -> list[str]:
+    theta = np.linspace(-60.0, 100.0, 1601)
+    figure, axes = canvas(2)
+    rows = []
+    for p, color in zip((0.5, 1.0, 4.0, 32.0), COLORS, strict=True):
+        model = go.Phong(kd=0.0, ks=0.5, p=p)
+        value = slice_of(model, -70.0, theta)
+        axes[0].plot(theta, value, color=color, label=f"p = {p:g}")
+        zoom = slice_of(model, -20.0, np.linspace(-75.0, -60.0, 400))
+        axes[1].plot(np.linspace(-75.0, -60.0, 400), zoom, color=color)
+        rows.append(f"| {p:g} | {float(slice_of(model, -70.0, np.array([89.99]))[0]) / 0.5:.3f} |")
+    axes[0].axvline(90.0, color="#888", lw=0.8, ls=":")
+    axes[0].set_title("viewer at 70 degrees: the highlight ends at the horizon", fontsize=9, loc="left")
+    axes[1].set_title("viewer at 20 degrees: the edge where v.r = 0", fontsize=9, loc="left")
+    for axis in axes:
+        axis.set_xlabel("angle of the light, degrees", fontsize=9)
+    axes[0].legend(frameon=False, fontsize=8)
+    save(figure, "edge")
+    return rows
+
+
+def main() -> int:
+    """Write the page and its pictures."""
+    PICTURES.mkdir(exist_ok=True)
+    power, under, mirrored = even_power(), below(), reciprocity()
+    _, rows = energy()
+    edges = edge()
+    text = f"""# When does the Phong model go wrong?
+
+Phong1975 describes a highlight that looks right; it was never meant to be a law of physics. Below, each failure that
+the course sheet asks for, with the verifier's answer. Made by `python docs/make_phong_limits.py`; every number is
+measured.
+
+    gonio verify phong                          # what the model breaks, and that it says so itself
+    gonio verify phong --param kd=0 --param ks=1 --sweep p=1..64
+
+## 1. v.r < 0, raised to an even power
+r is the light mirrored at n. Where the viewer stands more than 90 degrees away from it, v.r is negative, and an even
+power makes it positive again: a second highlight where there is none, on the side that faces away.
+
+![](phong-limits/even-power.svg)
+
+Sampling looks for light about the mirrored viewer and never finds the false highlight, so the verifier sees values
+where the density is 0. {power}
+
+The cure is max(0, v.r), and no power of a number whose sign is unknown.
+
+## 2. Light from below the surface
+n.l is then negative: the diffuse term takes light away, and the highlight shines through the surface, because r of a
+light below is a direction below, which a viewer near the horizon may still be close to.
+
+![](phong-limits/below.svg)
+
+{under}
+
+## 3. More light than came in
+The terms carry no normalization. int (v.r)^p dwi = 2 pi / (p + 1) at normal incidence: above 1 for p < 5.28 already
+with ks = 1, and kd = 1 alone gives pi. Counted from the light it is worse: the specular term has no n.l, so a beam that
+grazes the surface, and brings cos theta of its power, is answered as brightly as one from above. The ratio grows as
+1 / cos theta, whatever p.
+
+![](phong-limits/energy.svg)
+
+| p (kd = 0, ks = 1) | largest int eval dwi | power out / in, light at 0 | light at 87 degrees | energy | reciprocity |
+|---|---|---|---|---|---|
+{chr(10).join(rows)}
+
+A factor (p + 2) / (2 pi) and an n.l on the specular term (Lafortune1994) keep every albedo at or below 1.
+
+## 4. Light and eye cannot trade places
+f = eval / cos theta_i = kd + ks (v.r)^p / (n.l). v.r is the same both ways, n.l is not.
+
+![](phong-limits/reciprocity.svg)
+
+{mirrored}. A path traced from the eye and one traced from the light give different pictures.
+
+## 5. The cut-off edge for small p
+A wide highlight does not fade out before the horizon: for a viewer at 70 degrees the specular term has, where the light
+sets, still the share of its peak in the table, and is 0 an instant later. The terminator is a hard line. And where v.r
+passes 0, (v.r)^p for p <= 1 ends in a corner: a visible edge in the middle of the lit side.
+
+![](phong-limits/edge.svg)
+
+| p | left of the highlight as the light sets, viewer at 70 degrees |
+|---|---|
+{chr(10).join(edges)}
+
+`go.BlinnPhong` has no edge of the second kind, as n.h is never negative; it keeps the others. `go.Conductor` has none
+of the five.
+"""
+    (HERE / "phong-limits.md").write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
