@@ -135,9 +135,12 @@ def to_numpy(value: Any, count: int) -> np.ndarray:
     dr = drjit()
     if not dr.is_array_v(value):
         return np.full(count, value)
+    if dr.is_vector_v(value):
+        # component by component: Dr.Jit would join them in a kernel that has the number of rows in it as a literal
+        dr.eval(value)
+        parts = [np.asarray(component.numpy()) for component in value]
+        count = max(count, *(part.shape[-1] for part in parts))  # parameters may have more rows than the directions
+        return np.stack([np.broadcast_to(part, (count,)) for part in parts], axis=-1)
     array = np.asarray(value.numpy())
-    count = max(count, array.shape[-1])  # parameters may have more rows than the directions
-    if dr.is_vector_v(value) or array.ndim == 2:
-        array = array.T
-        return np.ascontiguousarray(np.broadcast_to(array, (count, array.shape[-1])))
+    count = max(count, array.shape[-1])
     return np.ascontiguousarray(np.broadcast_to(array, (count,)))
