@@ -12,10 +12,11 @@ import mmap
 import os
 import re
 import sys
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import MachineError
+from ..errors import GonioWarning, MachineError
 
 OLDEST_USABLE = 17  # 14, 15 and 16 measured to abort under Mitsuba 3.9; 19.1 and 23.1 measured to work
 VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -109,8 +110,7 @@ def use() -> Library:
 
     Dr.Jit loads its libLLVM when it is imported, so a program that imports it before Gonio has chosen already: that
     choice is checked, for an LLVM that is too old would abort the process later.
-    A library that the environment names is never replaced in silence: an unusable one is an error.
-    Raises MachineError where nothing fits.
+    Where the environment names one that cannot be used, the next is taken, with a warning. Raises MachineError where nothing fits.
     """
     loaded = _loaded() if "drjit" in sys.modules else None
     if loaded is not None:
@@ -120,17 +120,15 @@ def use() -> Library:
         raise MachineError(what, "LLVM", f"import gonio before drjit and mitsuba, or set {VARIABLE}")
     found = libraries()
     install = "pip install karellen-llvm-core (Linux x86-64), or apt-get install libllvm19, or any LLVM >= 17"
+    named = found[0] if found and found[0].source == "environment" and not found[0].usable else None
     for library in found:
         if library.usable:
+            if named is not None:
+                said = f"LLVM {named.version}, which aborts the process" if named.version else "no libLLVM"
+                text = f"{VARIABLE} names {said}; LLVM {library.version} at {library.path} is used instead"
+                warnings.warn(text, GonioWarning, stacklevel=2)
             os.environ[VARIABLE] = str(library.path)
             return library
-        if library.source == "environment":
-            what = (
-                f"{VARIABLE} names LLVM {library.version}, which aborts the process; {OLDEST_USABLE} or newer is needed"
-                if library.version
-                else f"{VARIABLE} names '{library.path}', which is missing or no libLLVM"
-            )
-            raise MachineError(what, "LLVM", f"unset {VARIABLE} or point it at a newer one; {install}")
     too_old = ", ".join(f"{x.version} at {x.path}" for x in found if x.version)
     what = f"no LLVM {OLDEST_USABLE} or newer found" + (f" (too old: {too_old})" if too_old else "")
     raise MachineError(what, "LLVM", install)
