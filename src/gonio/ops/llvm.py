@@ -110,7 +110,8 @@ def use() -> Library:
 
     Dr.Jit loads its libLLVM when it is imported, so a program that imports it before Gonio has chosen already: that
     choice is checked, for an LLVM that is too old would abort the process later.
-    Where the environment names one that cannot be used, the next is taken, with a warning. Raises MachineError where nothing fits.
+    Where the environment names one that cannot be used, the next is taken, with a warning. Raises MachineError where
+    nothing fits.
     """
     loaded = _loaded() if "drjit" in sys.modules else None
     if loaded is not None:
