@@ -85,9 +85,9 @@ class Energy(Law):
             float(np.trapezoid(2.0 * mu * loss, mu) / max(np.trapezoid(2.0 * mu, mu), 1e-9)) if len(mu) > 1 else 0.0
         )
         where = int(np.argmax(lost))
-        finding.notes.append(
-            f"white furnace loses {average:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
-        )
+        text = f"white furnace loses {average:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
+        known = float(error.max())
+        finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves["loss"] = average
         claim = getattr(white.model, "lossless", None)
         if claim is not None and lost[where] > claim + float(error.max()):
