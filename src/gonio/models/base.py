@@ -227,11 +227,7 @@ class BSDF:
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters by name."""
-        return {
-            field.name: Parameter(name=field.name, default=field.default, **field.metadata)
-            for field in dataclasses.fields(cls)  # type: ignore[arg-type]
-            if field.metadata
-        }
+        return dict(_declared(cls))
 
     # ------------------------------------------------------------------ the protocol
 
@@ -371,6 +367,16 @@ class BSDF:
         more = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
         kinds = {"wo": "vec3", "u": "vec3"} if method == "sample" else {"wo": "vec3", "wi": "vec3"}
         return ops.record(inner, types=kinds, name=f"{type(self).__name__}_{method}", **{"self": bound}, **more)
+
+
+@functools.cache
+def _declared(cls: type[BSDF]) -> dict[str, Parameter]:
+    """Asked at every binding, so found once a class."""
+    return {
+        field.name: Parameter(name=field.name, default=field.default, **field.metadata)
+        for field in dataclasses.fields(cls)  # type: ignore[arg-type]
+        if field.metadata
+    }
 
 
 def never(like: Any) -> Any:
