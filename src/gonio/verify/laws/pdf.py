@@ -53,7 +53,7 @@ class Pdf(Law):
                 continue
             for outcome in _chi_square(part, effort, seed):
                 wo = outcome["wo"]
-                place = f"{name + ': ' if name else ''}wo at {directions.text(wo).replace(',', ', ')} degrees"
+                place = f"{name + ': ' if name else ''}wo at {_angles(wo)} degrees"
                 for kind in ("fine", "coarse", "others"):
                     p = getattr(outcome["p"], kind)
                     finding.trials.append(Trial(p, f"{_KINDS[kind]}, {place}", _Again(part, wo, kind, effort, seed)))
@@ -93,6 +93,11 @@ class _Again:
     def __call__(self) -> float:
         outcomes = _chi_square(self.subject, self.effort, self.seed + 7919, self.wo[None])
         return min((getattr(outcome["p"], self.kind) for outcome in outcomes), default=1.0)
+
+
+def _angles(w: np.ndarray) -> str:
+    theta, phi = directions.angles(w)
+    return f"{theta:.4g}, {phi:.4g}"
 
 
 def _widths(subject: Subject, effort: Effort) -> list[float]:
@@ -156,7 +161,7 @@ def _deltas(subject: Subject, name: str, finding: Finding, seed: int) -> None:
                 second = frequencies(angles, seed + 7919)
                 return second[i][1] if i < len(second) else 0.0
 
-            text = f"{name + ': ' if name else ''}delta toward {directions.text(key)} from {angles[0]:g} degrees"
+            text = f"{name + ': ' if name else ''}delta toward {_angles(key)} from {angles[0]:g} degrees"
             finding.trials.append(Trial(p, text, again))
 
 
