@@ -212,7 +212,9 @@ def dot(a: Any, b: Any) -> Any:
     """Scalar product."""
     if isinstance(a, Node):
         return graph.emit("dot", "float", a, b)
-    # written out, every product rounded: the recorded graph, read by NumPy, then gives the same bits
+    if is_single(a):
+        return drjit().dot(a, b)
+    # float64 is the oracle: every product rounded, so that NumPy, reading the recorded graph, gets the same bits
     total = a[0] * b[0]
     for i in range(1, len(a)):
         total = total + a[i] * b[i]
