@@ -164,13 +164,14 @@ def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
         # the error of four nodes is far below the difference: for smooth cells its square, over the value
         off = np.abs(four - two) * 0.3
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
-        if depth == 0:
-            edge = _beside_light(four, owner, (n, sides, ROWS, COLUMNS))
-        divide = ((off > allowed) & (depth < 8)) | (edge & (depth < 3))
+        divide = off > allowed
+        dark = np.flatnonzero(four <= 0.0)
+        divide[dark] = _rim_is_lit(subject, grid.wo[row[owner[dark]]], side[owner[dark]], box[dark])
+        divide &= depth < 8
         np.add.at(cells, owner[~divide], four[~divide])
         if not divide.any():
             break
-        box, owner, edge = box[divide], np.repeat(owner[divide], 4), np.repeat(edge[divide], 4)
+        box, owner = box[divide], np.repeat(owner[divide], 4)
         m, q = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
         lo_a, hi_a, lo_c, hi_c = box.T
         parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
@@ -179,15 +180,28 @@ def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
     return Expectation(shaped, shaped.sum((1, 2, 3)))
 
 
-def _beside_light(value: np.ndarray, owner: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Dark cells next to one that is not: a sliver of light in them may have slipped through between the nodes."""
-    lit = np.zeros(shape, bool)
-    lit.ravel()[owner[value > 0.0]] = True
-    near = lit.copy()
-    for axis in (2, 3):
-        for step in (1, -1):
-            near |= np.roll(near, step, axis)
-    return (near & ~lit).ravel()[owner]
+# just inside a cell's corners and the middles of its sides, as shares of its width
+_RIM = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.9999) if (a, b) != (0.5, 0.5)])
+
+
+def _rim_is_lit(subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray) -> np.ndarray:
+    """Whether the pdf is positive somewhere on the rim of cells that are dark at all nodes.
+
+    Total reflection and the horizon end a density with a step; what lies between a cell's rim and its nodes would be
+    lost.
+    """
+    if not len(box):
+        return np.zeros(0, bool)
+    value = subject.pdf(np.repeat(wo, len(_RIM), axis=0), _directions(side, box, _RIM[:, 0], _RIM[:, 1]))
+    return np.any(value.reshape(len(box), -1) > 0.0, axis=1)
+
+
+def _directions(side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Unit vectors at places (s, t) in [0, 1]^2 of each box [a, b] x [c, d] of (1 - |z|, azimuth), row by row."""
+    a, b, c, d = box.T[..., None]
+    height, phi = a + (b - a) * s, c + (d - c) * t
+    r = np.sqrt(height * (2.0 - height))
+    return np.stack([r * np.cos(phi), r * np.sin(phi), (1.0 - height) * side[:, None]], -1).reshape(-1, 3)
 
 
 def _gauss(subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int) -> np.ndarray:
@@ -199,14 +213,11 @@ def _gauss(subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray, 
     result = np.empty(len(box))
     chunk = (1 << 22) // order**2
     for start in range(0, len(box), chunk):
-        a, b, c, d = box[start : start + chunk].T[..., None]
-        height, phi = a + (b - a) * s.ravel(), c + (d - c) * t.ravel()
-        r = np.sqrt(height * (2.0 - height))
-        z = (1.0 - height) * side[start : start + chunk, None]
-        wi = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1).reshape(-1, 3)
-        value = subject.pdf(np.repeat(wo[start : start + chunk], order**2, axis=0), wi)
-        value = value.reshape(-1, order**2) @ weights
-        result[start : start + chunk] = value * ((b - a) * (d - c))[:, 0]
+        part = slice(start, start + chunk)
+        wi = _directions(side[part], box[part], s.ravel(), t.ravel())
+        value = subject.pdf(np.repeat(wo[part], order**2, axis=0), wi).reshape(-1, order**2) @ weights
+        a, b, c, d = box[part].T
+        result[part] = value * (b - a) * (d - c)
     return result
 
 
