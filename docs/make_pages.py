@@ -1,6 +1,6 @@
 """Write docs/models/NAME.md for every model from its docstring and its declared parameters.
 
-    python docs/make_pages.py [--check]      --check writes nothing and fails where a page is out of date
+python docs/make_pages.py [--check]      --check writes nothing and fails where a page is out of date
 """
 
 from __future__ import annotations
