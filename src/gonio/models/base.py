@@ -227,7 +227,8 @@ class BSDF:
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters by name."""
-        return dict(_declared(cls))
+        this: Any = cls  # mypy takes a class of ours for unhashable
+        return dict(_declared(this))
 
     # ------------------------------------------------------------------ the protocol
 
