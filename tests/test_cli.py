@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gonio import cli
+from gonio.ops import llvm
 from gonio.render import images
 
 SCENE = {
@@ -322,7 +323,8 @@ def test_the_doctor_finds_something_to_render_with() -> None:
 def test_the_doctor_survives_a_library_that_is_none(tmp_path: Path) -> None:
     wrong = tmp_path / "libLLVM.so"
     wrong.write_bytes(b"no library")
+    usable = [library for library in llvm.libraries() if library.usable]
     code, report = _doctor(DRJIT_LIBLLVM_PATH=str(wrong), CUDA_VISIBLE_DEVICES="")
-    assert code == 3 and report["can_render"] is False
-    bad = [finding for finding in report["findings"] if finding["state"] == "bad"]  # type: ignore[attr-defined]
-    assert any("unset DRJIT_LIBLLVM_PATH" in finding["text"] for finding in bad)
+    assert (code, report["can_render"]) == ((0, True) if usable else (3, False))
+    used = [finding["text"] for finding in report["findings"] if finding["state"] == "ok"]  # type: ignore[attr-defined]
+    assert not any(str(wrong) in text for text in used)
