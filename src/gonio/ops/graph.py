@@ -42,16 +42,40 @@ def _source_line() -> str:
     return f"{frame.f_code.co_filename}:{frame.f_lineno}"
 
 
-class Node:
-    """One value in a recorded function: an operation, its arguments, its type and the line that wrote it."""
+def _name_locals(function: Function) -> None:
+    """Give the values of `function` the names of the Python variables that hold them now.
 
-    __slots__ = ("args", "function", "index", "op", "source", "static", "type")
+    Called whenever a value is made: what an earlier line bound is then still there. A name in the function's own
+    frame is preferred to one in a plain function that it calls, the first name to a later one.
+    """
+    found = []
+    frame: Any = sys._getframe(1)
+    while frame is not None and frame.f_code is not _define.__code__:
+        if not frame.f_code.co_filename.startswith(_HERE):
+            found.append(frame)
+        frame = frame.f_back
+    for depth, own in enumerate(reversed(found)):
+        for name, value in own.f_locals.items():
+            for path, node in _flatten(value, name) if isinstance(value, Node | tuple | list | dict) else ():
+                if node.function is function and node.depth > depth:
+                    node.name, node.depth = path.strip("_"), depth
+
+
+class Node:
+    """One value in a recorded function: an operation, its arguments, its type and the line that wrote it.
+
+    name  of the Python variable that held it, or ""; of a value in a tuple or dict with its place, "found.bend"
+    """
+
+    __slots__ = ("args", "depth", "function", "index", "name", "op", "source", "static", "type")
     __array_ufunc__ = None  # NumPy scalars on the left must defer to the operators below
 
     def __init__(self, function: Function, op: str, type: str, args: tuple, static: Any = None) -> None:
         self.function, self.op, self.type, self.args, self.static = function, op, type, args, static
         self.source = _source_line()
+        self.name, self.depth = "", 1000
         self.index = len(function.nodes)
+        _name_locals(function)
         function.nodes.append(self)
 
     def __repr__(self) -> str:
@@ -217,16 +241,28 @@ def arithmetic(op: str, a: Any, b: Any) -> Node:
 
 
 def _flatten(value: Any, name: str) -> Iterator[tuple[str, Node]]:
-    """The nodes inside an argument (node, tuple, list, object with fields), each with its path."""
+    """The nodes inside an argument (node, tuple, list, dict, object with fields), each with its path."""
     if isinstance(value, Node):
         yield name, value
     elif isinstance(value, tuple | list):
         fields = getattr(value, "_fields", None) or [str(i) for i in range(len(value))]
         for field, item in zip(fields, value, strict=True):
             yield from _flatten(item, f"{name}.{field}")
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _flatten(item, f"{name}.{key}")
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        for field in dataclasses.fields(value):
-            yield from _flatten(getattr(value, field.name), f"{name}.{field.name}")
+        for field in _fields(value):
+            yield from _flatten(value.__dict__[field], f"{name}.{field}")
+
+
+def _fields(value: Any) -> list[str]:
+    """The fields of an object that a recording follows: those declared, and what it keeps under `SETTLED`."""
+    names = [field.name for field in dataclasses.fields(value)]
+    return [*names, SETTLED] if value.__dict__.get(SETTLED) is not None else names
+
+
+SETTLED = "_settled"  # where an object keeps what it has worked out from its fields, see `BSDF.settle`
 
 
 def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
@@ -236,11 +272,13 @@ def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
     if isinstance(value, tuple | list):
         items = [_rebuild(item, replace) for item in value]
         return type(value)(*items) if hasattr(value, "_fields") else type(value)(items)
+    if isinstance(value, dict):
+        return {key: _rebuild(item, replace) for key, item in value.items()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         clone = object.__new__(type(value))
         clone.__dict__.update(value.__dict__)
-        for field in dataclasses.fields(value):
-            clone.__dict__[field.name] = _rebuild(getattr(value, field.name), replace)
+        for field in _fields(value):
+            clone.__dict__[field] = _rebuild(value.__dict__[field], replace)
         return clone
     return value
 
@@ -251,9 +289,10 @@ def _static_key(value: Any) -> Any:
         return value.type
     if isinstance(value, tuple | list):
         return tuple(_static_key(item) for item in value)
+    if isinstance(value, dict):
+        return tuple((key, _static_key(item)) for key, item in value.items())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = dataclasses.fields(value)
-        return (type(value), *(_static_key(getattr(value, f.name)) for f in fields))
+        return (type(value), *(_static_key(value.__dict__[field]) for field in _fields(value)))
     try:
         hash(value)
     except TypeError:
@@ -289,6 +328,8 @@ def _rebuild_constants(result: Any) -> Any:
     if isinstance(result, tuple):
         items = [_rebuild_constants(item) for item in result]
         return type(result)(*items) if hasattr(result, "_fields") else tuple(items)
+    if isinstance(result, dict):
+        return {key: _rebuild_constants(item) for key, item in result.items()}
     return result
 
 
@@ -297,6 +338,9 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Any:
     bound = inspect.signature(python_function).bind(*args, **kwargs)
     bound.apply_defaults()
     graph, _ = _stack[-1]
+    for argument, value in bound.arguments.items():
+        if type(value) is float:  # an argument like any other, or each number would make a copy of the function
+            bound.arguments[argument] = emit("constant", "float", static=value)
     key = (python_function, *(_static_key(value) for value in bound.arguments.values()))
     function = graph._known.get(key)
     if function is None:
@@ -305,6 +349,8 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Any:
         owner = bound.arguments.get("self")
         if owner is not None:
             stem = f"{type(owner).__name__}_{stem}"
+        elif python_function.__qualname__.count(".") == 1:  # a static method
+            stem = f"{python_function.__qualname__.split('.')[0]}_{stem}"
         name, count = stem, 1
         while name in taken:
             count += 1
@@ -432,8 +478,8 @@ def _run(function: Function, arguments: list) -> Any:
 
 
 def _leaves(value: Any) -> Iterator[Any]:
-    if isinstance(value, tuple):
-        for item in value:
+    if isinstance(value, tuple | dict):
+        for item in value.values() if isinstance(value, dict) else value:
             yield from _leaves(item)
     else:
         yield value
