@@ -1,7 +1,7 @@
 """What each kind of base misses, and the lobes that give it back: the rules behind compensated materials.
 
-A rule is a class of functions over (material, derived values, directions), one for metals, one for rough glass. All
-values are of the vocabulary of `gonio.ops`.
+A rule is a class of functions over (material, derived values, directions): one for metals, one for rough glass, and
+one for any other base (`gonio.energy.measured`). All values are of the vocabulary of `gonio.ops`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..models import BSDF, microfacet
 from ..models.conductor import Conductor
 from ..models.dielectric import Dielectric
+from ..models.two_sided import TwoSided
 from ..ops import (
     abs,
     backend,
@@ -32,29 +33,49 @@ from ..ops import (
 )
 from ..optics import frame
 from . import curves, fresnel_average
+from .measured import Measured
 
 # M_avg below this is less than the polynomials' own error: nothing is missing
 NOTHING = 1e-5
 
 
-def check_base(base: BSDF, where_: str, transmitting: bool) -> None:
-    """Raise InputError where a base cannot be compensated."""
+def check_base(base: BSDF, where_: str, transmitting: bool, any_base: bool = False) -> None:
+    """Raise InputError where a base cannot be compensated.
+
+    transmitting  whether a rough Dielectric may transmit
+    any_base      whether other bases than Conductor and Dielectric are taken: any that reflects by a finite lobe
+    """
+    name = type(base).__name__
+    if isinstance(base, Conductor | Dielectric):
+        if base.transmits and not transmitting:
+            hint = "Dielectric(transmission=False), or KullaConty, which splits the energy between both sides"
+            raise InputError(f"{name} transmits, a material that only reflects expected", where_, hint)
+        return
     hint = "compensate a conductor or a dielectric first, then mix it or make it two-sided"
-    if not isinstance(base, Conductor | Dielectric):
-        raise InputError(f"{type(base).__name__} given, Conductor or Dielectric expected", where_, hint)
-    if base.transmits and not transmitting:
-        hint = "Dielectric(transmission=False), or KullaConty, which splits the energy between both sides"
-        raise InputError(f"{type(base).__name__} transmits, a material that only reflects expected", where_, hint)
+    if not any_base or not base.name or isinstance(base, TwoSided):
+        expected = "a Gonio material seen from one side" if any_base else "Conductor or Dielectric"
+        raise InputError(f"{name or 'a foreign BSDF'} given, {expected} expected", where_, hint)
+    if base.transmits:
+        raise InputError(f"{name} transmits, a material that only reflects expected", where_, hint)
+    if base.delta != "never" or base.stochastic:
+        why = "has a perfectly specular part" if base.delta != "never" else "is random"
+        raise InputError(f"{name} {why}, a material with a finite lobe expected", where_, hint)
+    if not base.isotropic:
+        raise InputError(f"{name} has two widths inside, one expected", where_, hint)
 
 
 def rule(base: Any) -> Any:
     """The rule of a base."""
+    if not isinstance(base, Conductor | Dielectric):
+        return Measured
     return Glass if base.transmits else Metal
 
 
 def turned(base: BSDF) -> bool:
-    """Whether an unbound base has, or may have, two widths that differ; it shapes the code."""
-    alpha = base.alpha  # type: ignore[attr-defined]
+    """Whether an unbound microfacet base has, or may have, two widths that differ; it shapes the code."""
+    if not isinstance(base, Conductor | Dielectric):
+        return False
+    alpha = base.alpha
     if isinstance(alpha, tuple | list):
         plain = all(isinstance(a, int | float) for a in alpha)
         return not (plain and alpha[0] == alpha[1])

@@ -195,6 +195,11 @@ def _adapter_class(mi: ModuleType) -> type:
         def _settle(self) -> None:
             """Find once what the model derives from values that are the same at every hit."""
             self.settled = None
+            if self.textured() and getattr(self.model, "measured", False):
+                what = (
+                    "this base is measured: it takes colours and numbers, no texture, unlike conductor and dielectric"
+                )
+                raise InputError(what, f"{plugin_name(self.model.name)}.base")
             if type(self.model).derive is not BSDF.derive and not self.textured():
                 self.settled = self.at(dr.zeros(mi.SurfaceInteraction3f), True, inner=True).settle()
 

@@ -15,12 +15,13 @@ ALMOST_ONE = 0.99999994  # the largest float32 under 1
 class _Added(BSDF):
     """base + `_extra`, sampled by a mixture of the base and of the rule's broad lobes."""
 
-    base: BSDF = bsdf("the material to be compensated: a conductor or a dielectric")
+    base: BSDF = bsdf("the material to be compensated")
     _takes_glass = True  # whether the base may transmit
+    _takes_any = False  # whether it may be another than a conductor or a dielectric
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        missing.check_base(self.base, f"{type(self).__name__}.base", self._takes_glass)
+        missing.check_base(self.base, f"{type(self).__name__}.base", self._takes_glass, self._takes_any)
         self.__dict__["_turned"] = missing.turned(self.base)
 
     @property

@@ -1,8 +1,10 @@
-"""A microfacet material that keeps what it receives (Kulla2017)."""
+"""A material that keeps what it receives (Kulla2017)."""
 
 from __future__ import annotations
 
 from ...models.base import choice
+from ...models.conductor import Conductor
+from ...models.dielectric import Dielectric
 from .. import fresnel_average
 from ._added import _Added
 
@@ -17,22 +19,35 @@ class KullaConty(_Added):
 
     With E(mu) the albedo of the base at F = 1, E_avg = 2 int E mu dmu and F_avg likewise:
     f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)), whose albedo is 1 - E(mu_o), and f_add by `color`. At F = 1
-    nothing is lost. E comes from short polynomials met to 1e-4 (`gonio.energy.curves`). Reciprocal. As alpha -> 0 the
-    term vanishes, (1 - E)^2 faster than 1 - E_avg.
+    nothing is lost. Reciprocal. As alpha -> 0 the term vanishes, (1 - E)^2 faster than 1 - E_avg.
 
-    A transmitting base (rough glass) gets a reflected and a transmitted lobe on each side, of 1 - E with E the power
-    reflected and transmitted; the shares are those that reciprocity asks for (Kulla2017, p. 30).
+    Of a conductor or a dielectric E is a short polynomial met to 1e-4 (`gonio.energy.curves`), taken at any alpha, by
+    textures and gradients too. A dielectric that transmits gets a reflected and a transmitted lobe on each side, of
+    1 - E with E the power reflected and transmitted; the shares are those that reciprocity asks for (Kulla2017, p. 30).
 
-    The base is a Conductor or a Dielectric. Of masking schlick-direct, G does not tend to 1 as alpha -> 0
-    (E_avg = .835 at roughness .05): compensation then lays a false bright rim on smooth surfaces.
+    Any other base that only reflects, by a finite isotropic lobe, is measured once (`gonio.energy.measured`): E is its
+    albedo with F = 1 and every declared share 1, F_avg the ratio of its own to that. Lambert misses nothing; Oren-Nayar
+    the interreflections; a material without a declared share (Phong) whatever its brightest channel does not return.
+    What a base gains stays its own. Its values must not vary over the surface, and it cannot be recorded.
+
+    Of masking schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = .835 at roughness .05): compensation then
+    lays a false bright rim on smooth surfaces.
     """
 
     color: str = choice(default="bounce", doc="colour of the light that is given back", choices=COLORS)
-    average: str = choice(default="exact", doc="how F_avg is found", choices=fresnel_average.KINDS)
+    average: str = choice(
+        default="exact", doc="how F_avg of a conductor or dielectric is found", choices=fresnel_average.KINDS
+    )
+    _takes_any = True
+
+    @property
+    def measured(self) -> bool:
+        """Whether the base is one whose energy is measured, once for all rays."""
+        return not isinstance(self.base, Conductor | Dielectric)
 
     @property
     def lossless(self) -> float:  # type: ignore[override]
-        """What a white furnace may miss: the polynomials' error, see docs/energy.md."""
+        """What a white furnace may miss: the error of polynomials or of the measurement, see docs/energy.md."""
         if self.base.transmits:
             return 0.015  # near eta = 1.1; 2e-3 from eta 1.33 on
         return 0.01 if self.turned else 1e-3
