@@ -36,9 +36,22 @@ def register(mi: ModuleType) -> None:
         return  # Python plugins are written for arrays
     if variant not in _registered:
         _registered[variant] = _adapter_class(mi)
-    adapter = _registered[variant]
     for name, model in models().items():
-        mi.register_bsdf(plugin_name(name), lambda props, model=model: adapter(props, model))
+        _register(mi, plugin_name(name), model)
+
+
+def register_model(mi: ModuleType, model: type[BSDF]) -> str:
+    """The name of a model's plugin, which a class of the user's own gets here; call `register` first."""
+    if models().get(model.name) is model:
+        return plugin_name(model.name)
+    name = f"gonio_own_{model.name.replace('-', '_')}"
+    _register(mi, name, model)
+    return name
+
+
+def _register(mi: ModuleType, name: str, model: type[BSDF]) -> None:
+    adapter = _registered[mi.variant()]
+    mi.register_bsdf(name, lambda props: adapter(props, model))
 
 
 class _Slot:

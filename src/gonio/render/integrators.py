@@ -60,7 +60,7 @@ CIE_Y_INTEGRAL = 106.7502593994140625
 # 0.21 s in tiles and 0.32 s in scanlines.
 TILE = 4
 
-# Samples whose paths wait for each other, see _Transport.accumulate.
+# Samples whose paths wait for each other, see Transport.accumulate.
 BATCH = 16
 
 
@@ -105,6 +105,8 @@ class Render:
     aovs      also average albedo and normal of the first hit, for the denoiser
     """
 
+    features = 0  # values that a subclass adds up beside the radiance
+
     def __init__(self, scene: Any, settings: Settings, sensor: Any = None, aovs: bool = False):
         self.mi = mi = engine.load()
         self.scene, self.settings, self.aovs = scene, settings, aovs
@@ -115,13 +117,16 @@ class Render:
         self.done = 0
         self._order = _tiles(self.width, self.height)
         self._pixel = mi.UInt32(self._order)
-        self._sums = _Sums.zeros(mi, self.width * self.height, 6 if aovs else 0)
+        self._sums = _Sums.zeros(mi, self.width * self.height, 6 if aovs else self.features)
         dr.make_opaque(self._pixel, self._sums)  # zeros as data: else the first pass would be a kernel of its own
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
         with dr.suspend_grad():
-            self._transport = _Transport(mi, scene, self.sensor, settings, aovs)
+            self._transport = self._program(mi)
+
+    def _program(self, mi: Any) -> Transport:
+        return Transport(mi, self.scene, self.sensor, self.settings, self.aovs)
 
     def advance(self, count: int) -> None:
         """Render `count` more samples of every pixel; returns when they are done.
@@ -162,10 +167,10 @@ class Render:
         return int(dr.sum(self._sums.invalid)[0])
 
     def _mean(self, *sums: list[Any]) -> np.ndarray:
-        pixels = np.empty((self.height * self.width, 3), np.float32)
         channels = [sum(np.asarray(part) for part in parts) for parts in zip(*sums, strict=True)]
+        pixels = np.empty((self.height * self.width, len(channels)), np.float32)
         pixels[self._order] = np.stack(channels, axis=1) / max(self.done, 1)
-        return pixels.reshape(self.height, self.width, 3)
+        return pixels.reshape(self.height, self.width, len(channels))
 
 
 def _tiles(width: int, height: int) -> np.ndarray:
@@ -251,7 +256,7 @@ def _waiting_type(variant: str) -> Any:
     return waiting
 
 
-class _Transport:
+class Transport:
     """One integrator, bound to a scene: the program that the kernel runs for each lane."""
 
     def __init__(self, mi: Any, scene: Any, sensor: Any, settings: Settings, aovs: bool):
@@ -342,17 +347,21 @@ class _Transport:
 
     def begin(self, pixel: Any, key: Any, index: Any) -> tuple[_Path, list[Any]]:
         """The first vertex of a sample: (the path that goes on from it, [r, g, b, features of this vertex])."""
+        path = self.first(pixel, key, index)
+        if self.settings.integrator in ("normal", "uv"):
+            return path, self.show(path.hit.compute_surface_interaction(path.ray))
+        features: list[Any] = []
+        path = self.extend(path, key, features)
+        return path, [*self.rgb(path.radiance, path.ray.wavelengths), *features]
+
+    def first(self, pixel: Any, key: Any, index: Any) -> _Path:
+        """A sample's path up to the first thing that it meets."""
         mi = self.mi
         ray, weight = self.camera_ray(pixel, key, index)
         ray = mi.Ray3f(ray)
         hit = self.scene.ray_intersect_preliminary(ray, coherent=True)
-        path = _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
+        return _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
                      mi.Float(0), mi.Spectrum(0), mi.Bool(True))  # fmt: skip
-        if self.settings.integrator in ("normal", "uv"):
-            return path, self.show(hit.compute_surface_interaction(ray))
-        features: list[Any] = []
-        path = self.extend(path, key, features)
-        return path, [*self.rgb(path.radiance, ray.wavelengths), *features]
 
     def show(self, si: Any) -> list[Any]:
         """The pictures that need no light: `normal` and `uv`."""
@@ -458,8 +467,12 @@ class _Transport:
         if self.samples_bsdf:
             gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
         visible = active & dr.any(gathered != 0)
-        visible &= ~self.scene.ray_test(si.spawn_ray_to(light.ds.p), visible)
+        visible = self.unoccluded(si, light.ds.p, visible)
         return dr.select(visible, gathered, 0), light.solid_angle, bs, weight
+
+    def unoccluded(self, si: Any, point: Any, active: Any) -> Any:
+        """Lanes whose surface sees the point."""
+        return active & ~self.scene.ray_test(si.spawn_ray_to(point), active)
 
     def ambient_light(self, bsdf: Any, si: Any, active: Any) -> Any:
         """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
