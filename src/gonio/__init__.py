@@ -27,6 +27,7 @@ _PLACES = {
     "model": "models",
     "Albedo": "energy",
     "albedo": "energy",
+    "view": "viewer.widget",
 }
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from .errors import GonioError, GonioWarning, InputError, MachineError
     from .models import BSDF, Sample, model
     from .ops import get_precision, set_precision
+    from .viewer.widget import view
 
 
 def __getattr__(name: str) -> Any:
@@ -74,4 +76,5 @@ __all__ = [
     "render",
     "set_precision",
     "verify",
+    "view",
 ]

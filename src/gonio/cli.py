@@ -321,6 +321,60 @@ def _print_comparison(result: Any, metric: str, tolerance: float | None, passed:
         print(f"{verdict}: {metric} {result.value(metric):.6g} {relation} {tolerance:g}")
 
 
+@app.command(rich_help_panel=PICTURES)
+def view(
+    target: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="SCENE|MODEL", help="A lab scene, or materials; none: Kulla-Conty and plain."),
+    ] = None,
+    param: Annotated[
+        list[str] | None, typer.Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")
+    ] = None,
+    export: Annotated[
+        Path | None, typer.Option("--export", metavar="FILE", help="Write the page as one .html and end.")
+    ] = None,
+    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Where to listen.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(metavar="N", help="0 takes any that is free.")] = 0,
+    browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
+    device: Device = "auto",
+    allow_outside: Outside = False,
+) -> None:
+    """Show materials live on shading balls, in a browser, beside a path-traced reference.
+
+    With --export the page is one file that needs no server and no network.
+
+    \b
+    Examples:
+      gonio view
+      gonio view conductor lambert --param alpha=.3
+      gonio view "conductor(preset=Au)" "conductor(preset=Cu)"
+      gonio view examples/shading-balls
+      gonio view --export page.html
+    """
+    from .viewer import page, stage
+
+    if target and len(target) == 1 and (target[0].lower().endswith(".json") or Path(target[0]).is_dir()):
+        from .viewer import lab_scene
+
+        if param:
+            raise InputError("a scene takes no parameters here", "--param", "change the scene, or name a model")
+        shown = lab_scene.stage(Path(target[0]), allow_outside)
+    elif target:
+        shown = stage.of_targets(target, param or [])
+    else:
+        if param:
+            raise InputError("parameters for no model", "--param", "name one: gonio view conductor --param alpha=.3")
+        shown = stage.homework()
+    _print_warnings(shown.notes)
+    if export is not None:
+        path = page.export(shown, export)
+        print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")
+        return
+    from .viewer import server
+
+    server.serve(shown, host, port, browser, device)
+
+
 # --- materials -----------------------------------------------------------------------------------------
 
 
@@ -373,15 +427,21 @@ def bake(
     points: Annotated[str, typer.Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley",
     seed: Annotated[int, typer.Option(metavar="N", help="Of independent points.")] = 0,
     layout: Annotated[str, typer.Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear",
+    aspect: Annotated[float, typer.Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds phi.")] = 1.0,
+    azimuths: Annotated[int, typer.Option(metavar="N", help="Slices along phi, with two widths.")] = 16,
     store: Annotated[str, typer.Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E",
     flip: Annotated[bool, typer.Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True,
     as_json: Json = False,
 ) -> None:
-    """Write tables of directional albedo, its average and the split sum, with their measured error.
+    """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
+
+    With two widths the tables have a third axis, the azimuth. Of a material without a width: E over the cosine.
 
     \b
     Examples:
       gonio bake ggx -o tables
+      gonio bake ggx --aspect 0.25 --layout stretched -o brushed
+      gonio bake ggx --lut glass --size 32 -o glass
       gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
       gonio bake conductor --preset Au --lut E,Eavg -o gold
     """
@@ -399,6 +459,7 @@ def bake(
         what = plots.make(target, param or [], preset)[0]
     options: dict[str, Any] = {"lut": lut.split(",")} if lut else {}
     options |= {"size": size, "method": method, "masking": masking, "spp": spp, "points": points, "seed": seed}
+    options |= {"aspect": aspect, "azimuths": azimuths}
     baked = tables.bake(what, output, layout=layout, store=store, flip=flip, **options)
     _print_tables(baked.manifest, output, as_json)
 
@@ -423,13 +484,16 @@ def _print_tables(manifest: dict[str, Any], path: Path, as_json: bool) -> None:
         print(json.dumps({"path": str(path), **manifest}))
         return
     facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
-    print(f"{path}: {', '.join(facts)}")
-    table = _table("table", "shape", "max error", "rms error", "between nodes")
+    facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
+    print(f"{path}: {', '.join(filter(None, facts))}")
+    table = _table("table", "axes", "shape", "max error", "rms error", "between nodes")
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
         figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
-        table.add_row(name, " x ".join(map(str, shape)), *figures)
+        table.add_row(name, ", ".join(manifest["dims"][name]), " x ".join(map(str, shape)), *figures)
     _print_rich(table)
+    for axis, text in manifest["axes"].items():
+        print(f"{axis:10} {text}")
 
 
 @app.command(rich_help_panel=MATERIALS)
@@ -448,10 +512,13 @@ def compensation(
     """
     from .energy import comparison
 
-    found = comparison.compare(walks=walks)
     if output is not None:
+        from .render import tables
         from .viewer import energy_figures
 
+        output = tables.check_folder(output)
+    found = comparison.compare(walks=walks)
+    if output is not None:
         energy_figures.plot_comparison(found, output)
     if as_json:
         print(json.dumps(found))

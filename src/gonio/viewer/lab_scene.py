@@ -1,0 +1,195 @@
+"""A lab scene's materials on balls, under its light: what `gonio view SCENE` shows."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..models import BSDF
+from ..render import engine, scene
+from ..render.scene import schema, textures
+from ..render.scene.materials import BY_TYPE, MaterialPart
+from ..render.scene.values import ImageTexture, rgb
+from .stage import SUN, Ball, Material, Row, Stage, value_at, walk
+
+LARGEST_IMAGE = 1024  # pixels across of an environment in a page; a wider one is averaged down
+BALLS = 5  # a row
+
+
+def stage(path: Path, allow_outside: bool = False) -> Stage:
+    """The materials of a lab scene on balls, under its light.
+
+    Each distinct material is a ball; materials of one model and the same choices share a row. Each lamp becomes a
+    directional light: it shines from where the lamp stands, seen from the point that the camera looks at, as bright
+    as the lamp is there with nothing in between. An environment stays what it is. A texture, which has no place on a
+    page of sliders, is replaced by its parameter's default, and a note says so.
+
+    Raises InputError as the reader of scenes does: also where a file lies outside the scene's folder.
+    """
+    description = scene.read(path, allow_outside=allow_outside)
+    parts = _materials(description)
+    if not parts:
+        raise InputError("the scene has no shapes", str(path), "add one, or name a model")
+    notes = [f"{part.type}: its {what} is not shown" for part in parts for what in _textured(part)]
+    materials, rows = _rows([part.instance() for part in parts])
+    lights, more = _lights(description)
+    name = path.stem if path.stem != "scene" else path.resolve().parent.name
+    if path.is_dir():
+        name = path.resolve().name
+    return Stage(f"Materials of {name}", materials, rows, lights, notes=(*description.warnings, *notes, *more))
+
+
+def _materials(description: Any) -> list[MaterialPart]:
+    """The distinct materials, in the order of the shapes; a shape without one is matte."""
+    found: list[MaterialPart] = []
+    for shape in description.shapes:
+        part = shape.material or BY_TYPE["matte"](type="matte")
+        if part not in found:
+            found.append(part)
+    return found
+
+
+def _textured(part: MaterialPart) -> Iterator[str]:
+    if part.normalmap is not None:
+        yield "normal map"
+    for name, (value, _, _) in part.arguments().items():
+        if isinstance(value, MaterialPart):
+            yield from _textured(value)
+        elif any(isinstance(v, ImageTexture) for v in (value if isinstance(value, tuple | list) else (value,))):
+            yield f"texture of {name}"
+
+
+def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
+    """Materials of one code (model, choices, number of widths) share rows; each ball has its own numbers."""
+    groups: dict[Any, list[BSDF]] = {}
+    for bsdf in bsdfs:
+        groups.setdefault(_code(bsdf), []).append(bsdf)
+    materials, rows = {}, []
+    for index, members in enumerate(groups.values()):
+        key, first = f"m{index}", members[0]
+        title = type(first).__name__
+        materials[key] = Material(title, first)
+        for start in range(0, len(members), BALLS):
+            balls = tuple(
+                _ball(first, member, f"{title} {start + n + 1}") for n, member in enumerate(members[start:][:BALLS])
+            )
+            rows.append(Row(title, key, balls))
+    return materials, tuple(rows[:8])
+
+
+def _code(bsdf: BSDF) -> Any:
+    facts: list[Any] = [type(bsdf).__name__]
+    for path, parameter, owner in walk(bsdf):
+        value = value_at(bsdf, path)
+        facts.append((type(owner).__name__, path))
+        if not parameter.numeric:
+            facts.append(value)
+        elif parameter.kind == "alpha":
+            facts.append(isinstance(value, tuple))
+        elif parameter.kind == "angle":
+            facts.append(value == 0)
+    return tuple(facts)
+
+
+def _ball(first: BSDF, member: BSDF, label: str) -> Ball:
+    values = {path: value_at(member, path) for path, parameter, _ in walk(member) if parameter.numeric}
+    different = {path: _listed(v) for path, v in values.items() if v != value_at(first, path)}
+    named = [f"{path} {v:.4g}" for path, v in different.items() if isinstance(v, int | float)]
+    return Ball(", ".join(named) or label, different)
+
+
+def _listed(value: Any) -> Any:
+    return [float(v) for v in value] if isinstance(value, tuple | list | np.ndarray) else float(value)
+
+
+# --------------------------------------------------------------------------- lights
+
+
+def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
+    """The scene's lights as the page has them, and notes on what became of them."""
+    placed = description.camera.transform
+    target = np.array(placed.look_at, float)
+    right, up, back = _camera_axes(placed)
+    found, notes = [], []
+    for light in description.lights:
+        if isinstance(light, schema.EnvironmentLight):
+            found.append(_environment(description, light))
+            notes.append("the environment is seen as from the world's axes, not from the scene's camera")
+            continue
+        if isinstance(light, schema.SpotLight):
+            away = np.array(light.position, float) - target
+            irradiance = np.array(rgb(light.energy)) / max(float(away @ away), 1e-12)
+        else:
+            away, irradiance = _area(light, target)
+        distance = float(np.linalg.norm(away))
+        if distance == 0.0:
+            notes.append("a lamp stands where the camera looks at; it is left out")
+            continue
+        # in the camera's frame, since the page's camera looks along -z
+        direction = [float(axis @ away) / distance for axis in (right, up, back)]
+        found.append({"type": "directional", "direction": direction, "irradiance": [float(x) for x in irradiance]})
+    if not found:
+        notes.append("the scene has no light; the page's own is on")
+        return (SUN,), notes
+    return tuple(found), notes
+
+
+def _camera_axes(placed: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    back = np.array(placed.position, float) - np.array(placed.look_at, float)
+    back /= np.linalg.norm(back)
+    right = np.cross(np.array(placed.up, float), back)
+    right /= np.linalg.norm(right)
+    return right, np.cross(back, right), back
+
+
+def _area(light: Any, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(vector to the lamp's middle, irradiance on a surface that faces it): L A cos / r^2, as if it were far away."""
+    shape, radiance = light.shape, np.array(rgb(light.energy))
+    matrix = shape.transform.matrix()
+    if isinstance(shape, schema.Parallelogram):
+        edge0, edge1 = (matrix[:3, :3] @ np.array(edge, float) for edge in (shape.edge0, shape.edge1))
+        centre = (matrix @ [*shape.base, 1.0])[:3] + (edge0 + edge1) / 2
+        area_vector = np.cross(edge0, edge1)
+        away = centre - target
+        seen = abs(float(area_vector @ away)) / max(float(np.linalg.norm(away)), 1e-12)
+    elif isinstance(shape, schema.Sphere):
+        away = (matrix @ [*shape.center, 1.0])[:3] - target
+        seen = math.pi * shape.radius**2
+    else:
+        away = matrix[:3, 3] - target
+        seen = float(abs(np.linalg.det(matrix[:3, :3]))) ** (2 / 3) * math.pi
+    return away, radiance * seen / max(float(away @ away), 1e-12)
+
+
+def _environment(description: Any, light: Any) -> dict[str, Any]:
+    source = light.texture if light.texture is not None else light.radiance
+    found: dict[str, Any] = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
+    if not isinstance(source, ImageTexture):
+        return {**found, "constant": [float(x) for x in rgb(source)]}
+    where = description.where("/scene/lights")
+    mi = engine.load("cpu")
+    pixels = textures.load_image(mi, description.locate(source.file, where), where, srgb=source.color_space == "srgb")
+    pixels = _smaller(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
+    halves = np.ones((*pixels.shape[:2], 4), "<f2")
+    halves[..., :3] = np.clip(pixels, 0.0, np.finfo(np.float16).max)
+    data = base64.b64encode(halves.tobytes()).decode()
+    return {**found, "image": {"width": pixels.shape[1], "height": pixels.shape[0], "data": data}}
+
+
+def _smaller(pixels: np.ndarray) -> np.ndarray:
+    """Averaged over whole blocks until it is at most LARGEST_IMAGE wide."""
+    factor = -(-pixels.shape[1] // LARGEST_IMAGE)
+    if factor == 1:
+        return pixels
+    height, width = (n // factor * factor for n in pixels.shape[:2])
+    blocks = pixels[:height, :width].reshape(height // factor, factor, width // factor, factor, 3)
+    return blocks.mean((1, 3), dtype=np.float64).astype(np.float32)
+
+
+__all__ = ["stage"]

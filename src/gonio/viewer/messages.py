@@ -1,0 +1,203 @@
+"""What the page and the server say to each other: JSON in, JSON and frames out. docs/viewer.md describes it.
+
+Everything that comes in is checked here, so that the rest may trust it: types, ranges, finite numbers, and sizes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from ..errors import InputError
+
+TEXT_BYTES = 64 << 10  # a scene of 64 balls with all their parameters is a tenth of this
+UPLOAD_BYTES = 64 << 20  # an environment of 4096 x 2048 half floats in RGBA
+MOST_PIXELS = 1920 * 1080
+MOST_BALLS, MOST_LIGHTS = 64, 16
+
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
+Positive = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e9)]
+Vector = tuple[Number, Number, Number]
+Colour = tuple[Positive, Positive, Positive]
+Key = Annotated[str, Field(pattern=r"^[0-9A-Za-z_-]{1,80}$")]
+Path = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]{0,120}$")]
+Value = Number | tuple[Number, Number] | Vector
+Choice = Annotated[str, Field(max_length=80)] | bool
+
+
+def _direction(vector: Vector) -> Vector:
+    if not math.hypot(*vector) > 1e-6:
+        raise ValueError("a direction of length 0")
+    return vector
+
+
+class Part(BaseModel):
+    """Strict: no unknown keys, no text where a number is meant."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Directional(Part):
+    type: Literal["directional"]
+    direction: Annotated[Vector, AfterValidator(_direction)]
+    irradiance: Colour
+
+
+class Point(Part):
+    type: Literal["point"]
+    position: Vector
+    intensity: Colour
+
+
+class Area(Part):
+    type: Literal["area"]
+    center: Vector
+    u: Annotated[Vector, AfterValidator(_direction)]
+    v: Annotated[Vector, AfterValidator(_direction)]
+    radiance: Colour
+
+
+class Image(Part):
+    """A picture that was uploaded, or came with the page."""
+
+    key: Key
+
+
+class Environment(Part):
+    type: Literal["environment"]
+    image: Image | None = None
+    constant: Colour = (1.0, 1.0, 1.0)
+    rotation: Number = 0.0
+    scale: Positive = 1.0
+
+
+Light = Annotated[Directional | Point | Area | Environment, Field(discriminator="type")]
+
+
+class Camera(Part):
+    target: Vector
+    distance: Annotated[float, Field(gt=1e-3, le=1e6, allow_inf_nan=False)]
+    azimuth: Number
+    elevation: Number
+    fov: Annotated[float, Field(ge=1, le=170, allow_inf_nan=False)]
+
+
+class Row(Part):
+    material: Key
+    choices: dict[Path, Choice] = Field(default_factory=dict, max_length=32)
+    balls: list[dict[Path, Value]] = Field(min_length=1, max_length=MOST_BALLS)
+
+
+class State(Part):
+    rows: list[Row] = Field(min_length=1, max_length=8)
+    lights: list[Light] = Field(max_length=MOST_LIGHTS)
+    camera: Camera
+    spacing: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = 2.4
+
+
+class Scene(Part):
+    """Show this from now on; a newer one ends it."""
+
+    type: Literal["scene"]
+    id: Annotated[int, Field(ge=0, lt=2**53)]
+    width: Annotated[int, Field(ge=1, le=4096)]
+    height: Annotated[int, Field(ge=1, le=4096)]
+    state: State
+    spp: Annotated[int, Field(ge=1, le=1 << 16)] = 256
+    transport: Literal["local", "path"] = "local"
+    max_depth: Annotated[int, Field(ge=2, le=16)] = 2
+
+
+class Ack(Part):
+    """Frame `frame` is on the screen: the next may come."""
+
+    type: Literal["ack"]
+    frame: Annotated[int, Field(ge=0, lt=2**53)]
+
+
+class Upload(Part):
+    """The next binary message is an environment, float16 RGBA, row 0 on top; lights name it by its key."""
+
+    type: Literal["upload", "environment"]
+    key: Key
+    width: Annotated[int, Field(ge=1, le=8192)]
+    height: Annotated[int, Field(ge=1, le=8192)]
+
+    @property
+    def size(self) -> int:
+        return self.width * self.height * 8
+
+
+class Wish(Part):
+    """Ask for a material's shader with other choices."""
+
+    type: Literal["choice"]
+    id: Annotated[int, Field(ge=0, lt=2**53)]
+    material: Key
+    choices: dict[Path, Choice] = Field(max_length=32)
+
+
+Message = Annotated[Scene | Ack | Upload | Wish, Field(discriminator="type")]
+_message: TypeAdapter[Any] = TypeAdapter(Message)
+
+
+def parse(text: str) -> Scene | Ack | Upload | Wish:
+    """The message in a text; InputError says what is wrong with it and where."""
+    if len(text) > TEXT_BYTES:
+        raise InputError(f"a message of {len(text)} characters", "message", f"send at most {TEXT_BYTES}")
+    try:
+        message = _message.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = "/".join(str(part) for part in first["loc"])
+        raise InputError(first["msg"], place or "message", "see docs/viewer.md") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"no message: {error}", "message", "see docs/viewer.md") from None
+    if isinstance(message, Scene):
+        _check(message)
+    if isinstance(message, Upload) and message.size > UPLOAD_BYTES:
+        what = f"a picture of {message.size >> 20} MiB"
+        raise InputError(what, "upload", f"send at most {UPLOAD_BYTES >> 20} MiB; scale it down")
+    return message
+
+
+def _check(scene: Scene) -> None:
+    if scene.width * scene.height > MOST_PIXELS:
+        raise InputError(f"{scene.width} x {scene.height} pixels", "scene", f"ask for at most {MOST_PIXELS}")
+    balls = sum(len(row.balls) for row in scene.state.rows)
+    if balls > MOST_BALLS:
+        raise InputError(f"{balls} balls", "scene/state/rows", f"show at most {MOST_BALLS}")
+    if sum(isinstance(light, Environment) for light in scene.state.lights) > 1:
+        raise InputError("more than one environment", "scene/state/lights", "keep one")
+
+
+def environment(upload: Upload, content: bytes) -> np.ndarray:
+    """The pixels of an upload: (height, width, 3) float32; InputError where they are not what was announced."""
+    if len(content) != upload.size:
+        raise InputError(f"{len(content)} bytes came, {upload.size} were announced", "upload", "send float16 RGBA")
+    pixels = np.frombuffer(content, "<f2").reshape(upload.height, upload.width, 4)[..., :3].astype(np.float32)
+    if not np.isfinite(pixels).all() or pixels.min() < 0:
+        raise InputError("the picture holds values that are no radiance", "upload", "mend negative and infinite ones")
+    return pixels
+
+
+def failure(error: Any) -> str:
+    """An error as the page shows it."""
+    return json.dumps({"type": "error", "what": error.what, "where": error.where, "hint": error.hint})
+
+
+def frame(header: dict[str, Any], pixels: np.ndarray) -> bytes:
+    """A frame: length of the header (uint32), header (JSON, padded so that the pixels lie on 4 bytes), float16 RGBA.
+
+    pixels  (height, width, 4), row 0 on top
+    """
+    height, width = pixels.shape[:2]
+    text = json.dumps({**header, "width": width, "height": height, "format": "f16"}).encode()
+    text += b" " * (-len(text) % 4)
+    halves = np.clip(pixels, 0.0, np.finfo(np.float16).max).astype("<f2")
+    return struct.pack("<I", len(text)) + text + halves.tobytes()

@@ -1,0 +1,185 @@
+"""The page of `gonio view`: its data, and the one HTML file that holds everything it needs.
+
+The data format is described in docs/viewer.md. Shader code and tables come from `emit`; script and style are the
+prebuilt ones in `static/`, made from `web/`.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html as escaping
+import itertools
+import json
+import math
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__, emit
+from ..energy import bake
+from ..errors import InputError, MachineError
+from ..models import BSDF
+from . import stage
+from .stage import Stage
+
+VERSION = 1
+STATIC = Path(__file__).parent / "static"
+DFG_SIZE = 32  # bilinear lookups of A and B at roughness^2 steps: off by 2e-3 at most, below what the split sum errs by
+
+
+def page_data(what: Stage, socket: str | None = None) -> dict[str, Any]:
+    """The page's data, as JSON holds it.
+
+    socket  where the live reference is reached, such as "/ws?token=..."; None for a page without a server
+    Raises InputError where a model cannot be written as shader code.
+    """
+    used = {row.material for row in what.rows}
+    return {
+        "version": VERSION,
+        "generator": f"gonio {__version__}",
+        "title": what.title,
+        "mode": "export" if socket is None else "live",
+        "socket": socket,
+        "materials": [material_data(key, m) for key, m in what.materials.items() if key in used],
+        "scene": {
+            "rows": [
+                {
+                    "label": row.label,
+                    "material": row.material,
+                    "balls": [{"label": ball.label, "set": ball.values} for ball in row.balls],
+                }
+                for row in what.rows
+            ],
+            "lights": list(what.lights),
+            "camera": what.framed(),
+            "spacing": stage.SPACING,
+            "mesh": "sphere",
+        },
+        "display": {"tone": "none", "exposure": 0.0},
+        "notes": list(what.notes),
+        "dfg": split_sum_data(),
+    }
+
+
+def material_data(key: str, material: stage.Material) -> dict[str, Any]:
+    """A material with its presets and one variant for every combination of its choices, the model's own first."""
+    names = list(material.choices)
+    combinations = [dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())]
+    return {
+        "id": key,
+        "title": material.title,
+        "presets": stage.presets(material.bsdf),
+        "variants": [variant_data(material.bsdf, choices) for choices in combinations],
+    }
+
+
+def variant_data(bsdf: BSDF, choices: dict[str, Any]) -> dict[str, Any]:
+    """Shader, manifest and tables of a model with some choices made otherwise."""
+    bundle = emit.bundle(stage.replaced(bsdf, choices, "choices"), "glsl")
+    tables = {name: encode(values) for name, values in bundle.tables.items()}
+    return {"choices": choices, "manifest": _finite(bundle.manifest), "text": bundle.text, "tables": tables}
+
+
+def _finite(value: Any) -> Any:
+    """JSON knows no infinity: a range without an end has None there."""
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def encode(values: np.ndarray) -> str:
+    """Little-endian float32 in base64."""
+    return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
+
+
+@lru_cache
+def split_sum_data() -> dict[str, Any]:
+    """A and B of the split sum (Karis2013) for GGX, over mu (x) and roughness (y), at texel centres."""
+    values = bake.bake("ggx", lut=["dfg"], size=DFG_SIZE).arrays["dfg"]
+    return {"size": [DFG_SIZE, DFG_SIZE], "channels": 2, "data": encode(values)}
+
+
+# --------------------------------------------------------------------------- HTML
+
+
+def html(data: dict[str, Any], policy: bool = True) -> str:
+    """One file: style, data and script inline, no address in it that a browser would fetch.
+
+    policy  put the Content-Security-Policy into the file itself; a server sends it as a header instead
+    """
+    script, style = _script(), _style()
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{content_policy()}">\n' if policy else ""
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f"{meta}"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="referrer" content="no-referrer">\n'
+        f"<title>{escaping.escape(str(data['title']))} · Gonio</title>\n"
+        f"<style>{style}</style>\n</head>\n<body>\n"
+        '<div id="app"></div>\n'
+        "<noscript>This page draws with WebGL 2 and needs JavaScript.</noscript>\n"
+        f'<script type="application/json" id="gonio-data">{text}</script>\n'
+        f"<script>{script}</script>\n</body>\n</html>\n"
+    )
+
+
+def content_policy(socket: str = "") -> str:
+    """What the page may do: run its own script and style, read what the user drops, reach its own socket."""
+    connect = " ".join(["blob:", "data:", *([socket] if socket else [])])
+    parts = {
+        "default-src": "'none'",
+        "script-src": _digest(_script()),
+        "style-src": _digest(_style()),
+        "img-src": "data: blob:",
+        "worker-src": "blob:",
+        "connect-src": connect,
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    return "; ".join(f"{name} {value}" for name, value in parts.items())
+
+
+def _digest(text: str) -> str:
+    return "'sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() + "'"
+
+
+@lru_cache
+def _script() -> str:
+    # what would end the element early; within a JavaScript string or regular expression the backslash changes nothing
+    return _static("app.js").replace("</script", "<\\/script").replace("<!--", "<\\!--")
+
+
+@lru_cache
+def _style() -> str:
+    return _static("app.css").replace("</style", "<\\/style")
+
+
+def _static(name: str) -> str:
+    try:
+        return (STATIC / name).read_text(encoding="utf-8").strip()
+    except FileNotFoundError:
+        hint = "install Gonio again; in a checkout run `npm ci && npm run build` in web/"
+        raise MachineError(f"the page's {name} is missing", str(STATIC), hint) from None
+
+
+def export(what: Stage, path: Path) -> Path:
+    """Write the page as one file that needs no server and no network; whole or not at all."""
+    from ..render import images
+
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"unknown page format '{path.suffix}'", "--export", "give a name that ends in .html")
+    target = images.check_folder(path)
+    images.write_whole(target, html(page_data(what)).encode())
+    return target
+
+
+__all__ = ["content_policy", "export", "html", "page_data", "variant_data"]

@@ -1,0 +1,304 @@
+"""The path-traced truth beside the page's picture: the same balls, lights and camera, by Gonio's own renderer.
+
+    >>> reference = Reference(stage)
+    >>> reference.show(scene)           # a messages.Scene
+    >>> while not reference.done:
+    ...     reference.advance()         # some more samples of every pixel, about a twentieth of a second
+    >>> reference.image()               # (height, width, 4): radiance and coverage
+
+Two kinds of light transport:
+
+"local"  Direct light, one bounce (depth 2). The balls stand in one scene and the lights in another, so that each
+         point sees every light with nothing in between and no ball lights or shadows another: what a shader
+         computes that knows one point. Lights and BSDF are sampled both and weighed (multiple importance sampling).
+"path"   Balls and lights in one scene, with shadows, the light between the balls, and refraction through them.
+
+Pixels are averaged over a box one pixel wide. A changed value compiles nothing: parameters, lights and camera are data
+of the kernel and are written into the scene that is there. Another model, choice, number of balls or kind of light
+makes a new scene.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..models import BSDF
+from ..render import adapter, engine, foreground, integrators, lights
+from ..render.scene import textures
+from . import messages, stage
+from .stage import Stage
+
+PASS_SECONDS = 0.05  # of work before someone may interrupt: half of what a slider's change may take to be seen
+MOST_PER_PASS = 64
+
+# Mitsuba's sphere has its axis along z and u from x toward y; the page's has it along y and u from z toward x.
+SPHERE_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+
+
+class Reference:
+    """A picture in the making of what the page shows.
+
+    what    materials by key, from which a scene's rows take theirs
+    device  "cpu", "cuda" or "auto"
+    """
+
+    def __init__(self, what: Stage, device: str = "cpu"):
+        self.mi = engine.load(device)
+        adapter.register(self.mi)
+        lights.register(self.mi)
+        self.stage = what
+        self.pictures: dict[str, np.ndarray] = {}
+        self.scene: messages.Scene | None = None
+        self._render: foreground.Foreground | None = None
+        self._balls = _Balls(self.mi)
+        self._lamps = _Lamps(self.mi)
+        self._whole: tuple[Any, Any] = (None, None)
+        self._rate = 0.0  # samples per pixel and second
+
+    @property
+    def device(self) -> str:
+        return "cuda" if str(self.mi.variant()).startswith("cuda") else "cpu"
+
+    @property
+    def samples(self) -> int:
+        """Samples per pixel so far."""
+        return self._render.done if self._render is not None else 0
+
+    @property
+    def done(self) -> bool:
+        return self._render is None or self.scene is None or self.samples >= self.scene.spp
+
+    def show(self, scene: messages.Scene) -> None:
+        """Begin a picture anew; InputError for a material, parameter or picture that is not known."""
+        bsdfs = [self._materials(row, f"rows/{index}") for index, row in enumerate(scene.state.rows)]
+        balls = self._balls.place(bsdfs, scene.state.spacing)
+        lamps = self._lamps.place(scene.state.lights, self.pictures)
+        sensor = self._sensor(scene)
+        if scene.transport == "path":
+            settings = integrators.Settings("path", max_depth=scene.max_depth)
+            key = (id(self._balls.parts), id(self._lamps.parts))
+            if self._whole[0] != key:
+                self._whole = key, self.mi.load_dict({"type": "scene", **self._balls.parts, **self._lamps.parts})
+            render = foreground.Foreground(self._whole[1], settings, sensor)
+        else:
+            # a light without extent is never met by a sampled direction: sampling the BSDF would be for nothing
+            integrator = "direct" if self._lamps.extended else "directSampleLight"
+            render = foreground.Foreground(balls, integrators.Settings(integrator), sensor, lamps)
+        self.scene, self._render = scene, render
+
+    def _materials(self, row: messages.Row, where: str) -> list[BSDF]:
+        if row.material not in self.stage.materials:
+            known = ", ".join(self.stage.materials)
+            raise InputError(f"unknown material '{row.material}'", f"{where}/material", f"known: {known}")
+        bsdf = stage.replaced(self.stage.materials[row.material].bsdf, dict(row.choices), f"{where}/choices")
+        return [stage.replaced(bsdf, dict(ball), f"{where}/balls/{i}") for i, ball in enumerate(row.balls)]
+
+    def _sensor(self, scene: messages.Scene) -> Any:
+        camera, mi = scene.state.camera, self.mi
+        sin_a, cos_a = math.sin(camera.azimuth), math.cos(camera.azimuth)
+        sin_e, cos_e = math.sin(camera.elevation), math.cos(camera.elevation)
+        away = np.array([sin_a * cos_e, sin_e, cos_a * cos_e])
+        up = [-sin_a * sin_e, cos_e, -cos_a * sin_e]  # perpendicular to the view, also from straight above
+        target = np.array(camera.target)
+        eye = target + camera.distance * away
+        return mi.load_dict(
+            {
+                "type": "perspective",
+                "fov": camera.fov,
+                "fov_axis": "y",
+                "near_clip": camera.distance * 1e-4,
+                "far_clip": camera.distance * 1e3,
+                "to_world": mi.ScalarTransform4f().look_at(list(eye), list(target), up),
+                "film": {
+                    "type": "hdrfilm",
+                    "width": scene.width,
+                    "height": scene.height,
+                    "rfilter": {"type": "box"},
+                },
+            }
+        )
+
+    def advance(self) -> None:
+        """Some more samples: one at first, so that there is a picture soon; then about PASS_SECONDS of them."""
+        if self.done:
+            return
+        render, scene = self._render, self.scene
+        assert render is not None and scene is not None
+        count = 1 if render.done == 0 else max(1, min(int(self._rate * PASS_SECONDS), MOST_PER_PASS, render.done))
+        count = min(count, scene.spp - render.done)
+        started = time.perf_counter()
+        render.advance(count)
+        self._rate = count / max(time.perf_counter() - started, 1e-6)
+
+    def image(self) -> np.ndarray:
+        """(height, width, 4) float32: linear radiance of the balls alone, averaged over the pixel, and coverage."""
+        if self._render is None:
+            raise InputError("nothing to show yet", "Reference.image", "call show first")
+        return self._render.image()
+
+
+# --------------------------------------------------------------------------- balls
+
+
+class _Balls:
+    """The balls' scene, kept as long as only values change."""
+
+    def __init__(self, mi: Any):
+        self.mi = mi
+        self.parts: dict[str, Any] = {}
+        self._structure: Any = None
+        self._scene: Any = None
+        self._parameters: list[Any] = []
+
+    def place(self, rows: list[list[BSDF]], spacing: float) -> Any:
+        flat = [bsdf for row in rows for bsdf in row]
+        structure = ([[_structure(bsdf) for bsdf in row] for row in rows], spacing)
+        if structure != self._structure:
+            bsdfs = [self.mi.load_dict(self._plugin(bsdf)) for bsdf in flat]
+            places = [
+                [(j - (len(row) - 1) / 2) * spacing, ((len(rows) - 1) / 2 - i) * spacing, 0.0]
+                for i, row in enumerate(rows)
+                for j in range(len(row))
+            ]
+            self.parts = {f"ball{n}": self._ball(p, b) for n, (p, b) in enumerate(zip(places, bsdfs, strict=True))}
+            self._scene = self.mi.load_dict({"type": "scene", **self.parts})
+            self._parameters = [self.mi.traverse(bsdf) for bsdf in bsdfs]
+            self._structure = structure
+        for parameters, bsdf in zip(self._parameters, flat, strict=True):
+            for name, value in _slots(bsdf).items():
+                parameters[name] = self.mi.Color3f(*value) if isinstance(value, tuple) else self.mi.Float(value)
+            parameters.update()
+        return self._scene
+
+    def _ball(self, place: list[float], bsdf: Any) -> Any:
+        to_world = np.eye(4)
+        to_world[:3, :3], to_world[:3, 3] = SPHERE_AXES, place
+        return self.mi.load_dict({"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world), "bsdf": bsdf})
+
+    def _plugin(self, bsdf: BSDF) -> dict[str, Any]:
+        """A material as a plugin; numbers as their slots name them."""
+        plugin: dict[str, Any] = {"type": adapter.register_model(self.mi, type(bsdf))}
+        for name, parameter in bsdf.parameters().items():
+            value = getattr(bsdf, name)
+            if parameter.kind == "bsdf":
+                plugin[name] = self._plugin(value)
+            elif not parameter.numeric:
+                plugin[name] = value
+        for name, value in _slots(bsdf).items():
+            if "." not in name:
+                plugin[name] = {"type": "rgb", "value": list(value)} if isinstance(value, tuple) else value
+        return plugin
+
+
+def _slots(bsdf: BSDF, prefix: str = "") -> dict[str, float | tuple[float, ...]]:
+    """The numbers of a material by the adapter's names: two widths are alpha_x and alpha_y, no turn is no slot."""
+    found: dict[str, Any] = {}
+    for name, parameter in bsdf.parameters().items():
+        value = getattr(bsdf, name)
+        if parameter.kind == "bsdf":
+            found.update(_slots(value, f"{prefix}{name}."))
+        elif parameter.kind == "spectrum":
+            colour = np.broadcast_to(np.asarray(value, float), 3)
+            found[prefix + name] = tuple(float(x) for x in colour)
+        elif parameter.kind == "alpha" and isinstance(value, tuple | list):
+            found[f"{prefix}{name}_x"], found[f"{prefix}{name}_y"] = float(value[0]), float(value[1])
+        elif parameter.numeric and not (parameter.kind == "angle" and value == 0):
+            found[prefix + name] = float(value)
+    return found
+
+
+def _structure(bsdf: BSDF) -> Any:
+    """What shapes a material's code: classes, choices, and which numbers there are."""
+    shape: list[Any] = [type(bsdf), bsdf.delta, sorted(_slots(bsdf))]
+    for name, parameter in bsdf.parameters().items():
+        value = getattr(bsdf, name)
+        if parameter.kind == "bsdf":
+            shape.append(_structure(value))
+        elif not parameter.numeric:
+            shape.append(value)
+    return shape
+
+
+# --------------------------------------------------------------------------- lights
+
+
+class _Lamps:
+    """The lights' scene, kept as long as only values change."""
+
+    def __init__(self, mi: Any):
+        self.mi = mi
+        self.parts: dict[str, Any] = {}
+        self.extended = False
+        self._structure: Any = None
+        self._scene: Any = None
+
+    def place(self, given: list[Any], pictures: dict[str, np.ndarray]) -> Any:
+        for light in given:
+            if isinstance(light, messages.Environment) and light.image and light.image.key not in pictures:
+                hint = "upload it before the scene that names it"
+                raise InputError(f"unknown picture '{light.image.key}'", "lights", hint)
+        structure = [(light.type, getattr(light, "image", None)) for light in given]
+        if structure != self._structure:
+            self.parts = {f"light{n}": self.mi.load_dict(self._plugin(x, pictures)) for n, x in enumerate(given)}
+            self._scene = self.mi.load_dict({"type": "scene", **self.parts})
+            self._structure = structure
+            self.extended = any(light.type in ("area", "environment") for light in given)
+        for n, light in enumerate(given):
+            self._set(self.mi.traverse(self.parts[f"light{n}"]), light)
+        return self._scene
+
+    def _plugin(self, light: Any, pictures: dict[str, np.ndarray]) -> dict[str, Any]:
+        """The kind of light; values follow by `_set`."""
+        white = {"type": "rgb", "value": [1.0, 1.0, 1.0]}
+        match light:
+            case messages.Directional():
+                return {"type": "directional", "irradiance": white}
+            case messages.Point():
+                return {"type": "point", "intensity": white}
+            case messages.Area():
+                return {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": white}}
+            case messages.Environment(image=messages.Image(key=key)):
+                return textures.environment(self.mi, pictures[key])
+        return {"type": "constant", "radiance": white}
+
+    def _set(self, parameters: Any, light: Any) -> None:
+        mi = self.mi
+        match light:
+            case messages.Directional():
+                toward = -np.array(light.direction) / np.linalg.norm(light.direction)
+                parameters["to_world"] = mi.Transform4f(_looking(toward))
+                parameters["irradiance.value"] = mi.Color3f(*light.irradiance)
+            case messages.Point():
+                parameters["position"] = mi.Point3f(*light.position)
+                parameters["intensity.value"] = mi.Color3f(*light.intensity)
+            case messages.Area():
+                to_world = np.eye(4)
+                normal = np.cross(light.u, light.v)
+                if np.linalg.norm(normal) == 0.0:
+                    raise InputError("an area light whose edges are parallel", "lights", "give two that span an area")
+                to_world[:3, :3] = np.stack([light.u, light.v, normal / np.linalg.norm(normal)], 1)
+                to_world[:3, 3] = light.center
+                parameters["to_world"] = mi.Transform4f(to_world)
+                parameters["emitter.radiance.value"] = mi.Color3f(*light.radiance)
+            case messages.Environment(image=None):
+                parameters["radiance.value"] = mi.Color3f(*light.constant) * light.scale
+            case messages.Environment():
+                # half a turn: see textures.environment
+                turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation) + 180.0)
+                parameters["to_world"] = turn
+                parameters["scale"] = float(light.scale)
+        parameters.update()
+
+
+def _looking(toward: np.ndarray) -> np.ndarray:
+    """A rotation that takes +z to a direction."""
+    side = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
+    side /= np.linalg.norm(side)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([side, np.cross(toward, side), toward], 1)
+    return matrix

@@ -1,0 +1,299 @@
+"""`gonio view`: the page on this machine's loopback, and the live reference behind it.
+
+Two routes and no files: `/` gives the page, `/ws` is the socket of docs/viewer.md. Who may speak to it:
+
+- The address holds a random token; without it nothing is answered.
+- `Host` must be an address or a name of this machine: a name that an attacker points here (DNS rebinding) is refused.
+- `Origin` must be this server itself, so a page elsewhere can neither read nor drive it.
+- The page's Content-Security-Policy lets it run its own script only, and reach nothing but its socket.
+- Sizes are bounded: requests, messages, uploads, connections, sessions, and what waits to be sent (one frame).
+
+One thread renders. Sessions take turns of one short pass, so that a newer scene never waits long for an older one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import re
+import secrets
+import signal
+import socket
+import sys
+import webbrowser
+from typing import Any
+from urllib.parse import parse_qs
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from ..errors import InputError, MachineError
+from . import messages, page
+from .session import Renderer, Session
+from .stage import Stage
+
+LOOPBACK = "127.0.0.1"
+MOST_SESSIONS = 8  # each holds a scene and a picture in memory
+MOST_CONNECTIONS = 256
+REQUEST_SECONDS = 10.0  # for a request's headers to arrive, and for a session's first message
+STALL_SECONDS = 30.0  # for a frame to be taken
+FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
+
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+class Door:
+    """Who may come in: the token, and the names under which this server is spoken to."""
+
+    def __init__(self, host: str, token: str | None = None):
+        self.token = token or secrets.token_urlsafe(24)
+        self.names = {"localhost", host.lower()}
+        if host in ("0.0.0.0", "::"):  # open to the network by the user's own wish: its name counts too
+            self.names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
+
+    def refusal(self, headers: Headers, query: bytes, needs_origin: bool) -> str:
+        """Why a request is refused; "" where it is not."""
+        hosts = headers.getlist("host")
+        if len(hosts) != 1 or not self._is_ours(hosts[0]):
+            return "wrong Host"
+        origins = headers.getlist("origin")
+        # The port may differ from ours (a tunnel), but the browser must have spoken to the page under the same name.
+        if origins != [f"http://{hosts[0]}"] and (needs_origin or origins):
+            return "wrong Origin"
+        given = parse_qs(query.decode("latin-1")).get("token", [""])
+        if len(given) != 1 or not secrets.compare_digest(given[0].encode(), self.token.encode()):
+            return "wrong token"
+        return ""
+
+    def _is_ours(self, host: str) -> bool:
+        """Whether a Host header names this machine. An address is never the work of a rebound name."""
+        parts = re.fullmatch(r"(\[[0-9a-f:.]+\]|[\w.-]+)(?::\d{1,5})?", host.lower(), re.ASCII)
+        if parts is None:
+            return False
+        name = parts[1].strip("[]")
+        if name in self.names:
+            return True
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return True
+
+
+class Application:
+    """The page and its socket, for one stage.
+
+    what    what is shown
+    door    who may come in
+    device  of the reference: "cpu", "cuda" or "auto"
+    """
+
+    def __init__(self, what: Stage, door: Door, device: str = "cpu"):
+        self.door = door
+        self.renderer = Renderer(what, device)
+        self.sessions: list[Session] = []
+        data = page.page_data(what, f"/ws?token={door.token}")
+        self._html = page.html(data, policy=False)
+        self.asgi = Starlette(
+            routes=[Route("/", self.show), WebSocketRoute("/ws", self.talk)],
+            exception_handlers={404: _nothing_here, 405: _nothing_here},
+        )
+
+    async def show(self, request: Request) -> Response:
+        """The page."""
+        refusal = self.door.refusal(request.headers, request.scope["query_string"], needs_origin=False)
+        if refusal:
+            return PlainTextResponse(f"{refusal}: open the address that gonio view printed\n", 403, HEADERS)
+        host = request.headers["host"]
+        policy = page.content_policy(f"ws://{host}") + "; frame-ancestors 'none'"
+        return HTMLResponse(self._html, headers={**HEADERS, "Content-Security-Policy": policy})
+
+    async def talk(self, websocket: WebSocket) -> None:
+        """A session: from its first message to its end."""
+        if self.door.refusal(websocket.headers, websocket.scope["query_string"], needs_origin=True):
+            await websocket.close(REFUSED)  # before it is accepted: the handshake is answered with 403
+            return
+        if not self._make_room():
+            await websocket.accept()
+            await websocket.close(FULL, "too many pages are open; close one")
+            return
+        await websocket.accept()
+        session = Session(websocket, self.renderer)
+        self.sessions.append(session)
+        try:
+            await session.run(REQUEST_SECONDS, STALL_SECONDS)
+        finally:
+            self.sessions.remove(session)
+            self.renderer.forget(session)
+
+    def _make_room(self) -> bool:
+        """Whether one more session fits; those that never asked for anything give way, the oldest first."""
+        if len(self.sessions) < MOST_SESSIONS:
+            return True
+        idle = next((session for session in self.sessions if not session.asked), None)
+        if idle is None:
+            return False
+        idle.end(LATE, "made room for another page")
+        return True
+
+
+async def _nothing_here(request: Request, error: Exception) -> Response:
+    return PlainTextResponse("nothing here\n", 404, HEADERS)
+
+
+class _Guarded(H11Protocol):
+    """HTTP that ends a connection whose request does not come, and the oldest such where there are too many."""
+
+    waiting: dict[_Guarded, asyncio.TimerHandle]  # set by `serve`, one dictionary a server
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        self.waiting[self] = self.loop.call_later(REQUEST_SECONDS, self._give_up)
+        if len(self.waiting) > MOST_CONNECTIONS:
+            next(iter(self.waiting))._give_up()
+
+    def handle_events(self) -> None:
+        super().handle_events()
+        if self.cycle is not None or self.transport.get_protocol() is not self:
+            self._came()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._came()
+        super().connection_lost(exc)
+
+    def _came(self) -> None:
+        timer = self.waiting.pop(self, None)
+        if timer is not None:
+            timer.cancel()
+
+    def _give_up(self) -> None:
+        self._came()
+        self.transport.abort()
+
+
+class Server(uvicorn.Server):
+    """uvicorn with the guards above, which says where it is reached and opens the browser once it is."""
+
+    def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
+        self.application, self.host, self.browser, self.quiet = application, host, browser, quiet
+        guarded = type("Guarded", (_Guarded,), {"waiting": {}})
+        self.listener = _listen(host, port)
+        config = uvicorn.Config(
+            application.asgi,
+            http=guarded,
+            ws="websockets-sansio",
+            ws_max_size=messages.UPLOAD_BYTES,
+            ws_per_message_deflate=False,
+            ws_ping_interval=20.0,
+            ws_ping_timeout=20.0,
+            h11_max_incomplete_event_size=16 << 10,
+            limit_concurrency=MOST_CONNECTIONS,
+            timeout_keep_alive=5,
+            timeout_graceful_shutdown=1,
+            lifespan="off",
+            log_level="critical",
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+        )
+        super().__init__(config)
+
+    @property
+    def port(self) -> int:
+        return int(self.listener.getsockname()[1])
+
+    @property
+    def url(self) -> str:
+        host = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{self.port}/?token={self.application.door.token}"
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if not self.quiet:
+            print(f"{self.url}\nCtrl-C ends it", flush=True)
+        if self.browser:
+            await asyncio.get_running_loop().run_in_executor(None, _open, self.url)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        for session in list(self.application.sessions):
+            session.end(1001, "the server ends")
+        await super().shutdown(sockets)
+
+    def serve_until_interrupted(self) -> None:
+        """Serve until Ctrl-C or SIGTERM; returns then, with everything closed."""
+        try:
+            with contextlib.suppress(KeyboardInterrupt):
+                self.run(sockets=[self.listener])
+        finally:
+            self.application.renderer.stop()
+            self.listener.close()
+            with contextlib.suppress(ValueError):  # a second Ctrl-C shall not end in a traceback
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(MOST_CONNECTIONS)
+    except (OSError, OverflowError) as error:
+        listener.close()
+        text = getattr(error, "strerror", None) or str(error)
+        raise MachineError(
+            f"cannot listen: {text}", f"--host {host} --port {port}", "--port 0 finds a free one"
+        ) from None
+    return listener
+
+
+def _open(url: str) -> None:
+    with contextlib.suppress(webbrowser.Error):
+        webbrowser.open(url)
+
+
+def serve(
+    what: Stage,
+    host: str = LOOPBACK,
+    port: int = 0,
+    browser: bool = True,
+    device: str = "cpu",
+) -> None:
+    """Show a stage until Ctrl-C.
+
+    host     where to listen; anything but a loopback address opens it to the network, and a line says so
+    port     0 takes any that is free
+    browser  open the page there
+    Raises MachineError where the port is taken, InputError where a model cannot be shown.
+    """
+    if not 0 <= port < 65536:
+        raise InputError(f"port {port}", "--port", "give 0 to 65535")
+    application = Application(what, Door(host), device)
+    server = Server(application, host, port, browser)
+    if not _is_loopback(host):
+        print(
+            f"listening on {host}: whoever knows the address below can use it, and it is not encrypted", file=sys.stderr
+        )
+    server.serve_until_interrupted()
+
+
+def _is_loopback(host: str) -> bool:
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host).is_loopback
+    return host == "localhost"

@@ -1,0 +1,302 @@
+"""One page that is connected, and the thread that renders for all of them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from .. import __version__
+from ..errors import GonioError, InputError
+from . import messages, page
+from .reference import Reference
+from .stage import Stage
+
+PICTURES = 4  # environments kept a session
+
+
+class Session:
+    """A connected page: what it asked for last, and the frame that is on its way to it."""
+
+    def __init__(self, websocket: WebSocket, renderer: Renderer):
+        self.websocket, self.renderer = websocket, renderer
+        self.loop = asyncio.get_running_loop()
+        self.asked = False  # whether a message ever came that made sense
+        self.sent = self.acknowledged = 0  # numbers of frames
+        self.stalled_since: float | None = None
+        self._outbox: asyncio.Queue[str | bytes | None] = asyncio.Queue()
+        self._upload: messages.Upload | None = None
+        self._reason = (1000, "")
+        # the renderer's, under its lock
+        self.scene: messages.Scene | None = None
+        self.pictures: dict[str, Any] = {}
+        self.reference: Reference | None = None
+        self.shown_samples = 0
+
+    # ------------------------------------------------------------------ in the server's thread
+
+    async def run(self, first_seconds: float, stall_seconds: float) -> None:
+        """Talk until one side ends it.
+
+        first_seconds  for the first message to come
+        stall_seconds  for a frame to be acknowledged
+        """
+        tasks = [
+            asyncio.create_task(self._read()),
+            asyncio.create_task(self._write()),
+            asyncio.create_task(self._watch(first_seconds, stall_seconds)),
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect, asyncio.TimeoutError):
+                await asyncio.wait_for(self.websocket.close(*self._reason), 1.0)
+
+    def end(self, code: int, reason: str) -> None:
+        """Close the connection, from the server's side."""
+        self._reason = (code, reason)
+        self._outbox.put_nowait(None)
+
+    async def _read(self) -> None:
+        while True:
+            received = await self.websocket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            try:
+                if received.get("text") is not None:
+                    self._take(messages.parse(received["text"]))
+                elif received.get("bytes") is not None:
+                    await self._take_upload(received["bytes"])
+                self.asked = True
+            except GonioError as error:
+                self.send(messages.failure(error))
+
+    def _take(self, message: Any) -> None:
+        match message:
+            case messages.Scene():
+                self.renderer.show(self, message)
+            case messages.Ack():
+                if self.acknowledged < message.frame <= self.sent:
+                    self.acknowledged = message.frame
+                    self.stalled_since = None
+                    self.renderer.wake()
+            case messages.Upload():
+                self._upload = message
+            case messages.Wish():
+                self.renderer.request_variant(self, message)
+
+    async def _take_upload(self, content: bytes) -> None:
+        upload, self._upload = self._upload, None
+        if upload is None:
+            raise InputError(f"{len(content)} bytes that nothing announced", "message", "send an upload message first")
+        pixels = await asyncio.to_thread(messages.environment, upload, content)
+        self.renderer.keep_picture(self, upload.key, pixels)
+
+    def send(self, message: str | bytes) -> None:
+        """Queue a message. What can queue up is bounded: one frame, and answers to messages that were read."""
+        self._outbox.put_nowait(message)
+
+    async def _write(self) -> None:
+        while (message := await self._outbox.get()) is not None:
+            if isinstance(message, bytes):
+                await self.websocket.send_bytes(message)
+            else:
+                await self.websocket.send_text(message)
+
+    async def _watch(self, first_seconds: float, stall_seconds: float) -> None:
+        await asyncio.sleep(first_seconds)
+        if not self.asked:
+            self._reason = (1008, "nothing was asked for")
+            return
+        while True:
+            await asyncio.sleep(1.0)
+            if self.stalled_since is not None and time.monotonic() - self.stalled_since > stall_seconds:
+                self._reason = (1008, "frames are not taken")
+                return
+
+    # ------------------------------------------------------------------ from the renderer's thread
+
+    def send_from_thread(self, message: str | bytes) -> None:
+        """As `send`; the loop may have ended by now."""
+        with contextlib.suppress(RuntimeError):
+            self.loop.call_soon_threadsafe(self.send, message)
+
+
+class Renderer:
+    """The thread that renders: one short pass for each session in turn, and shaders in between.
+
+    what    materials by key
+    device  "cpu", "cuda" or "auto"
+    """
+
+    def __init__(self, what: Stage, device: str = "cpu"):
+        self.stage, self.device = what, device
+        self._sessions: list[Session] = []
+        self._jobs: list[Callable[[], None]] = []
+        self._lock = threading.Condition()
+        self._running = False
+        self._thread: threading.Thread | None = None
+
+    # ------------------------------------------------------------------ asked by sessions
+
+    def show(self, session: Session, scene: messages.Scene) -> None:
+        """Render a scene for a session from now on: the newest wins."""
+        with self._lock:
+            session.scene = scene
+            if session not in self._sessions:
+                self._sessions.append(session)
+            self._start()
+            self._lock.notify()
+
+    def keep_picture(self, session: Session, key: str, pixels: Any) -> None:
+        with self._lock:
+            session.pictures.pop(key, None)
+            session.pictures[key] = pixels
+            while len(session.pictures) > PICTURES:
+                session.pictures.pop(next(iter(session.pictures)))
+
+    def request_variant(self, session: Session, wish: messages.Wish) -> None:
+        """Write a shader with other choices and send it."""
+        if wish.material not in self.stage.materials:
+            known = ", ".join(self.stage.materials)
+            raise InputError(f"unknown material '{wish.material}'", "material", f"known: {known}")
+        with self._lock:
+            self._jobs = [job for job in self._jobs if getattr(job, "session", None) is not session]
+            job = _Variant(self.stage, session, wish)
+            self._jobs.append(job)
+            self._start()
+            self._lock.notify()
+
+    def wake(self) -> None:
+        """A frame was taken: the next may be made."""
+        with self._lock:
+            self._lock.notify()
+
+    def forget(self, session: Session) -> None:
+        """Work no more for a session that has ended."""
+        with self._lock:
+            if session in self._sessions:
+                self._sessions.remove(session)
+            session.scene = session.reference = None
+
+    def stop(self) -> None:
+        """End the thread, after the pass that it is in."""
+        with self._lock:
+            self._running = False
+            self._lock.notify()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _start(self) -> None:
+        if self._thread is None:
+            self._running = True
+            self._thread = threading.Thread(target=self._work, name="gonio reference", daemon=True)
+            self._thread.start()
+
+    # ------------------------------------------------------------------ the thread
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                while self._running and not self._jobs and not any(map(_has_work, self._sessions)):
+                    self._lock.wait()
+                if not self._running:
+                    return
+                jobs, self._jobs = self._jobs, []
+                sessions = [session for session in self._sessions if _has_work(session)]
+            for job in jobs:
+                job()
+            for session in sessions:
+                try:
+                    self._turn(session)
+                except GonioError as error:
+                    self._give_up(session, error)
+                except Exception as error:
+                    what = f"the reference failed: {type(error).__name__}: {str(error).strip().splitlines()[:1]}"
+                    self._give_up(session, GonioError(what, "reference", "report this; the page itself goes on"))
+
+    def _give_up(self, session: Session, error: GonioError) -> None:
+        with self._lock:
+            if session in self._sessions:
+                self._sessions.remove(session)
+        session.send_from_thread(messages.failure(error))
+
+    def _turn(self, session: Session) -> None:
+        """One pass for a session, and a frame where the page waits for one."""
+        with self._lock:
+            scene, reference = session.scene, session.reference
+            pictures = dict(session.pictures)
+        if scene is None:
+            return
+        if reference is None:
+            reference = Reference(self.stage, self.device)
+            session.reference = reference
+            limits = {"upload": messages.UPLOAD_BYTES, "pixels": messages.MOST_PIXELS}
+            ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
+            session.send_from_thread(json.dumps(ready))
+        if reference.scene is not scene:
+            reference.pictures = pictures
+            reference.show(scene)
+            session.shown_samples = 0
+            session.started = time.perf_counter()  # type: ignore[attr-defined]
+        reference.advance()
+        if session.sent == session.acknowledged and _worth_showing(reference, session.shown_samples):
+            self._send_frame(session, reference)
+
+    def _send_frame(self, session: Session, reference: Reference) -> None:
+        assert reference.scene is not None
+        session.shown_samples = reference.samples
+        session.sent += 1
+        session.stalled_since = time.monotonic()
+        header = {
+            "id": reference.scene.id,
+            "frame": session.sent,
+            "spp": reference.samples,
+            "seconds": round(time.perf_counter() - session.started, 4),  # type: ignore[attr-defined]
+            "done": reference.done,
+        }
+        session.send_from_thread(messages.frame(header, reference.image()))
+
+
+def _worth_showing(reference: Reference, shown: int) -> bool:
+    """A first picture at once; then when a quarter more samples are in, or it is finished."""
+    samples = reference.samples
+    return samples > shown and (reference.done or samples >= 1.25 * shown)
+
+
+def _has_work(session: Session) -> bool:
+    """Whether samples are missing, or a finished picture waits to be shown."""
+    reference = session.reference
+    if session.scene is None:
+        return False
+    if reference is None or reference.scene is not session.scene or not reference.done:
+        return True
+    return session.sent == session.acknowledged and session.shown_samples < reference.samples
+
+
+class _Variant:
+    """The job of writing one shader."""
+
+    def __init__(self, what: Stage, session: Session, wish: messages.Wish):
+        self.stage, self.session, self.wish = what, session, wish
+
+    def __call__(self) -> None:
+        wish = self.wish
+        try:
+            variant = page.variant_data(self.stage.materials[wish.material].bsdf, dict(wish.choices))
+            answer = {"type": "variant", "id": wish.id, "material": wish.material, "variant": variant}
+            self.session.send_from_thread(json.dumps(answer, allow_nan=False))
+        except GonioError as error:
+            self.session.send_from_thread(messages.failure(error))
+        except Exception as error:
+            what = f"the shader cannot be written: {type(error).__name__}: {error}"
+            self.session.send_from_thread(messages.failure(GonioError(what, wish.material)))

@@ -1,0 +1,95 @@
+"""`go.view(model)`: the page as a widget in JupyterLab, marimo and whatever else shows anywidgets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError, MachineError
+from ..models import BSDF
+from . import page, stage
+
+if TYPE_CHECKING:
+    from anywidget import AnyWidget
+
+# The page is a document of its own in a frame: its style cannot touch the notebook's, nor its script the notebook.
+_SCRIPT = """
+function render({ model, el }) {
+  const frame = document.createElement("iframe");
+  frame.setAttribute("sandbox", "allow-scripts allow-downloads");
+  frame.setAttribute("allow", "clipboard-write; fullscreen");
+  frame.title = "Gonio";
+  const show = () => {
+    frame.style.cssText = `width: 100%; height: ${model.get("height")}px; border: 0; display: block;`;
+    frame.srcdoc = model.get("html");
+  };
+  model.on("change:html", show);
+  model.on("change:height", show);
+  show();
+  el.appendChild(frame);
+  return () => {
+    model.off("change:html", show);
+    model.off("change:height", show);
+    frame.remove();
+  };
+}
+export default { render };
+"""
+
+
+def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
+    """The page of `gonio view` in a notebook cell: balls, sliders, plots.
+
+    models  materials or their names; none shows the two rows of Kulla-Conty and plain balls
+    height  of the cell, CSS pixels
+    Returns a widget, which the notebook shows. The page lives in the notebook's browser and needs no server: there is
+    no live reference. Raises InputError where a model cannot be shown, MachineError where anywidget is missing.
+
+        go.view(go.Conductor.preset("Au"), "lambert")
+    """
+    try:
+        import anywidget
+        import traitlets
+    except ImportError:
+        raise MachineError("anywidget is not installed", "go.view", "pip install 'gonio[notebook]'") from None
+    if not 100 <= height <= 4000:
+        raise InputError(f"height {height}", "go.view: height", "give 100 to 4000 pixels")
+    html = page.html(page.page_data(_stage(models)))
+    members: dict[str, Any] = {
+        "_esm": _SCRIPT,
+        "html": traitlets.Unicode(html).tag(sync=True),
+        "height": traitlets.Int(height).tag(sync=True),
+    }
+    return type("GonioView", (anywidget.AnyWidget,), members)()
+
+
+def _stage(models: tuple[Any, ...]) -> stage.Stage:
+    if not models:
+        return stage.homework()
+    bsdfs: list[BSDF] = []
+    given: list[set[str]] = []
+    for model in models:
+        if isinstance(model, BSDF):
+            bsdfs.append(model)
+            given.append(_own(model))
+        elif isinstance(model, str):
+            named = stage.of_targets([model])
+            bsdfs += [m.bsdf for m in named.materials.values()]
+            given.append(set())
+        else:
+            raise InputError(f"{type(model).__name__} given, a material or its name expected", "go.view")
+    return stage.of_models(bsdfs, given)
+
+
+def _own(model: BSDF) -> set[str]:
+    """The parameters that are not what they are by default: whoever made the material has fixed those."""
+    fixed = set()
+    for path, parameter, _ in stage.walk(model):
+        if parameter.required or not _equal(stage.value_at(model, path), parameter.default):
+            fixed.add(path)
+    return fixed
+
+
+def _equal(a: Any, b: Any) -> bool:
+    import numpy as np
+
+    return bool(np.array_equal(np.asarray(a), np.asarray(b)))
