@@ -32,7 +32,7 @@ _PLACES = {
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
-    from . import models, render, verify
+    from . import emit, models, render, verify
     from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError, MachineError
     from .models import BSDF, Sample, model
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(name)
-    if name in ("models", "render", "verify"):  # packages that can be called: go.models(), go.render(scene)
+    if name in ("emit", "models", "render", "verify"):  # packages that can be called: go.models(), go.render(scene)
         return import_module("." + name, __name__)
     if name in _PLACES:
         return getattr(import_module("." + _PLACES[name], __name__), name)
@@ -70,6 +70,7 @@ __all__ = [
     "MachineError",
     "Sample",
     "albedo",
+    "emit",
     "get_precision",
     "model",
     "models",

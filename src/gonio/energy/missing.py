@@ -19,6 +19,7 @@ from ..ops import (
     backend,
     clamp,
     copysign,
+    function,
     inset,
     lookup,
     maximum,
@@ -117,12 +118,14 @@ class Metal:
         }
 
     @staticmethod
+    @function
     def _isotropic(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction above the surface, of the mean of the widths."""
         form = curves.form_of(material.base.ndf, material.base.masking)
         return curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
 
     @staticmethod
+    @function
     def missing(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction above the surface."""
         if not material.turned:
@@ -148,12 +151,14 @@ class Metal:
         return curves.missing(form, tuple(rows), bend, top, maximum(w.z, 1e-6))
 
     @staticmethod
+    @function
     def added(material: Any, found: dict[str, Any], wo: Any, wi: Any, mode: str) -> Any:
         """f_add f_ms |cos theta_i|."""
         m_o, m_i = Metal.missing(material, found, wo), Metal.missing(material, found, wi)
         return found["added"] * where((wo.z > 0.0) & (wi.z > 0.0), m_o * m_i * wi.z, 0.0)
 
     @staticmethod
+    @function
     def share(material: Any, found: dict[str, Any], wo: Any) -> Any:
         """Probability of the broad lobe: the power it carries over all the power, at the mean colour."""
         m_o = where((found["scale"] > 0.0) & (wo.z > 0.0), Metal._isotropic(material, found, wo), 0.0)
@@ -161,11 +166,13 @@ class Metal:
         return safe_div(given, given + (1.0 - m_o))
 
     @staticmethod
+    @function
     def pdf(material: Any, found: dict[str, Any], wo: Any, wi: Any) -> Any:
         """M(mu_i) mu_i / (pi M_avg); of the mean of two widths."""
         return Metal._isotropic(material, found, wi) * maximum(wi.z, 0.0) * found["scale"]
 
     @staticmethod
+    @function
     def sample(material: Any, found: dict[str, Any], wo: Any, u: Any) -> Any:
         """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
         base = material.base
@@ -263,12 +270,14 @@ class Glass:
         }
 
     @staticmethod
+    @function
     def _thin(material: Any, w: Any) -> Any:
         """Whether a direction lies on the side of the lower index."""
         inside = w.z < 0.0
         return where(material.base.eta >= 1.0, ~inside, inside)
 
     @staticmethod
+    @function
     def missing(material: Any, found: dict[str, Any], w: Any, thin: Any) -> Any:
         """M at a direction, from its own side."""
         mu = maximum(abs(w.z), 1e-6)
@@ -279,10 +288,13 @@ class Glass:
         return where(thin, *sides)
 
     @staticmethod
+    @function
     def _through(found: dict[str, Any], thin: Any) -> Any:
+        """T, the share of what is missing on a side that goes to the other."""
         return where(thin, found["through_thin"], found["through_dense"])
 
     @staticmethod
+    @function
     def added(material: Any, found: dict[str, Any], wo: Any, wi: Any, mode: str) -> Any:
         """The broad lobes times |cos theta_i|."""
         thin = Glass._thin(material, wo)
@@ -292,6 +304,7 @@ class Glass:
         return found["added"] * value
 
     @staticmethod
+    @function
     def share(material: Any, found: dict[str, Any], wo: Any) -> Any:
         """Probability of the broad lobes: the power they carry over all the power."""
         m_o = Glass.missing(material, found, wo, Glass._thin(material, wo))
@@ -299,6 +312,7 @@ class Glass:
         return safe_div(given, given + maximum(1.0 - m_o, 0.0))
 
     @staticmethod
+    @function
     def pdf(material: Any, found: dict[str, Any], wo: Any, wi: Any) -> Any:
         """M(mu_i) mu_i / (pi M_avg) of wi's side, times the share of that side."""
         thin_o, thin_i = Glass._thin(material, wo), Glass._thin(material, wi)
@@ -309,6 +323,7 @@ class Glass:
         return where(wo.z * wi.z != 0.0, value, 0.0)
 
     @staticmethod
+    @function
     def sample(material: Any, found: dict[str, Any], wo: Any, u: Any) -> Any:
         """A side by u1, then a direction of that density."""
         base = material.base

@@ -215,7 +215,7 @@ class BSDF:
             cls.name = (
                 "".join("-" + c.lower() if c.isupper() else c for c in cls.__name__).lstrip("-").replace("_", "-")
             )
-        for method in ("eval", "pdf", "sample"):
+        for method in ("eval", "pdf", "sample", "terms"):
             if method in cls.__dict__:
                 setattr(cls, method, _doorway(cls.__dict__[method]))
         dataclass(frozen=True, eq=False)(cls)
@@ -355,15 +355,19 @@ class BSDF:
                 clone.__dict__[parameter.name] = convert(parameter, value)
         return clone
 
-    def record(self, method: str = "eval", mode: str = "radiance") -> graph.Graph:
-        """The method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
+    def symbols(self) -> Any:
+        """A copy bound to symbols, one for each numeric parameter; an angle that is the plain number 0 is none."""
 
         def symbol(parameter: Parameter, value: Any) -> Any:
-            if parameter.kind == "angle" and value is None:
+            if _no_turn(parameter, value) or (parameter.kind == "angle" and value is None):
                 return None
             return graph.symbol({"float": "float", "spectrum": "spectrum"}.get(parameter.kind, "vec2"))
 
-        bound = self.bind(lambda p, v: symbol(p, None if _no_turn(p, v) else v))
+        return self.bind(symbol)
+
+    def record(self, method: str = "eval", mode: str = "radiance") -> graph.Graph:
+        """The method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
+        bound = self.symbols()
         inner = inspect.unwrap(getattr(type(self), method))
         more = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
         kinds = {"wo": "vec3", "u": "vec3"} if method == "sample" else {"wo": "vec3", "wi": "vec3"}

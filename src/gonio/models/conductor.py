@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ..ops import abs, dot, function, safe_div, where
-from ..optics import frame, fresnel, indices
+from ..optics import frame, fresnel, indices, masking
+from ..optics.ndf import distribution
 from . import microfacet
 from .base import BSDF, Sample, Value, angle, choice, spectrum, width
 
@@ -72,6 +73,15 @@ class Conductor(BSDF):
         facets = where(smooth, 1.0, safe_div(microfacet.reflection(self, wo, wi, m, alpha), pdf))
         weight = self.reflectance(cos_m) * where(pdf > 0.0, facets, 0.0)
         return Sample(frame.rotate_back(wi, self.rotation), weight, pdf, smooth & above, 1.0 + 0.0 * pdf)
+
+    def terms(self, wo: Any, wi: Any) -> microfacet.Terms:
+        """D, G and F of the pair; eval is F D G / (4 cos theta_o)."""
+        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
+        alpha, _ = microfacet.widths(self.alpha)
+        m = frame.half_vector(wo, wi)
+        ndf = distribution(self.ndf)
+        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
+        return microfacet.Terms(ndf.D(m, alpha), g, self.reflectance(abs(dot(wo, m))))
 
     def tint(self, wo: Any) -> Any:
         """F at the surface's own normal."""

@@ -50,10 +50,12 @@ class Dielectric(BSDF):
             return where(cos_t > 0.0, fresnel.schlick(cos_theta, fresnel.r0_dielectric(eta)), 1.0)
         return fresnel.dielectric(cos_o, cos_t, eta)
 
+    @function
     def _relative_eta(self, wo: Any) -> Any:
         """Index on the far side over index on wo's side."""
         return where(wo.z >= 0.0, self.eta, 1.0 / self.eta)
 
+    @function
     def _normal(self, wo: Any, wi: Any, eta: Any) -> Any:
         """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
@@ -118,6 +120,21 @@ class Dielectric(BSDF):
         seen = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
         density = safe_div(share * microfacet.normal_pdf(self, wo, m, alpha) * spread, abs(dot(wo, m)))
         return where(self._live(wo, wi) & seen & ~smooth, density, 0.0)
+
+    def terms(self, wo: Any, wi: Any) -> microfacet.Terms:
+        """D, G and F of the pair, at the normal that reflects or refracts wo into wi."""
+        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
+        alpha, _ = self._widths()
+        eta = self._relative_eta(wo)
+        m = self._normal(wo, wi, eta)
+        ndf = distribution(self.ndf)
+        reflects = wo.z * wi.z > 0.0
+        cos_t = where(reflects, fresnel.cos_transmitted(abs(dot(wo, m)), eta), abs(dot(wi, m)))
+        f = self.reflectance(abs(dot(wo, m)), cos_t, eta)
+        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
+        if self.transmission:
+            g = where(reflects, g, masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha, transmits=True))
+        return microfacet.Terms(ndf.D(m, alpha), g, self.albedo * f)
 
     def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
         """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""

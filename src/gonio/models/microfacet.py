@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..ops import abs, backend, maximum, vec2, where
+from ..ops import abs, backend, function, maximum, vec2, where
 from ..optics import masking
 from ..optics.ndf import distribution, distributions
 
@@ -41,9 +41,23 @@ def delta(alpha: Any) -> str:
     return "always" if np.all(smooth) else "maybe" if np.any(smooth) else "never"
 
 
+@function
 def upper(w: Any) -> Any:
     """w above the surface, -w below: a facet seen from behind at -w looks as from the front at w."""
     return where(w.z < 0.0, -w, w)
+
+
+class Terms(NamedTuple):
+    """What a microfacet lobe is made of, at the half vector of a pair of directions.
+
+    D  density of microfacet normals, 1/sr
+    G  masking and shadowing
+    F  Fresnel reflectance, with the albedo
+    """
+
+    D: Any
+    G: Any
+    F: Any
 
 
 def _bounded(model: Any) -> bool:
@@ -51,6 +65,7 @@ def _bounded(model: Any) -> bool:
     return model.sampling == "bounded" and not model.transmits
 
 
+@function
 def sample_normal(model: Any, wo: Any, u1: Any, u2: Any, alpha: Any) -> Any:
     """A normal (m.z > 0) by the model's `sampling`; its back faces a wo below the surface."""
     ndf = distribution(model.ndf)
@@ -61,6 +76,7 @@ def sample_normal(model: Any, wo: Any, u1: Any, u2: Any, alpha: Any) -> Any:
     return ndf.sample_visible(upper(wo), u1, u2, alpha)
 
 
+@function
 def normal_pdf(model: Any, wo: Any, m: Any, alpha: Any) -> Any:
     """Density of `sample_normal`, 1/sr."""
     ndf = distribution(model.ndf)
@@ -71,6 +87,7 @@ def normal_pdf(model: Any, wo: Any, m: Any, alpha: Any) -> Any:
     return ndf.pdf_visible(wo, m, alpha)
 
 
+@function
 def reflection(model: Any, wo: Any, wi: Any, m: Any, alpha: Any) -> Any:
     """D G / (4 |cos theta_o|): the microfacet BRDF without F, times |cos theta_i|."""
     ndf = distribution(model.ndf)

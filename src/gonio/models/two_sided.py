@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import InputError
-from ..ops import vec3, where
+from ..ops import function, vec3, where
 from .base import BSDF, Sample, bsdf
 
 
@@ -50,6 +50,7 @@ class TwoSided(BSDF):
         return getattr(self.base, "ambient", 0.0)
 
 
+@function
 def _turned(w: Any, wo: Any) -> Any:
     """w with its z mirrored where wo is below the surface."""
     return vec3(w.x, w.y, where(wo.z < 0.0, -w.z, w.z))

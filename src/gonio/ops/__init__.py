@@ -80,7 +80,7 @@ def function(python_function: F) -> F:
 
     @functools.wraps(python_function)
     def wrapper(*args: Any, **kwargs: Any) -> Any:
-        if graph.recording((*args, *kwargs.values())):
+        if graph._stack and graph.recording((*args, *kwargs.values())):
             return graph.call(python_function, args, kwargs)
         return python_function(*args, **kwargs)
 
@@ -139,6 +139,7 @@ def where(mask: Any, a: Any, b: Any) -> Any:
     return a if mask else b
 
 
+@function
 def pow(x: Any, y: Any) -> Any:
     """x ** y for x > 0; 0 where x <= 0, so that no power of unknown sign reaches a shader or a gradient."""
     positive = x > 0.0
@@ -153,7 +154,9 @@ def isfinite(x: Any) -> Any:
 
 
 def is_single(x: Any) -> bool:
-    """Whether x is computed in float32, so that steps below its last digits can be left out; False for symbols."""
+    """Whether x is computed in float32, so that steps below its last digits can be left out; symbols: see `Graph`."""
+    if isinstance(x, Node):
+        return graph._stack[-1][0].single
     return is_drjit(x) and drjit().itemsize_v(x) == 4
 
 
@@ -171,22 +174,26 @@ def fma(a: Any, b: Any, c: Any) -> Any:
     return a * b + c
 
 
+@function
 def sqr(x: Any) -> Any:
     """x * x."""
     return x * x
 
 
+@function
 def clamp(x: Any, low: Any, high: Any) -> Any:
     """x held in [low, high]."""
     return minimum(maximum(x, low), high)
 
 
+@function
 def safe_sqrt(x: Any) -> Any:
     """sqrt(max(x, 0)), with gradient 0 instead of infinity where x <= 0."""
     positive = x > 0.0
     return where(positive, sqrt(where(positive, x, 1.0)), 0.0)
 
 
+@function
 def safe_div(a: Any, b: Any) -> Any:
     """a / b, and 0 where b = 0."""
     zero = b == 0.0
@@ -226,6 +233,7 @@ def norm(v: Any) -> Any:
     return sqrt(dot(v, v))
 
 
+@function
 def normalize(v: Any) -> Any:
     """v / |v|; v must not be 0."""
     return v * (1.0 / norm(v))

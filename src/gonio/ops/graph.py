@@ -156,6 +156,7 @@ class Function:
 
     name, doc, source  of the Python function it came from
     parameters         name -> type, in order; "self.alpha" is the field `alpha` of the model
+    arguments          name -> what the function was given, nodes inside objects and tuples
     nodes              every value, in order of evaluation
     result             the returned nodes, in the shape in which Python returned them (a tuple, a NamedTuple, a node)
     """
@@ -163,6 +164,7 @@ class Function:
     def __init__(self, name: str, doc: str, source: str) -> None:
         self.name, self.doc, self.source = name, doc, source
         self.parameters: dict[str, str] = {}
+        self.arguments: dict[str, Any] = {}
         self.nodes: list[Node] = []
         self.result: Any = None
 
@@ -172,10 +174,15 @@ class Function:
 
 
 class Graph:
-    """Recorded functions in order of definition; `entry` is the last."""
+    """Recorded functions in order of definition; `entry` is the last.
 
-    def __init__(self) -> None:
+    replacements  operation -> a function of the vocabulary to be recorded in its place, for languages that lack it
+    single        whether it is recorded for 32 bits, see `ops.is_single`
+    """
+
+    def __init__(self, replacements: dict[str, Callable] | None = None, single: bool = False) -> None:
         self.functions: list[Function] = []
+        self.replacements, self.single = replacements or {}, single
         self._known: dict[Any, Function] = {}
 
     @property
@@ -204,7 +211,7 @@ def emit(op: str, type: str, *args: Any, static: Any = None) -> Node:
     """Append one operation to the function that is being recorded."""
     if not _stack:
         raise RecordingError("a recorded value outlived its recording", _source_line())
-    function = _stack[-1][1]
+    graph, function = _stack[-1]
     for arg in args:
         if isinstance(arg, Node) and arg.function is not function:
             raise RecordingError(
@@ -212,6 +219,8 @@ def emit(op: str, type: str, *args: Any, static: Any = None) -> Node:
                 _source_line(),
                 "pass it as an argument: a @function sees its arguments only",
             )
+    if op in graph.replacements:
+        return call(graph.replacements[op], args, {})
     return Node(function, op, type, args, static)
 
 
@@ -310,6 +319,7 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Any], 
         for argument, value in arguments.items():
             replacements = iter([function.parameter(path, node.type) for path, node in _flatten(value, argument)])
             inner[argument] = _rebuild(value, functools.partial(_next, replacements))
+        function.arguments = dict(inner)
         function.result = _rebuild_constants(python_function(**inner))
     finally:
         _stack.pop()
@@ -370,13 +380,21 @@ def recording(values: tuple) -> bool:
     return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
 
 
-def record(python_function: Callable, *, types: dict[str, str] | None = None, name: str = "", **more: Any) -> Graph:
+def record(
+    python_function: Callable,
+    *,
+    types: dict[str, str] | None = None,
+    name: str = "",
+    into: Graph | None = None,
+    **more: Any,
+) -> Graph:
     """Record a function of named arguments.
 
     types  argument name -> "float", "bool", "vec2", "vec3" or "spectrum"; or give them as keywords
+    into   an empty graph, where one with replacements is wanted
     more   arguments that are not symbols are handed over as they stand, objects with symbolic fields included
     """
-    graph = Graph()
+    graph = Graph() if into is None else into
     kinds = dict(types or {})
     values = dict(more)
     for argument, value in list(values.items()):

@@ -8,6 +8,7 @@ from .. import ops
 from ..ops import dot, function, sqr, vec3
 
 
+@function
 def reflect(w: Any, m: Any) -> Any:
     """w mirrored at the normal m: 2 (w.m) m - w."""
     return m * (2.0 * dot(w, m)) - w
@@ -34,6 +35,7 @@ def upright(like: Any) -> Any:
     return vec3(zero, zero, 1.0 + zero)
 
 
+@function
 def rotate(w: Any, rotation: Any) -> Any:
     """w in a frame that is turned about z by an angle given as the vector (cos, sin); None is no rotation at all."""
     if rotation is None:
@@ -41,6 +43,7 @@ def rotate(w: Any, rotation: Any) -> Any:
     return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
 
 
+@function
 def rotate_back(w: Any, rotation: Any) -> Any:
     """The inverse of `rotate`."""
     if rotation is None:
@@ -53,6 +56,7 @@ def sin2(w: Any) -> Any:
     return sqr(w.x) + sqr(w.y)
 
 
+@function
 def half_vector(wo: Any, wi: Any) -> Any:
     """Normal of the facet that mirrors wo into wi, unit; z where wo = -wi, which no facet above does."""
     h = wo + wi

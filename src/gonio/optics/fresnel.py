@@ -18,6 +18,7 @@ KINDS = {
 }
 
 
+@function
 def cos_transmitted(cos_i: Any, eta: Any) -> Any:
     """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle."""
     return safe_sqrt(1.0 - (1.0 - sqr(cos_i)) / sqr(eta))
@@ -55,11 +56,13 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     return ops.where(below > 0.0, (s1 - s2) * p1 / ops.where(below > 0.0, below, 1.0), 1.0)
 
 
+@function
 def r0_dielectric(eta: Any) -> Any:
     """Reflectance at normal incidence, ((eta - 1) / (eta + 1))^2 (course sheet, eq. 12)."""
     return sqr((eta - 1.0) / (eta + 1.0))
 
 
+@function
 def r0_conductor(eta: Any, k: Any) -> Any:
     """Reflectance at normal incidence, ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2) (course sheet, eq. 11)."""
     return (sqr(eta - 1.0) + sqr(k)) / (sqr(eta + 1.0) + sqr(k))

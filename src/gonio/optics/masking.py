@@ -34,6 +34,7 @@ def schlick_g1(v: Any, k: Any) -> Any:
     return c / (c * (1.0 - k) + k)
 
 
+@function
 def masking_shadowing(kind: str, ndf: NDF, wo: Any, wi: Any, m: Any, alpha: Any, transmits: bool = False) -> Any:
     """G of one of `KINDS`; 0 where wo or wi sees the facet from its back.
 

@@ -30,6 +30,7 @@ def square_to_power_lobe(u1: Any, u2: Any, p: Any) -> Any:
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
 
 
+@function
 def square_to_power_lobe_pdf(cos_theta: Any, p: Any) -> Any:
     """(p + 1) / (2 pi) cos(theta)^p above, 0 below; 1/sr."""
     return (p + 1.0) * (0.5 * ops.inv_pi) * ops.pow(cos_theta, p)

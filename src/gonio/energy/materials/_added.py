@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from ... import ops
 from ...models.base import BSDF, Sample, bsdf
@@ -10,6 +10,32 @@ from ...ops import safe_div, vec3, where
 from .. import missing
 
 ALMOST_ONE = 0.99999994  # the largest float32 under 1
+
+
+class Parts(NamedTuple):
+    """What a compensated material is the sum of, both times |cos theta_i|.
+
+    single  the base alone: light scattered once
+    multi   what is added: light scattered more than once
+    """
+
+    single: Any
+    multi: Any
+
+
+class AllParts(NamedTuple):
+    """`Parts`, after the microfacet `Terms` of the base."""
+
+    D: Any
+    G: Any
+    F: Any
+    single: Any
+    multi: Any
+
+
+def with_terms(base: Any, wo: Any, wi: Any, single: Any, multi: Any) -> Any:
+    """The parts, with D, G and F where the base has them."""
+    return AllParts(*base.terms(wo, wi), single, multi) if hasattr(base, "terms") else Parts(single, multi)
 
 
 class _Added(BSDF):
@@ -55,6 +81,11 @@ class _Added(BSDF):
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """The base, plus what is added."""
         return self.base.eval(wo, wi, mode) + self._extra(self.derived(), wo, wi, mode)
+
+    def terms(self, wo: Any, wi: Any) -> Any:
+        """`Parts`, with D, G and F of the base where it has them."""
+        extra = self._extra(self.derived(), wo, wi, "radiance")
+        return with_terms(self.base, wo, wi, self.base.eval(wo, wi), extra)
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         """The base's density and that of lobes proportional to (1 - E(mu_i)) mu_i, mixed by the energy each carries."""

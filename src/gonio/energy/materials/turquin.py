@@ -9,6 +9,7 @@ from ...models.base import BSDF, Breach, Sample, bsdf
 from ...ops import maximum
 from .. import missing
 from ..missing import Metal
+from ._added import with_terms
 
 
 class Turquin(BSDF):
@@ -55,6 +56,11 @@ class Turquin(BSDF):
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """The base times the factor."""
         return self.base.eval(wo, wi, mode) * self._factor(wo)
+
+    def terms(self, wo: Any, wi: Any) -> Any:
+        """The base, and what the factor adds to it; D, G and F of the base."""
+        single = self.base.eval(wo, wi)
+        return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         """The base's."""

@@ -25,6 +25,7 @@ from ..frame import sin2
 from .base import NDF
 
 
+@function
 def slant2(v: Any, alpha: Any) -> Any:
     """(alpha_x v_x)^2 + (alpha_y v_y)^2: squared sine, stretched by the widths."""
     return sqr(alpha.x * v.x) + sqr(alpha.y * v.y)

@@ -1,0 +1,273 @@
+"""A shader with all that a program needs to run it: text, manifest, tables."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+import textwrap
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, MachineError, did_you_mean
+from ..models import BSDF
+from . import program as programs
+from .dialect import Dialect, axes, groups, literal, pixels, width
+from .glsl import GLSL
+from .program import Program
+from .simplify import Record
+from .writer import Writer, comment, wrap
+
+DIALECTS: dict[str, Dialect] = {d.name: d for d in (GLSL,)}
+
+SYMBOLS = {"alpha": "α", "eta": "η", "sigma": "σ", "albedo": "ρ", "rotation": "φ", "weight": "w"}
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """What `bundle` makes.
+
+    text      the shader: structs, helpers, functions; no version line, no main
+    manifest  what a program must know to use it: plain dicts, lists, numbers; see docs/emit.md
+    tables    uniform name -> float32 array in the order of upload (x fastest), channels last
+    """
+
+    text: str
+    manifest: dict[str, Any]
+    tables: dict[str, np.ndarray]
+    dialect: Dialect = field(repr=False)
+
+    def write(self, folder: Path | str) -> list[Path]:
+        """Write shader, manifest.json and one raw little-endian float32 file a table; the paths written."""
+        folder = Path(folder)
+        written = []
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            name = self.manifest["model"] + self.dialect.suffix
+            contents = {name: self.text.encode(), "manifest.json": json.dumps(self.manifest, indent=2).encode()}
+            for texture in self.manifest["textures"]:
+                contents[texture["file"]] = self.tables[texture["uniform"]].astype("<f4").tobytes()
+            for file, content in contents.items():
+                (folder / file).write_bytes(content)
+                written.append(folder / file)
+        except OSError as error:
+            raise MachineError(f"cannot write: {error.strerror}", str(folder)) from error
+        return written
+
+
+def emit(model: BSDF, lang: str = "glsl", functions: tuple[str, ...] = ("eval", "pdf", "sample")) -> str:
+    """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
+
+        print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
+
+    lang       "glsl" (ES 3.00, WebGL2), "wgsl" (WebGPU) or "hlsl" (shader model 6)
+    functions  of "eval", "pdf", "sample", "terms" (D, G, F, ...; where the model has them)
+    Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
+    "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
+    Raises InputError for a stochastic material (RandomWalk): there is no code for it.
+    """
+    return bundle(model, lang, functions).text
+
+
+def bundle(model: BSDF, lang: str = "glsl", functions: tuple[str, ...] = ("eval", "pdf", "sample", "terms")) -> Bundle:
+    """Shader, manifest and tables of a material; arguments as in `emit`."""
+    if lang not in DIALECTS:
+        raise InputError(f"unknown language '{lang}'", "emit: lang", did_you_mean(str(lang), list(DIALECTS)))
+    functions = tuple(functions.split(",")) if isinstance(functions, str) else tuple(functions)
+    programs.check(model, functions, "emit")
+    if not hasattr(model, "terms"):
+        functions = tuple(f for f in functions if f != "terms")
+    dialect = DIALECTS[lang]
+    made = Program(model, functions)
+    text = _text(made, dialect)
+    tables = {f"table_{t.name}": pixels(t) for t in made.tables}
+    return Bundle(text, _manifest(made, dialect), tables, dialect)
+
+
+# ---------------------------------------------------------------------- text
+
+
+def _text(made: Program, dialect: Dialect) -> str:
+    writer = Writer(made, dialect)
+    bodies = [writer.routine(routine) for routine in made.routines]
+    parts: list[list[str]] = [_head(made)]
+    if dialect.prelude:
+        parts.append(dialect.prelude.strip().splitlines())
+    constants = []
+    for name, (value, about) in writer.constants.items():
+        line = dialect.constant(name, literal(value))
+        if about and len(line) + len(about) + 4 <= 110:
+            constants.append(f"{line}  // {about}")
+        else:
+            constants += [*(f"// {text}" for text in textwrap.wrap(about, 105)), line]
+    if constants:
+        parts.append(constants)
+    for record in _structs(made, writer):
+        parts.append([*comment(record.doc), *_struct(record, writer)])
+    for place, table in enumerate(made.tables):
+        uniform = f"table_{table.name}"
+        size = " x ".join(map(str, table.shape))
+        about = f"// {size} texels, {table.channels} channel{'s' * (table.channels > 1)}; linear between texel centres, held outside."
+        lookup = dialect.lookup(f"lookup_{table.name}", uniform, width(table), groups(table), table.shape)
+        parts.append([*dialect.binding(uniform, 3 if len(axes(table)) == 3 else 2, place), "", about, *lookup])
+    parts += [body for body in bodies if body]
+    return "\n\n".join("\n".join(part) for part in parts) + "\n"
+
+
+def _head(made: Program) -> list[str]:
+    model = made.model
+    from .. import __version__
+
+    choices = [f"{path} = {value}" for path, value in _choices(model)]
+    lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
+    lines += comment(inspect.cleandoc(type(model).__doc__ or ""))
+    if choices:
+        lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(choices) + ".", 105))]
+    lines += [
+        "//",
+        "// Directions are unit vectors of the local frame, away from the surface; +z is the shading normal.",
+    ]
+    return lines
+
+
+def _choices(model: Any, path: str = "") -> list[tuple[str, Any]]:
+    found = []
+    for name, parameter in model.parameters().items():
+        value = getattr(model, name)
+        if parameter.kind == "bsdf":
+            found += [(f"{path}{name}", type(value).__name__), *_choices(value, f"{path}{name}.")]
+        elif parameter.kind in ("choice", "flag"):
+            found.append((f"{path}{name}", value))
+    return found
+
+
+def _structs(made: Program, writer: Writer) -> list[Record]:
+    own = made.struct_of(made.bound)
+    assert own is not None
+    writer.note(own.record)
+    if made.derived is not None:
+        writer.note(made.derived.record)
+    return list(writer.records.values())
+
+
+def _struct(record: Record, writer: Writer) -> list[str]:
+    fields = [(writer.dialect.type(type_), writer.dialect.word(name)) for name, type_ in record.fields]
+    if not fields:  # a struct must have a member
+        fields = [(writer.dialect.type("float"), "nothing")]
+    return writer.dialect.struct(writer.dialect.word(record.name), fields)
+
+
+# ---------------------------------------------------------------------- manifest
+
+
+def _manifest(made: Program, dialect: Dialect) -> dict[str, Any]:
+    model = made.model
+    cls = type(model)
+    struct = made.struct_of(made.bound)
+    assert struct is not None
+    numbers = dict(_numbers(model))
+    fields = [
+        {"name": name, "path": path, "type": type_, "value": numbers[path]}
+        for (name, type_), path in zip(struct.record.fields, struct.paths, strict=True)
+    ]
+    terms = made.entries.get("terms")
+    derived = made.derived
+    return {
+        "version": 1,
+        "lang": dialect.name,
+        "model": cls.name,
+        "title": cls.__name__,
+        "doc": inspect.cleandoc(cls.__doc__ or ""),
+        "struct": dialect.word(struct.record.name),
+        "fields": fields,
+        "derived": derived
+        and {
+            "struct": derived.record.name,
+            "fields": [{"name": name, "type": type_} for name, type_ in derived.record.fields],
+        },
+        "functions": {method: routine.name for method, routine in made.entries.items()},
+        "terms": [
+            {"name": name, "type": type_, "doc": _term_doc(name)}
+            for name, type_ in (terms.record.fields if terms and terms.record else [])
+        ],
+        "parameters": list(_parameters(model, set(struct.paths))),
+        "textures": [
+            {
+                "uniform": f"table_{table.name}",
+                "dimension": 3 if len(axes(table)) == 3 else 2,
+                "size": list(axes(table)),
+                "channels": width(table),
+                "file": f"{table.name}.f32",
+            }
+            for table in made.tables
+        ],
+        "transmits": bool(model.transmits),
+        "delta": model.delta,
+        "stochastic": False,
+        "isotropic": bool(model.isotropic),
+    }
+
+
+TERMS = {
+    "D": "density of microfacet normals at the half vector, 1/sr",
+    "G": "masking and shadowing",
+    "F": "Fresnel reflectance at the half vector",
+    "single": "light scattered once: the base alone, times |cos theta_i|",
+    "multi": "what is added for light scattered more than once, times |cos theta_i|",
+}
+
+
+def _term_doc(name: str) -> str:
+    return TERMS.get(name, "")
+
+
+def _parameters(model: Any, fields: set[str], path: str = "") -> Any:
+    for name, parameter in model.parameters().items():
+        value = getattr(model, name)
+        here = f"{path}{name}"
+        if parameter.kind == "bsdf":
+            yield from _parameters(value, fields, f"{here}.")
+            continue
+        yield {
+            "path": here,
+            "kind": parameter.kind,
+            "value": _plain(value),
+            "default": None if parameter.required else _plain(parameter.default),
+            "low": None if parameter.low == -np.inf else parameter.low,
+            "high": None if parameter.high == np.inf else parameter.high,
+            "unit": parameter.unit,
+            "doc": parameter.doc,
+            "symbol": SYMBOLS.get(name, name),
+            "choices": parameter.choices,
+            "field": programs.flat(here) if here in fields else None,
+        }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bool | str) or value is None:
+        return value
+    array = np.asarray(value, dtype=float)
+    return float(array) if array.ndim == 0 else array.tolist()
+
+
+def _numbers(model: Any, path: str = "") -> Any:
+    """(path, value as its field holds it) of each numeric parameter."""
+    for name, parameter in model.parameters().items():
+        value = getattr(model, name)
+        if parameter.kind == "bsdf":
+            yield from _numbers(value, f"{path}{name}.")
+        elif parameter.numeric and value is not None:
+            array = np.asarray(value, dtype=float)
+            if array.ndim > 1 or (array.ndim == 1 and parameter.kind not in ("spectrum", "alpha")):
+                what = "one value a ray given, one value expected"
+                raise InputError(what, f"emit: {type(model).__name__}.{name}", "the shader's struct holds one material")
+            if parameter.kind == "spectrum":
+                array = np.broadcast_to(array, (3,))
+            elif parameter.kind == "alpha":
+                array = np.broadcast_to(array, (2,))
+            elif parameter.kind == "angle":
+                array = np.array([np.cos(array), np.sin(array)])
+            yield f"{path}{name}", array.tolist()

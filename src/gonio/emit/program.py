@@ -1,0 +1,279 @@
+"""A model as the functions, structs and tables of a shader, in no language yet.
+
+All methods are recorded into one graph, so that what eval, pdf and sample share is there once. What follows from the
+parameters alone (`BSDF.derive`) becomes a function of its own, whose result the others take as an argument: a shader
+computes it once a draw, not once a pixel.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import ops
+from ..errors import InputError, did_you_mean
+from ..models import BSDF
+from ..ops import graph
+from ..ops.table import Table
+from .polyfills import POLYFILLS
+from .simplify import Record, Routine, Value, routines, shape
+
+FUNCTIONS = ("eval", "pdf", "sample", "terms")
+
+
+class Struct:
+    """An argument made of fields: a model's parameters, or what was derived from them."""
+
+    def __init__(self, name: str, fields: list[tuple[str, str]], doc: str = "") -> None:
+        self.record = Record(name, [(flat(path), type_) for path, type_ in fields], doc)
+        self.paths = [path for path, _ in fields]
+
+
+class Program:
+    """What a shader of one model is made of.
+
+    routines  in order of definition, callees first
+    entries   method -> its routine, "derive" among them where there is something to derive
+    structs   of parameters, derived values and results, in order of use
+    tables    the tables that are looked up
+    """
+
+    def __init__(self, model: BSDF, functions: tuple[str, ...]) -> None:
+        self.model = model
+        self.bound = model.symbols()
+        recorded = _record(self.bound, functions)
+        found = routines(recorded)
+        self.driver = found.pop()
+        functions_of = dict(zip((r.name for r in found), recorded.functions, strict=False))
+        self.recorded = {r: functions_of[r.name] for r in found}
+        self.entries: dict[str, Routine] = {}
+        stem = type(model).__name__
+        for routine in found:
+            for method in (*functions, "derive"):
+                if routine.name == f"{stem}_{method}":
+                    self.entries[method] = routine
+        self._parameters: dict[tuple, Struct] = {}
+        self._derived: dict[tuple, Struct] = {}
+        self.routines = self._reachable(found)
+        self._trim_derived()
+        self.tables = self._tables()
+
+    # ------------------------------------------------------------------ structs
+
+    def struct_of(self, value: Any) -> Struct | None:
+        """The struct of a model's parameters."""
+        if not isinstance(value, BSDF):
+            return None
+        fields = tuple(field_list(value))
+        key = (type(value).__name__, fields)
+        if key not in self._parameters:
+            name = _free(type(value).__name__, [s.record.name for s in self._parameters.values()])
+            doc = (type(value).__doc__ or "").strip().splitlines()[0]
+            self._parameters[key] = Struct(name, list(fields), doc)
+        return self._parameters[key]
+
+    def derived_of(self, value: Any) -> Struct | None:
+        """The struct of what is derived from a model's parameters; also of the dict itself."""
+        key = tuple(derived_list(value))
+        return self._derived.get(key)
+
+    def _trim_derived(self) -> None:
+        """One struct for each structure of derived values, with the fields that somebody uses."""
+        used: dict[tuple, set[str]] = {}
+        owner: dict[tuple, str] = {}
+        for routine in self.routines:
+            for argument, value in self.recorded[routine].arguments.items():
+                key = tuple(derived_list(value))
+                if not key:
+                    continue
+                if isinstance(value, BSDF):
+                    owner.setdefault(key, type(value).__name__)
+                used.setdefault(key, set())
+                for index in routine.used:
+                    root, path, derived = place(routine.parameters[index].static)
+                    if root == argument and (derived or not isinstance(value, BSDF)):
+                        used[key].add(path)
+        for key, paths in used.items():
+            fields = [(path, type_) for path, type_ in key if path in paths]
+            if fields and key in owner:
+                name = _free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
+                self._derived[key] = Struct(name, fields, "What follows from the parameters alone.")
+        derive = self.entries.get("derive")
+        if derive is None:
+            return
+        struct = self._derived.get(tuple(derived_list(self._settled)))
+        if struct is None:  # nothing of it is used
+            del self.entries["derive"]
+            self.routines.remove(derive)
+            return
+        kept = dict(derive.results)
+        derive.results = [(path, kept[path]) for path in struct.paths]
+        derive.used = {derive.parameters.index(v) for v in derive.values() if v.op == "parameter"}
+        derive.record, derive.single = struct.record, False
+
+    @property
+    def _settled(self) -> Any:
+        """An argument that has the derived values of the whole model."""
+        for method, routine in self.entries.items():
+            if method != "derive":
+                return self.recorded[routine].arguments["self"]
+        return None
+
+    @property
+    def derived(self) -> Struct | None:
+        """The struct that the entries take besides the parameters."""
+        return self.derived_of(self._settled) if "derive" in self.entries else None
+
+    # ------------------------------------------------------------------ what is there
+
+    def _reachable(self, found: list[Routine]) -> list[Routine]:
+        wanted = set(self.entries.values())
+        for routine in reversed(found):  # callers come after callees
+            if routine in wanted:
+                wanted |= {v.static for v in routine.values() if v.op == "call"}
+        for routine in found:
+            if routine in wanted and not routine.single and routine.name != f"{type(self.model).__name__}_derive":
+                self._name_result(routine)
+        return [routine for routine in found if routine in wanted]
+
+    def _name_result(self, routine: Routine) -> None:
+        result = self.recorded[routine].result
+        if routine.name.endswith("_terms"):
+            name = routine.name.removesuffix("_terms") + "Terms"
+        elif hasattr(result, "_fields"):
+            name = type(result).__name__
+        else:
+            name = "".join(part[:1].upper() + part[1:] for part in routine.name.split("_")) + "Result"
+        fields = [(_result_name(path, value), value.type) for path, value in routine.results]
+        routine.record = Record(name, fields, _first_line(type(result)) if hasattr(result, "_fields") else "")
+
+    def _tables(self) -> list[Table]:
+        found: dict[int, Table] = {}
+        for routine in self.routines:
+            for value in routine.values():
+                if value.op == "texel":
+                    found.setdefault(id(value.static[0]), value.static[0])
+        return list(found.values())
+
+
+def _record(bound: Any, functions: tuple[str, ...]) -> graph.Graph:
+    def every(self: Any, wo: Any, wi: Any, u: Any) -> Any:
+        """The driver of a recording; no part of the shader."""
+        if any(True for _ in _deriving(self)):
+            self = settle(self, derive(self))
+        results = []
+        for method in functions:
+            results.append(getattr(self, method)(wo, u if method == "sample" else wi))
+        return tuple(results)
+
+    into = graph.Graph(POLYFILLS, single=True)
+    return ops.record(every, types={"wo": "vec3", "wi": "vec3", "u": "vec3"}, name="every", into=into, self=bound)
+
+
+@ops.function
+def derive(self: Any) -> Any:
+    """What follows from the parameters alone: to be computed once, not for every pair of directions."""
+    return _derive(self)
+
+
+def _derive(material: Any) -> dict[str, Any]:
+    found = dict(material.derive()) if _derives(material) else {}
+    for name, inner in _inner(material):
+        below = _derive(inner)
+        if below:
+            found[name] = below
+    return found
+
+
+def settle(material: Any, found: dict[str, Any]) -> Any:
+    """A copy of a bound material that holds what `derive` found."""
+    clone = object.__new__(type(material))
+    clone.__dict__.update(material.__dict__)
+    names = [name for name, _ in _inner(material)]
+    if _derives(material):
+        clone.__dict__[graph.SETTLED] = {key: value for key, value in found.items() if key not in names}
+    for name in names:
+        if name in found:
+            clone.__dict__[name] = settle(getattr(material, name), found[name])
+    return clone
+
+
+def _derives(material: Any) -> bool:
+    return type(material).derive is not BSDF.derive
+
+
+def _inner(material: Any) -> list[tuple[str, Any]]:
+    return [(n, getattr(material, n)) for n, p in material.parameters().items() if p.kind == "bsdf"]
+
+
+def _deriving(material: Any) -> Any:
+    if _derives(material):
+        yield material
+    for _, inner in _inner(material):
+        yield from _deriving(inner)
+
+
+# ---------------------------------------------------------------------- paths
+
+
+def place(path: str) -> tuple[str, str, bool]:
+    """(root argument, path below it, whether it is a derived value) of a parameter of a recording."""
+    root, _, rest = path.partition(".")
+    parts = rest.split(".") if rest else []
+    derived = graph.SETTLED in parts
+    return root, ".".join(part for part in parts if part != graph.SETTLED), derived
+
+
+def flat(path: str) -> str:
+    """A field's name in a struct."""
+    return path.replace(".", "_")
+
+
+def field_list(value: Any) -> list[tuple[str, str]]:
+    """(path, type) of a model's numeric parameters, those of inner materials included."""
+    pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
+    return [(rest, shape(type_)) for (_, rest, derived), type_ in pairs if not derived]
+
+
+def derived_list(value: Any) -> list[tuple[str, str]]:
+    """(path, type) of derived values: of those that a model holds, or of a dict of them."""
+    if not isinstance(value, BSDF | dict):
+        return []
+    pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
+    return [(rest, shape(type_)) for (_, rest, derived), type_ in pairs if derived or isinstance(value, dict)]
+
+
+def _result_name(path: str, value: Value) -> str:
+    if path and not path[0].isdigit():
+        return flat(path)
+    return value.name.rpartition(".")[2] or f"value_{path}"
+
+
+def _first_line(cls: type) -> str:
+    return (cls.__doc__ or "").strip().splitlines()[0]
+
+
+def _free(name: str, taken: list[str]) -> str:
+    found, count = name, 1
+    while found in taken:
+        count += 1
+        found = f"{name}_{count}"
+    return found
+
+
+def check(model: Any, functions: tuple[str, ...], where: str) -> None:
+    """Raise InputError where there can be no shader code."""
+    if not isinstance(model, BSDF):
+        raise InputError(f"{type(model).__name__} given, a material expected", where)
+    for function in functions:
+        if function not in FUNCTIONS:
+            raise InputError(f"unknown function '{function}'", where, did_you_mean(function, FUNCTIONS))
+    if not functions:
+        raise InputError("no function named", where, "known: " + ", ".join(FUNCTIONS))
+    if stochastic(model):
+        what = f"{type(model).__name__} is estimated by random walks and cannot be written as shader code"
+        raise InputError(what, where, "KullaConty is its closed form")
+
+
+def stochastic(model: Any) -> bool:
+    """Whether values are random numbers, here or in an inner material."""
+    return model.stochastic or any(stochastic(inner) for _, inner in _inner(model))

@@ -1,0 +1,408 @@
+"""Recorded functions, made fit to be read: one `Value` for each thing computed, nothing that is not used.
+
+A recording holds what Python did, number by number. Here equal values become one, constants are folded, branches that
+cannot be taken vanish, and a value chosen inside a choice by the same mask is taken at once: `where(b == 0, 0,
+a / where(b == 0, 1, b))` is a quotient that is looked at only where b is not 0.
+"""
+
+from __future__ import annotations
+
+import functools
+import linecache
+import math
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import GonioError
+from ..ops import graph
+from ..ops.table import Table
+
+SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
+COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
+LOGIC = {"and", "or", "not"}
+
+
+class Value:
+    """One thing that a function computes.
+
+    op      as in a recording, or "constant", "parameter", "texel" (up to four channels of a table)
+    type    "float", "bool", "vec2", "vec3", "vec4", "bvec3", or the result of a call: a `Record`
+    args    Values
+    static  the constant, the parameter's place, the callee, the component, (table, group of channels)
+    name    of the Python variable, where known; `source` the line that wrote it
+    """
+
+    __slots__ = ("args", "name", "op", "order", "source", "static", "type")
+
+    def __init__(self, op: str, type: Any, args: tuple, static: Any, order: int) -> None:
+        self.op, self.type, self.args, self.static, self.order = op, type, args, static, order
+        self.name, self.source = "", ""
+
+    def __repr__(self) -> str:
+        return f"#{self.order}:{self.op}"
+
+
+class Record:
+    """The type of several values returned together: a struct of the shader."""
+
+    def __init__(self, name: str, fields: list[tuple[str, str]], doc: str = "") -> None:
+        self.name, self.fields, self.doc = name, fields, doc
+
+    @property
+    def key(self) -> tuple:
+        return tuple(self.fields)
+
+
+class Routine:
+    """A function of the shader.
+
+    parameters  Values of op "parameter", with `static` the path ("self.base.alpha")
+    result      a Value, or a list of (path, Value) where several are returned
+    used        which parameters the result depends on
+    record      the type of several results
+    """
+
+    def __init__(self, function: graph.Function) -> None:
+        self.name, self.doc, self.source = function.name, function.doc, function.source
+        self.parameters: list[Value] = []
+        self.results: list[tuple[str, Value]] = []
+        self.single = False
+        self.used: set[int] = set()
+        self.record: Record | None = None
+
+    @property
+    def type(self) -> Any:
+        return self.results[0][1].type if self.single else self.record
+
+    def values(self) -> list[Value]:
+        """Everything that the results depend on, in order of computation."""
+        found: dict[int, Value] = {}
+        pending = [value for _, value in self.results]
+        while pending:
+            value = pending.pop()
+            if value.order not in found:
+                found[value.order] = value
+                pending.extend(needed(value))
+        return [found[order] for order in sorted(found)]
+
+
+def needed(value: Value) -> list[Value]:
+    """The arguments that count: of a call those that the callee uses."""
+    if value.op == "call":
+        return [value.args[i] for i in sorted(value.static.used)]
+    return list(value.args)
+
+
+def routines(recorded: graph.Graph) -> list[Routine]:
+    """Every function of a recording, simplified, callees first."""
+    known: dict[graph.Function, Routine] = {}
+    for function in recorded.functions:
+        known[function] = _Simplifier(function, known).routine
+    return list(known.values())
+
+
+def shape(type_: str) -> str:
+    """A spectrum is three channels in a shader."""
+    return "vec3" if type_ == "spectrum" else type_
+
+
+class _Simplifier:
+    def __init__(self, function: graph.Function, known: dict[graph.Function, Routine]) -> None:
+        self.known = known
+        self.table: dict[tuple, Value] = {}
+        self.count = 0
+        self.assumed: dict[tuple, Value] = {}
+        self.routine = Routine(function)
+        self.values: dict[graph.Node, Value] = {}
+        for node in function.nodes:
+            value = self.convert(node)
+            if node.name and not value.name and value.op not in ("parameter", "constant"):
+                value.name = node.name
+            if not value.source:
+                value.source = node.source
+            self.values[node] = value
+        self.routine.single = isinstance(function.result, graph.Node)
+        leaves = list(graph._flatten(function.result, "result"))
+        self.routine.results = [(path.partition(".")[2], self.values[node]) for path, node in leaves]
+        for value in self.routine.values():
+            if value.op == "parameter":
+                self.routine.used.add(self.routine.parameters.index(value))
+
+    # ------------------------------------------------------------------ making values
+
+    def make(self, op: str, type_: Any, args: tuple = (), static: Any = None, name: str = "") -> Value:
+        key = (op, type_ if isinstance(type_, str) else id(type_), tuple(a.order for a in args), _key(static), name)
+        value = self.table.get(key)
+        if value is None:
+            self.count += 1
+            value = self.table[key] = Value(op, type_, args, static, self.count)
+        return value
+
+    def constant(self, number: Any, type_: str = "float", source: str = "") -> Value:
+        """A number; by name, where the line of the source that uses it does so."""
+        if isinstance(number, bool | np.bool_):
+            return self.make("constant", "bool" if type_ == "float" else type_, (), bool(number))
+        name = module_constant(float(number), source)[0] if source else ""
+        value = self.make("constant", type_, (), float(number), name)
+        value.name, value.source = name, value.source or source
+        return value
+
+    def convert(self, node: graph.Node) -> Value:
+        args = tuple(
+            self.values[a] if isinstance(a, graph.Node) else self.constant(a, source=node.source) for a in node.args
+        )
+        op = node.op
+        if op == "parameter":
+            self.routine.parameters.append(self.make("parameter", shape(node.type), (), node.static))
+            return self.routine.parameters[-1]
+        if op == "constant":
+            number = node.static if isinstance(node.static, bool) else float(node.static)
+            return self.constant(number, source=node.source)
+        if op == "call":
+            callee = self.known[node.static]
+            if callee.single:  # a function that says nothing needs no call
+                result = callee.results[0][1]
+                if result.op == "parameter":
+                    return args[callee.parameters.index(result)]
+                if result.op == "constant":
+                    return self.constant(result.static, result.type)
+            return self.make("call", callee.results[0][1].type if callee.single else callee, args, callee)
+        if op == "element":
+            return self.element(args[0], node.static)
+        if op == "lookup":
+            return self.lookup(args, *node.static)
+        if op == "component":
+            return self.component(args[0], node.static)
+        return self.build(op, args, shape(node.type))
+
+    def element(self, called: Value, place: int) -> Value:
+        result = called.static.results[place][1]
+        if result.op == "constant":
+            return self.constant(result.static, result.type)
+        return self.make("element", result.type, (called,), place)
+
+    def lookup(self, args: tuple, table: Table, channel: int) -> Value:
+        if table.channels == 1:
+            return self.make("texel", "float", args, (table, 0))
+        if table.channels == 2:
+            return self.component(self.make("texel", "vec2", args, (table, 0)), channel)
+        return self.component(self.make("texel", "vec4", args, (table, channel // 4)), channel % 4)
+
+    def component(self, vector: Value, place: int) -> Value:
+        if vector.op == "vector":
+            return vector.args[place]
+        if vector.op == "constant":
+            return self.constant(vector.static)
+        if vector.op == "neg" and vector.args[0].op in ("vector", "parameter"):
+            return self.build("neg", (self.component(vector.args[0], place),), "float")
+        return self.make("component", "float", (vector,), place)
+
+    def build(self, op: str, args: tuple, declared: str) -> Value:
+        """An operation on values: folded where its arguments allow, else made."""
+        type_ = self.type_of(op, args, declared)
+        folded = self.fold(op, args, type_)
+        return folded if folded is not None else self.make(op, type_, args)
+
+    def type_of(self, op: str, args: tuple, declared: str) -> str:
+        wide = {a.type for a in args} & set(SIZES)
+        if op in COMPARE or op in LOGIC or op == "isfinite":
+            size = {SIZES[t] for t in wide} | {int(a.type[-1]) for a in args if a.type.startswith("bvec")}
+            return f"bvec{size.pop()}" if size else "bool"
+        if op == "where" and args[0].type.startswith("bvec"):
+            return "vec" + args[0].type[-1]
+        if op in ("dot", "mean", "max_component"):
+            return "float"
+        if op == "vector":
+            return declared
+        return wide.pop() if wide else ("bool" if op == "where" and args[1].type == "bool" else "float")
+
+    # ------------------------------------------------------------------ folding
+
+    def fold(self, op: str, args: tuple, type_: str) -> Value | None:
+        if op == "where":
+            return self.fold_where(*args, type_)
+        if args and all(a.op == "constant" for a in args):
+            found = _compute(op, [a.static for a in args])
+            if found is not None:
+                return self.constant(found, type_)
+        if op in ("add", "sub", "mul", "div"):
+            return self.fold_arithmetic(op, args, type_)
+        if op == "neg" and args[0].op == "neg":
+            return args[0].args[0]
+        if op == "not" and args[0].op == "not":
+            return args[0].args[0]
+        if op in ("ne", "lt", "gt") and args[0] is args[1]:  # `never`; no NaN is asked for this way
+            return self.constant(False, type_)
+        if op in ("and", "or"):
+            for a, b in (args, args[::-1]):
+                if a.op == "constant":
+                    return b if a.static is (op == "and") else self.constant(op == "or", type_)
+            if args[0] is args[1]:
+                return args[0]
+        return None
+
+    def fold_arithmetic(self, op: str, args: tuple, type_: str) -> Value | None:
+        a, b = args
+
+        def is_number(x: Value, number: float) -> bool:
+            return x.op == "constant" and x.static == number
+
+        def whole(x: Value) -> Value | None:
+            """x where it has the type of the result already."""
+            if x.type == type_:
+                return x
+            return self.constant(x.static, type_) if x.op == "constant" else self.make("splat", type_, (x,))
+
+        if op == "mul" and (is_number(a, 0.0) or is_number(b, 0.0)):
+            return self.constant(0.0, type_)
+        if op == "div" and is_number(a, 0.0):
+            return self.constant(0.0, type_)
+        if op == "mul" and is_number(a, 1.0):
+            return whole(b)
+        if op in ("mul", "div") and is_number(b, 1.0):
+            return whole(a)
+        if op == "mul" and (is_number(a, -1.0) or is_number(b, -1.0)):
+            other = b if is_number(a, -1.0) else a
+            return self.build("neg", (other,), other.type) if other.type == type_ else None
+        if op == "add" and is_number(a, 0.0):
+            return whole(b)
+        if op in ("add", "sub") and is_number(b, 0.0):
+            return whole(a)
+        if op == "sub" and is_number(a, 0.0) and b.type == type_:
+            return self.build("neg", (b,), type_)
+        if op == "add" and b.op == "neg":
+            return self.build("sub", (a, b.args[0]), type_)
+        if op == "sub" and b.op == "neg":
+            return self.build("add", (a, b.args[0]), type_)
+        return None
+
+    def fold_where(self, mask: Value, a: Value, b: Value, type_: str) -> Value | None:
+        if mask.op == "constant":
+            chosen = a if mask.static else b
+            return chosen if chosen.type == type_ else None
+        if a is b and a.type == type_:
+            return a
+        if mask.op == "not":
+            return self.build("where", (mask.args[0], b, a), type_)
+        if type_ == "bool":
+            if a.op == "constant":
+                return self.build("or", (mask, b), "bool") if a.static else None
+            if b.op == "constant" and not b.static:
+                return self.build("and", (mask, a), "bool")
+        a2, b2 = self.assume(a, mask, True), self.assume(b, mask, False)
+        if a2 is not a or b2 is not b:
+            return self.build("where", (mask, a2, b2), type_)
+        return None
+
+    def assume(self, value: Value, mask: Value, holds: bool) -> Value:
+        """The value where it is known that `mask` holds, or that it does not."""
+        key = (value.order, mask.order, holds)
+        found = self.assumed.get(key)
+        if found is None:
+            found = self.assumed[key] = self._assume(value, mask, holds)
+        return found
+
+    def _assume(self, value: Value, mask: Value, holds: bool) -> Value:
+        if value is mask and value.type == "bool":
+            return self.constant(holds)
+        if value.op == "where" and value.args[0] is mask and not value.name:
+            chosen = value.args[1 if holds else 2]
+            if chosen.type == value.type:
+                return self.assume(chosen, mask, holds)
+        if value.name or value.op in ("call", "element", "texel", "parameter", "constant"):
+            return value  # shared with other lines: a second copy would be dearer than the choice
+        args = tuple(self.assume(a, mask, holds) for a in value.args)
+        if all(new is old for new, old in zip(args, value.args, strict=True)):
+            return value
+        if value.op == "component":
+            return self.component(args[0], value.static)
+        return self.build(value.op, args, value.type)
+
+
+def _key(static: Any) -> Any:
+    if isinstance(static, float):
+        return ("float", struct.pack("d", static))
+    if isinstance(static, tuple):
+        return tuple(_key(item) for item in static)
+    return (type(static).__name__, static if isinstance(static, bool | int | str | None) else id(static))
+
+
+_FOLD: dict[str, Callable] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "log": math.log,
+    "sin": math.sin,
+    "cos": math.cos,
+    "abs": abs,
+    "floor": math.floor,
+    "minimum": min,
+    "maximum": max,
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "gt": lambda a, b: a > b,
+    "ge": lambda a, b: a >= b,
+    "eq": lambda a, b: a == b,
+    "ne": lambda a, b: a != b,
+    "and": lambda a, b: a and b,
+    "or": lambda a, b: a or b,
+    "not": lambda a: not a,
+}
+
+
+def _compute(op: str, numbers: list) -> Any:
+    if op not in _FOLD:
+        return None
+    try:
+        return _FOLD[op](*numbers)
+    except (ValueError, ZeroDivisionError, OverflowError):  # left for the shader, as the source has it
+        return None
+
+
+def check_single(number: float, where: str) -> None:
+    """Raise where a constant of the source is none of float32's."""
+    size = abs(number)
+    if math.isnan(number) or size > 3.4028234e38 or 0.0 < size < 1.17549435e-38:
+        raise GonioError(f"the constant {number!r} is no float32", where, "shader code computes in 32 bits")
+
+
+@functools.cache
+def module_constant(number: float, source: str) -> tuple[str, str]:
+    """(name, what is said of it) of a constant of a module, where the line of the source uses it; else ("", "")."""
+    path, _, line = source.rpartition(":")
+    text = linecache.getline(path, int(line or 0))
+    words = {word for word in "".join(c if c.isalnum() or c == "_" else " " for c in text).split() if word.isupper()}
+    for name in words if number not in (0.0, 1.0) else ():
+        for module in list(sys.modules.values()):
+            place = getattr(module, "__file__", None) or ""
+            if place.startswith(_PACKAGE) and type(vars(module).get(name)) is float and vars(module)[name] == number:
+                about = _said_of(place, name)
+                if about is not None:
+                    return name.strip("_"), about
+    return "", ""
+
+
+_PACKAGE = str(Path(__file__).parent.parent)
+
+
+def _said_of(path: str, name: str) -> str | None:
+    """The comment on a constant where it is defined, above it or after it; None where it is only imported."""
+    lines = linecache.getlines(path)
+    for index, line in enumerate(lines):
+        if line.startswith(f"{name} ="):
+            after = line.partition("#")[2].strip()
+            above: list[str] = []
+            while not after and index > 0 and lines[index - 1].startswith("#"):
+                index -= 1
+                above.insert(0, lines[index].lstrip("# ").rstrip())
+            return after or " ".join(above)
+    return None
