@@ -7,6 +7,7 @@
  * All values on this page that are not pixels of the picture come from here: no formula of a material is typed in web/.
  */
 import type { Values } from "./data";
+import { derivedVaryings } from "./glsl";
 import { HEADER, type Program, type Shader, type ShaderLibrary } from "./shaders";
 import { SOBOL_WIDTH, sobolTexels } from "./sobol";
 
@@ -245,15 +246,16 @@ uniform int start;`;
 
   private program(shader: Shader, kind: string, body: string, outputs: number, declarations: string): Program {
     const { struct, derived, functions } = shader.manifest;
-    const fields = derived?.fields ?? [];
-    const varyings = (direction: "in" | "out") => fields.map((f) => `flat ${direction} ${f.type} derived_${f.name};`).join("\n");
-    const vertex = derived
+    // Null also where a model derives more than fits between the stages: it then derives in every query.
+    const flat = derivedVaryings(shader.manifest);
+    const varyings = (direction: "in" | "out") =>
+      Array.from({ length: flat?.vectors ?? 0 }, (_, i) => `flat ${direction} vec4 derived_${i};`).join("\n");
+    const vertex = flat
       ? `${HEADER}${shader.text}
 uniform ${struct} material;
 ${varyings("out")}
 void main() {
-  ${derived.struct} derived = ${functions.derive}(material);
-  ${fields.map((f) => `derived_${f.name} = derived.${f.name};`).join("\n  ")}${VERTEX_MAIN}
+${flat.pack}${VERTEX_MAIN}
 }`
       : `${HEADER}void main() {${VERTEX_MAIN}\n}`;
     const fragment = `${HEADER}${shader.text}
@@ -269,7 +271,7 @@ vec3 row_of(sampler2D rows) {
 }
 void main() {
   vec3 first = row_of(first_rows), second = row_of(second_rows);
-  ${derived ? `${derived.struct} derived = ${derived.struct}(${fields.map((f) => `derived_${f.name}`).join(", ")});` : ""}${body}
+  ${derived ? `${derived.struct} derived = ${flat ? flat.unpack : `${functions.derive}(material)`};` : ""}${body}
 }`;
     return this.library.program(`${shader.key}/evaluator/${kind}`, vertex, fragment);
   }

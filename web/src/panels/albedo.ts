@@ -1,0 +1,126 @@
+/** The albedo curve E(mu): the share of power that comes back, from the mean weight of the emitted sample(). */
+import type { App, Panel } from "../panel";
+import type { Change } from "../state";
+import { channelOf, element, evaluatorOf, latest, legend, type Model, overlaid, range, select, short, CHANNELS, type Channel } from "./base";
+import { Curves, type Series } from "./curves";
+import { polar, RADIANS } from "./directions";
+import type { AlbedoEstimate } from "../evaluator";
+import { channelIn } from "./viewing";
+
+const DEFAULTS = { phi: 0 };
+/** Where E is estimated: even in mu, closer at grazing angles, where the curves bend. */
+export const MUS = [0.01, 0.02, 0.035, ...Array.from({ length: 39 }, (_, i) => 0.05 + (0.95 * i) / 38)];
+const TARGET = 5e-4;
+
+class AlbedoPanel implements Panel {
+  readonly id = "albedo";
+  readonly title = "Albedo";
+  readonly doc = "E(μ): the share of power given back, with the white furnace's line at 1";
+  private app!: App;
+  private curves!: Curves;
+  private key!: HTMLElement;
+  private note!: HTMLElement;
+  private phi!: { show(v: number): void };
+  private channel!: { show(v: Channel): void };
+  private ask!: () => void;
+  private generation = 0;
+
+  mount(host: HTMLElement, app: App): void {
+    this.app = app;
+    host.classList.add("p-panel");
+    const bar = element("div", "p-bar");
+    this.channel = select(bar, "channel", "Which number of the RGB value is drawn", CHANNELS, (channel) => app.store.setPanel("viewing", { channel }));
+    this.phi = range(bar, "φo", "Azimuth of ωo from the tangent: matters for anisotropic materials", [0, 180, 1], "°", (phi) => app.store.setPanel(this.id, { phi }));
+    const body = element("div", "p-body");
+    const cell = element("div", "p-cell p-wide");
+    body.append(cell);
+    this.key = element("div", "p-legend");
+    this.note = element("div", "p-note");
+    host.append(bar, body, this.key, this.note);
+    this.curves = new Curves(cell, app);
+    this.ask = latest(app, () => this.compute());
+    this.ask();
+  }
+
+  update(change: Change): void {
+    if (!change.touches("slots", "solo", "selection", `panels.${this.id}`, "panels.viewing", "display.theme")) return;
+    this.generation += 1;
+    this.ask();
+  }
+
+  refresh(what: "picture" | "reference" | "picked" | "theme"): void {
+    if (what === "picked" || what === "theme") this.update({ touches: () => true } as unknown as Change);
+  }
+
+  private async compute(): Promise<void> {
+    const { app } = this;
+    const generation = this.generation;
+    const { phi } = app.store.panel(this.id, DEFAULTS);
+    const channel = channelIn(app);
+    this.phi.show(phi);
+    this.channel.show(channel);
+    const models = overlaid(app);
+    const wo = MUS.flatMap((mu) => polar(Math.acos(mu), phi * RADIANS));
+    const estimates = new Map<Model, AlbedoEstimate>();
+    let shown = 0;
+    for (const model of models) {
+      if (!model.shader.manifest.functions.sample) continue;
+      estimates.set(
+        model,
+        await evaluatorOf(app).albedo(model.shader, model.values, wo, {
+          error: TARGET,
+          progress: (estimate) => {
+            estimates.set(model, estimate);
+            if (performance.now() - shown > 150 && generation === this.generation) {
+              this.draw(models, estimates, channel);
+              shown = performance.now();
+            }
+            return generation === this.generation;
+          },
+        }),
+      );
+      if (generation !== this.generation) return;
+    }
+    this.draw(models, estimates, channel);
+  }
+
+  private draw(models: Model[], estimates: Map<Model, AlbedoEstimate>, channel: Channel): void {
+    const { app } = this;
+    const text = app.cssColor("--text");
+    const series: Series[] = [{ label: "furnace, 1", color: text, values: MUS.map(() => 1), dashed: true, width: 1 }];
+    const bands: [number, number, string][] = [];
+    let highest = 1;
+    for (const model of models) {
+      const estimate = estimates.get(model);
+      if (!estimate) continue;
+      const mean = MUS.map((_, i) => channelOf(estimate.value, i, channel));
+      // Channels come from the same samples: their errors add linearly at most, weights sum to one.
+      const error = MUS.map((_, i) => channelOf(estimate.error, i, channel));
+      series.push({ label: `E ${model.letter}`, color: model.color, values: mean });
+      const at = series.length;
+      series.push({ label: `${model.letter} +2σ`, color: "transparent", values: mean.map((v, i) => v + 2 * (error[i] as number)), width: 0, edge: true });
+      series.push({ label: `${model.letter} −2σ`, color: "transparent", values: mean.map((v, i) => v - 2 * (error[i] as number)), width: 0, edge: true });
+      bands.push([at, at + 1, `color-mix(in srgb, ${model.color} 30%, transparent)`]);
+      highest = Math.max(highest, ...mean);
+    }
+    this.curves.show({
+      x: MUS,
+      series,
+      xTitle: "μo = cos θo",
+      yTitle: "E(μo)",
+      xRange: [0, 1],
+      y: [0, highest * 1.05],
+      bands,
+    });
+    legend(this.key, models, (model) => {
+      const estimate = estimates.get(model);
+      if (!estimate) return model.shader.manifest.functions.sample ? ": waiting" : ": the page holds no sample() of it";
+      const worst = estimate.error.reduce((a, b) => Math.max(a, b), 0);
+      const loss = Math.max(...MUS.map((_, i) => 1 - channelOf(estimate.value, i, channel)));
+      return `: standard error ≤ ${short(worst)} (${estimate.samples.toLocaleString("en")} samples a direction), largest loss ${short(Number(loss.toFixed(4)))}`;
+    });
+    this.note.textContent = `Mean weight of the emitted sample(), reflected and transmitted power, ${channel}; band: ± 2 standard errors. On the line, nothing is lost.`;
+  }
+}
+
+export const albedoPanel = new AlbedoPanel();

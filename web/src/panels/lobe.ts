@@ -1,0 +1,106 @@
+/** The lobe in 3-D at the clicked point: distance from the centre = f(wo, wi) |cos theta_i| in the direction wi. */
+import type { Vec3 } from "../data";
+import type { App, Panel } from "../panel";
+import type { Change } from "../state";
+import { channelOf, check, element, evaluatorOf, latest, legend, overlaid, select, short } from "./base";
+import { colorTable } from "./colormaps";
+import { type Lobe, lobeIndices, lobeOf, radius } from "./lobe_mesh";
+import { type Arrow, LobeView, type Surface } from "./lobe_view";
+import { channelIn, viewingTouched, ViewingControls, woOf } from "./viewing";
+
+const DECADES = 4;
+const DEFAULTS = { log: false, color: "auto" as "auto" | "model" | "value" };
+
+class LobePanel implements Panel {
+  readonly id = "lobe";
+  readonly title = "Lobe";
+  readonly doc = "The lobe in 3-D at the clicked point";
+  private app!: App;
+  private view!: LobeView;
+  private viewing!: ViewingControls;
+  private log!: ReturnType<typeof check>;
+  private color!: { show(value: "auto" | "model" | "value"): void };
+  private key!: HTMLElement;
+  private note!: HTMLElement;
+  private ask!: () => void;
+
+  mount(host: HTMLElement, app: App): void {
+    this.app = app;
+    host.classList.add("p-panel");
+    const bar = element("div", "p-bar");
+    this.viewing = new ViewingControls(bar, app);
+    this.log = check(bar, "log", `Length by the logarithm, ${DECADES} decades from the largest value down`, (log) => app.store.setPanel(this.id, { log }));
+    this.color = select(bar, "colour", "By model, or by value (viridis, the same scale as the length)", { auto: "auto", model: "by model", value: "by value" }, (color) =>
+      app.store.setPanel(this.id, { color }),
+    );
+    const body = element("div", "p-body p-lobe");
+    this.key = element("div", "p-legend");
+    this.note = element("div", "p-note");
+    host.append(bar, body, this.key, this.note);
+    this.view = new LobeView(body, lobeIndices());
+    this.ask = latest(app, () => this.compute());
+    this.ask();
+  }
+
+  update(change: Change): void {
+    if (viewingTouched(change) || change.touches(`panels.${this.id}`, "display.theme")) this.ask();
+  }
+
+  refresh(): void {
+    this.ask();
+  }
+
+  private async compute(): Promise<void> {
+    const { app } = this;
+    const { log, color } = app.store.panel(this.id, DEFAULTS);
+    const wo = woOf(app);
+    const channel = channelIn(app);
+    const models = overlaid(app);
+    this.viewing.show(models.some((m) => m.shader.manifest.transmits));
+    this.log.show(log);
+    this.color.show(color);
+    const lobes: Lobe[] = [];
+    for (const model of models) lobes.push(await lobeOf(evaluatorOf(app), model, wo, channel));
+    const peak = Math.max(...lobes.map((l) => l.peak), 0);
+    const byValue = color === "value" || (color === "auto" && lobes.length === 1);
+    const surfaces = lobes.map((lobe): Surface => {
+      const tint = rgb(lobe.model.color);
+      const table = colorTable("viridis");
+      const count = lobe.values.length / 3;
+      const vertices = new Float32Array(6 * count);
+      let size = 0;
+      for (let i = 0; i < count; i++) {
+        const r = radius(channelOf(lobe.values, i, channel), peak, log ? DECADES : null);
+        size += r;
+        const at = 4 * Math.round(255 * Math.min(1, r));
+        for (let c = 0; c < 3; c++) {
+          vertices[6 * i + c] = r * (lobe.directions[3 * i + c] as number);
+          vertices[6 * i + 3 + c] = byValue ? (table[at + c] as number) / 255 : (tint[c] as number);
+        }
+      }
+      return { vertices, alpha: lobes.length === 1 ? 1 : 0.6, size };
+    });
+    const ink = rgb(app.cssColor("--text"));
+    const arrows: Arrow[] = [
+      { direction: [0, 0, 1], color: ink, label: "n" },
+      { direction: [1, 0, 0], color: ink, label: "t" },
+      { direction: wo, color: rgb(app.cssColor("--accent")), label: "ωo" },
+    ];
+    this.view.show(surfaces, arrows, ink.map((v, i) => 0.5 * v + 0.25 * (i >= 0 ? 1 : 0)) as Vec3);
+    legend(this.key, models, (m) => `: largest ${short(lobes.find((l) => l.model === m)?.peak ?? 0)} 1/sr`);
+    const length = log ? `outer ring ${short(peak)} 1/sr, centre ${short(peak / 10 ** DECADES)} 1/sr and less (log)` : `outer ring ${short(peak)} 1/sr, centre 0`;
+    const delta = models.some((m) => m.shader.manifest.delta !== "never") ? " A delta lobe (mirror, smooth glass) has no finite length and is not drawn." : "";
+    this.note.textContent = peak > 0 ? `Length: f |cos θi|, ${channel}; ${length}.${delta}` : `No model scatters light from this ωo.${delta}`;
+  }
+}
+
+/** Any CSS colour as numbers 0 to 1, by asking the browser. */
+export function rgb(color: string): Vec3 {
+  const context = document.createElement("canvas").getContext("2d", { willReadFrequently: true }) as CanvasRenderingContext2D;
+  context.fillStyle = color || "#888";
+  context.fillRect(0, 0, 1, 1);
+  const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
+  return [(r as number) / 255, (g as number) / 255, (b as number) / 255];
+}
+
+export const lobePanel = new LobePanel();

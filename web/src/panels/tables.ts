@@ -1,0 +1,227 @@
+/** The tables that the shaders read, as pictures, with the float32 number of the texel under the pointer. */
+import { decodeFloats, type TableTexture } from "../data";
+import type { App, Panel } from "../panel";
+import type { Change } from "../state";
+import { check, element, exact, range, select, short, Sketch } from "./base";
+import { colorTable, css, paint } from "./colormaps";
+
+interface Table {
+  label: string;
+  size: number[];
+  channels: number;
+  /** What runs along x, y, z, where the page knows. */
+  axes: string[];
+  floats: Float32Array;
+}
+
+const DEFAULTS = { table: "", channel: 0, layer: 0, fixed: false };
+
+class TablesPanel implements Panel {
+  readonly id = "tables";
+  readonly title = "Tables";
+  readonly doc = "The precomputed tables as pictures, with a float read-out";
+  private app!: App;
+  private which!: ReturnType<typeof select<string>>;
+  private channel!: ReturnType<typeof select<string>>;
+  private layer!: ReturnType<typeof range>;
+  private layerHost!: HTMLElement;
+  private fixed!: ReturnType<typeof check>;
+  private sketch!: Sketch;
+  private read!: HTMLElement;
+  private note!: HTMLElement;
+  private tables = new Map<string, Table>();
+  private bitmap = document.createElement("canvas");
+  private span: [number, number] = [0, 1];
+  private current: { table: Table; channel: number; layer: number } | null = null;
+  private pointed: [number, number] | null = null;
+
+  mount(host: HTMLElement, app: App): void {
+    this.app = app;
+    host.classList.add("p-panel");
+    const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
+    const bar = element("div", "p-bar");
+    this.which = select<string>(bar, "table", "Every texture that a shader of the page reads", {}, (table) => set({ table, channel: 0, layer: 0 }));
+    this.channel = select<string>(bar, "component", "Tables may hold several numbers a texel", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
+    this.layer = range(bar, "layer", "Slice of a three-dimensional table", [0, 0, 1], "", (layer) => set({ layer }));
+    this.layerHost = bar.lastElementChild as HTMLElement;
+    this.fixed = check(bar, "0 to 1", "Colours from 0 to 1 instead of from the smallest to the largest value", (fixed) => set({ fixed }));
+    const body = element("div", "p-body");
+    const cell = element("div", "p-cell p-wide");
+    body.append(cell);
+    this.read = element("div", "p-read");
+    this.note = element("div", "p-note");
+    host.append(bar, body, this.read, this.note);
+    this.sketch = new Sketch(cell, (context, width, height) => this.draw(context, width, height));
+    const point = (event: PointerEvent) => this.point(event);
+    this.sketch.canvas.addEventListener("pointermove", point);
+    this.sketch.canvas.addEventListener("pointerdown", point);
+    this.sketch.canvas.addEventListener("pointerleave", () => {
+      this.pointed = null;
+      this.show();
+    });
+    this.show();
+  }
+
+  update(change: Change): void {
+    if (change.touches("slots", "solo", `panels.${this.id}`, "display.theme")) this.show();
+  }
+
+  refresh(what: string): void {
+    if (what === "theme") this.show();
+  }
+
+  /** All tables of the shown models, then the split sum's; the floats are decoded once. */
+  private collect(): void {
+    const wanted = new Map<string, () => Table>();
+    for (const slot of this.app.visibleSlots()) {
+      const { key, manifest, variant, material } = this.app.shaderOf(slot);
+      for (const texture of manifest.textures) {
+        const data = variant.tables[texture.uniform];
+        if (data === undefined) continue;
+        const axes = (texture as TableTexture & { axes?: string[] }).axes ?? [];
+        wanted.set(`${key}/${texture.uniform}`, () => ({
+          label: `${material.title}: ${texture.uniform}`,
+          size: texture.size,
+          channels: texture.channels,
+          axes,
+          floats: decodeFloats(data),
+        }));
+      }
+    }
+    const { dfg } = this.app.data;
+    if (dfg) wanted.set("dfg", () => ({ label: "split sum (A, B)", size: dfg.size, channels: dfg.channels, axes: ["μ", "roughness"], floats: decodeFloats(dfg.data) }));
+    this.tables = new Map([...wanted].map(([key, make]) => [key, this.tables.get(key) ?? make()]));
+  }
+
+  private show(): void {
+    this.collect();
+    const settings = this.app.store.panel(this.id, DEFAULTS);
+    const key = this.tables.has(settings.table) ? settings.table : ([...this.tables.keys()][0] ?? "");
+    const table = this.tables.get(key);
+    this.which.options(Object.fromEntries([...this.tables].map(([k, t]) => [k, t.label])));
+    this.which.show(key);
+    this.fixed.show(settings.fixed);
+    if (!table) {
+      this.current = null;
+      this.read.textContent = "";
+      this.note.textContent = "The shown models read no table: all their values are computed where they are needed.";
+      this.layerHost.hidden = true;
+      this.sketch.redraw();
+      return;
+    }
+    const [width, height = 1, depth = 1] = table.size as [number, number?, number?];
+    const channel = Math.min(settings.channel, table.channels - 1);
+    const layer = Math.min(settings.layer, depth - 1);
+    this.channel.options(Object.fromEntries(Array.from({ length: table.channels }, (_, i) => [String(i), String(i)])));
+    this.channel.show(String(channel));
+    this.channel.enable(table.channels > 1);
+    this.layerHost.hidden = depth === 1;
+    this.layer.limits(0, depth - 1);
+    this.layer.show(layer);
+    const plane = Float32Array.from({ length: width * height }, (_, i) => table.floats[(layer * width * height + i) * table.channels + channel] as number);
+    const [low, high] = plane.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity] as [number, number]);
+    this.span = settings.fixed ? [0, 1] : low === high ? [low - 0.5, high + 0.5] : [low, high];
+    // Row 0 of a texture is its smallest y: shown at the bottom, as an axis wants it.
+    const flipped = new Float32Array(plane.length);
+    for (let y = 0; y < height; y++) flipped.set(plane.subarray(y * width, (y + 1) * width), (height - 1 - y) * width);
+    Object.assign(this.bitmap, { width, height });
+    (this.bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(paint(flipped, width, height, "viridis", ...this.span), 0, 0);
+    this.current = { table, channel, layer };
+    this.note.textContent = `${table.size.join(" × ")} texels of ${table.channels} float32; this picture: smallest ${exact(low)}, largest ${exact(high)}. Axes count texel centres from 0 to 1.`;
+    this.write();
+    this.sketch.redraw();
+  }
+
+  private box(width: number, height: number): { x: number; y: number; w: number; h: number } {
+    const [columns, lines = 1] = (this.current as NonNullable<typeof this.current>).table.size as [number, number?];
+    const room = { w: Math.max(20, width - 150), h: Math.max(16, height - 46) };
+    // Texels are square where that leaves a picture worth looking at; a table of one row is drawn as a thick bar.
+    const scale = Math.min(room.w / columns, room.h / lines);
+    const [w, h] = [Math.max(columns * scale, Math.min(room.w, 120)), Math.max(lines * scale, Math.min(room.h, 40))];
+    return { x: 56 + (room.w - w) / 2, y: 8, w, h };
+  }
+
+  private draw(context: CanvasRenderingContext2D, width: number, height: number): void {
+    if (!this.current) return;
+    const { table } = this.current;
+    const { x, y, w, h } = this.box(width, height);
+    const text = this.app.cssColor("--text");
+    context.imageSmoothingEnabled = false;
+    context.drawImage(this.bitmap, x, y, w, h);
+    context.strokeStyle = this.app.cssColor("--line");
+    context.strokeRect(x, y, w, h);
+    context.fillStyle = text;
+    context.font = "11px system-ui, sans-serif";
+    const [columns, lines = 1] = table.size as [number, number?];
+    for (const t of [0, 0.5, 1]) {
+      context.textBaseline = "top";
+      context.textAlign = "center";
+      context.fillText(short(t), x + t * w, y + h + 4);
+      if (lines > 1) {
+        context.textBaseline = "middle";
+        context.textAlign = "right";
+        context.fillText(short(t), x - 5, y + h - t * h);
+      }
+    }
+    context.textBaseline = "top";
+    context.textAlign = "center";
+    context.fillText(`${table.axes[0] ?? "x"} (${columns})`, x + w / 2, y + h + 19);
+    if (lines > 1) {
+      context.save();
+      context.translate(x - 44, y + h / 2);
+      context.rotate(-Math.PI / 2);
+      context.fillText(`${table.axes[1] ?? "y"} (${lines})`, 0, 0);
+      context.restore();
+    }
+    colorBar(context, x + w + 14, y, Math.max(h, 60), this.span, text);
+    if (this.pointed) {
+      const [i, j] = this.pointed;
+      context.strokeStyle = this.app.cssColor("--accent");
+      context.lineWidth = 2;
+      context.strokeRect(x + (i / columns) * w - 1, y + h - ((j + 1) / lines) * h - 1, w / columns + 2, h / lines + 2);
+    }
+  }
+
+  private point(event: PointerEvent): void {
+    if (!this.current) return;
+    const bounds = this.sketch.canvas.getBoundingClientRect();
+    const { x, y, w, h } = this.box(bounds.width, bounds.height);
+    const [columns, lines = 1] = this.current.table.size as [number, number?];
+    const i = Math.floor(((event.clientX - bounds.left - x) / w) * columns);
+    const j = Math.floor((1 - (event.clientY - bounds.top - y) / h) * lines);
+    this.pointed = i >= 0 && j >= 0 && i < columns && j < lines ? [i, j] : null;
+    this.write();
+    this.sketch.redraw();
+  }
+
+  private write(): void {
+    if (!this.current || !this.pointed) {
+      this.read.textContent = "Point at the picture to read a texel.";
+      return;
+    }
+    const { table, layer } = this.current;
+    const [i, j] = this.pointed;
+    const [columns, lines = 1, depth = 1] = table.size as [number, number?, number?];
+    const at = ((layer * lines + j) * columns + i) * table.channels;
+    const numbers = Array.from(table.floats.subarray(at, at + table.channels), exact);
+    const place = [`${table.axes[0] ?? "x"} ${short((i + 0.5) / columns)}`, ...(lines > 1 ? [`${table.axes[1] ?? "y"} ${short((j + 0.5) / lines)}`] : [])];
+    this.read.textContent = `texel (${[i, j, ...(depth > 1 ? [layer] : [])].join(", ")}), ${place.join(", ")}: ${numbers.join("  ")}`;
+  }
+}
+
+/** A vertical viridis bar with its two ends written beside it. */
+export function colorBar(context: CanvasRenderingContext2D, x: number, y: number, height: number, [low, high]: [number, number], text: string): void {
+  const table = colorTable("viridis");
+  const gradient = context.createLinearGradient(0, y + height, 0, y);
+  for (let i = 0; i <= 16; i++) gradient.addColorStop(i / 16, css(table, i / 16));
+  context.fillStyle = gradient;
+  context.fillRect(x, y, 12, height);
+  context.fillStyle = text;
+  context.textAlign = "left";
+  context.textBaseline = "top";
+  context.fillText(short(high), x + 17, y);
+  context.textBaseline = "bottom";
+  context.fillText(short(low), x + 17, y + height);
+}
+
+export const tablesPanel = new TablesPanel();
