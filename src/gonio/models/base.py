@@ -343,16 +343,20 @@ class BSDF:
 
     def bind(self, convert: Callable[[Parameter, Any], Any]) -> Any:
         """A copy whose numeric parameters are what `convert(parameter, value)` makes of them, inner materials too."""
-        clone = object.__new__(type(self))
-        clone.__dict__.update(self.__dict__)
-        clone.__dict__["_bound"] = True
-        clone.__dict__.pop("_kept", None)
+        values = {}
         for parameter in self.parameters().values():
             value = getattr(self, parameter.name)
             if parameter.kind == "bsdf":
-                clone.__dict__[parameter.name] = value.bind(convert)
+                values[parameter.name] = value.bind(convert)
             elif parameter.numeric:
-                clone.__dict__[parameter.name] = convert(parameter, value)
+                values[parameter.name] = convert(parameter, value)
+        return self.bound(values)
+
+    def bound(self, values: dict[str, Any]) -> Any:
+        """A copy with these bound values: every numeric parameter's, and the inner materials'."""
+        clone = object.__new__(type(self))
+        clone.__dict__.update(self.__dict__, _bound=True, **values)
+        clone.__dict__.pop("_kept", None)
         return clone
 
     def symbols(self) -> Any:

@@ -43,42 +43,42 @@ class Conductor(BSDF):
             return self.albedo * fresnel.schlick(cos_theta, fresnel.r0_conductor(self.eta, self.k))
         return self.albedo * fresnel.conductor(cos_theta, self.eta, self.k)
 
+    def _facet(self, wo: Any, wi: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all
+        along the axes of the anisotropy; turned last, as wo + wi would cancel with the rounding of the turn."""
+        m = frame.half_vector(wo, wi)
+        alpha, smooth = microfacet.widths(self.alpha)
+        wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
+        return wo, wi, m, alpha, _above(wo, wi) & ~smooth
+
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """albedo F D G / (4 cos theta_o); 0 where alpha makes it a mirror."""
-        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
-        alpha, smooth = microfacet.widths(self.alpha)
-        m = frame.half_vector(wo, wi)
-        facets = microfacet.reflection(self, wo, wi, m, alpha)
-        return self.reflectance(abs(dot(wo, m))) * where(_above(wo, wi) & ~smooth, facets, 0.0)
+        wo, wi, m, alpha, lit = self._facet(wo, wi)
+        return self.reflectance(abs(dot(wo, m))) * where(lit, microfacet.reflection(self, wo, wi, m, alpha), 0.0)
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         """Density of the sampled normal over 4 (o.m) (Walter2007, eq. 14)."""
-        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
-        alpha, smooth = microfacet.widths(self.alpha)
-        m = frame.half_vector(wo, wi)
-        density = safe_div(microfacet.normal_pdf(self, wo, m, alpha), 4.0 * abs(dot(wo, m)))
-        return where(_above(wo, wi) & ~smooth, density, 0.0)
+        wo, wi, m, alpha, lit = self._facet(wo, wi)
+        return where(lit, 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha), 0.0)
 
     def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
         """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
-        wo = frame.rotate(wo, self.rotation)
         alpha, smooth = microfacet.widths(self.alpha)
-        m = microfacet.sample_normal(self, wo, u.y, u.z, alpha)
-        m = where(smooth, frame.upright(wo), m)
-        wi = frame.reflect(wo, m)
-        cos_m = abs(dot(wo, m))
-        above = _above(wo, wi)
-        pdf = safe_div(microfacet.normal_pdf(self, wo, m, alpha), 4.0 * cos_m)
-        pdf = where(above, where(smooth, 1.0, pdf), 0.0)
-        facets = where(smooth, 1.0, safe_div(microfacet.reflection(self, wo, wi, m, alpha), pdf))
-        weight = self.reflectance(cos_m) * where(pdf > 0.0, facets, 0.0)
-        return Sample(frame.rotate_back(wi, self.rotation), weight, pdf, smooth & above, 1.0 + 0.0 * pdf)
+        turned = frame.rotate(wo, self.rotation)
+        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
+        wi = frame.rotate_back(frame.reflect(turned, m), self.rotation)
+        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        wo, turned, m, alpha, lit = self._facet(wo, wi)
+        density = 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha)
+        facets = where(lit, safe_div(microfacet.reflection(self, wo, turned, m, alpha), density), 0.0)
+        mirrors = smooth & _above(wo, turned)
+        weight = self.reflectance(abs(dot(wo, m))) * where(mirrors, 1.0, facets)
+        pdf = where(mirrors, 1.0, where(lit, density, 0.0))
+        return Sample(wi, weight, pdf, mirrors, 1.0 + 0.0 * pdf)
 
     def terms(self, wo: Any, wi: Any) -> microfacet.Terms:
         """D, G and F of the pair; eval is F D G / (4 cos theta_o)."""
-        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
-        alpha, _ = microfacet.widths(self.alpha)
-        m = frame.half_vector(wo, wi)
+        wo, wi, m, alpha, _ = self._facet(wo, wi)
         ndf = distribution(self.ndf)
         g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
         return microfacet.Terms(ndf.D(m, alpha), g, self.reflectance(abs(dot(wo, m))))

@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..ops import abs, backend, dot, function, maximum, norm, safe_div, sqr, where
+from ..ops import abs, backend, dot, function, maximum, rsqrt, safe_div, sqr, where
 from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet
 from .base import BSDF, Sample, Value, angle, choice, flag, number, spectrum, width
+
+
+class _Facet(NamedTuple):
+    """What joins a pair of directions.
+
+    wo, wi        the pair, in the frame of the widths
+    m             normal of the facet, m.z >= 0
+    dot_o, dot_i  o.m and i.m
+    reflects      whether wi lies on wo's side
+    lit           whether a rough lobe joins them
+    alpha         widths
+    spread        |o.m| dm/dwi (Walter2007, eq. 14), in refraction (eq. 17) over eta^2
+    """
+
+    wo: Any
+    wi: Any
+    m: Any
+    dot_o: Any
+    dot_i: Any
+    reflects: Any
+    lit: Any
+    alpha: Any
+    spread: Any
 
 
 class Dielectric(BSDF):
@@ -60,108 +83,112 @@ class Dielectric(BSDF):
         """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
         h = wo + wi * ratio
-        h = h * (1.0 / maximum(norm(h), 1e-15))
+        h = h * rsqrt(maximum(dot(h, h), frame.TINY))
         return where(h.z < 0.0, -h, h)
 
-    def _terms(self, wo: Any, wi: Any, m: Any, eta: Any, alpha: Any) -> tuple[Any, Any, Any]:
-        """(D G / |o.n|, |o.m| dm/dwi over `_squeeze`, F) for the pair: what eval, pdf and the weight are made of."""
-        ndf = distribution(self.ndf)
-        reflects = wo.z * wi.z > 0.0
+    def _facet(self, wo: Any, wi: Any, eta: Any) -> _Facet:
+        """The facet that joins a pair of directions, along the axes of the anisotropy; turned last, see `Conductor`."""
+        m = self._normal(wo, wi, eta)
+        wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
+        alpha, smooth = self._widths()
         dot_o, dot_i = dot(wo, m), dot(wi, m)
-        # the far direction of a refraction is known: Snell's root would lose its cosine near the critical angle
-        cos_t = where(reflects, fresnel.cos_transmitted(abs(dot_o), eta), abs(dot_i))
-        f = self.reflectance(abs(dot_o), cos_t, eta)
-        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
+        reflects = wo.z * wi.z > 0.0
         spread = 0.25 + 0.0 * dot_o
         if self.transmission:
-            g_through = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha, transmits=True)
-            g = where(reflects, g, g_through)
-            # Walter2007, eq. 17 (eq. 14 for reflection), times |o.m| / eta^2
-            spread = where(reflects, spread, safe_div(abs(dot_i * dot_o), sqr(dot_o + eta * dot_i)))
-        return safe_div(ndf.D(m, alpha) * g, abs(wo.z)), spread, f
+            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which keeps its digits where eta is near 1
+            thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
+            spread = where(reflects, spread, abs(dot_i * dot_o) * thinned)
+        # a facet seen from its back, or one that would refract into the wrong side, is never sampled
+        lit = (dot_o * wo.z > 0.0) & (dot_i * wi.z > 0.0) & ~smooth
+        if not self.transmission:
+            lit = lit & reflects
+        return _Facet(wo, wi, m, dot_o, dot_i, reflects, lit, alpha, spread)
+
+    def _reflectance_at(self, facet: _Facet, eta: Any) -> Any:
+        """F of the facet."""
+        cos_o = abs(facet.dot_o)
+        # the far direction of a refraction is known: Snell's root would lose its cosine near the critical angle
+        cos_t = where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), abs(facet.dot_i))
+        return self.reflectance(cos_o, cos_t, eta)
+
+    def _masking(self, facet: _Facet) -> Any:
+        """G of the facet."""
+        pair = self.masking, distribution(self.ndf), facet.wo, facet.wi, facet.m, facet.alpha
+        g = masking.masking_shadowing(*pair)
+        if self.transmission:
+            g = where(facet.reflects, g, masking.masking_shadowing(*pair, transmits=True))
+        return g
+
+    def _value(self, facet: _Facet) -> Any:
+        """Radiance's eval without albedo and F."""
+        facets = safe_div(distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet), abs(facet.wo.z))
+        return where(facet.lit, facets * facet.spread, 0.0)
+
+    def _density(self, facet: _Facet, eta: Any) -> Any:
+        """The pdf without the probability of the lobe: density of the normal times dm/dwi."""
+        density = microfacet.pdf_per_cosine(self, facet.wo, facet.m, facet.alpha)
+        return where(facet.lit, density * facet.spread * self._squeeze(facet.reflects, eta), 0.0)
+
+    def _squeeze(self, reflects: Any, eta: Any) -> Any:
+        """eta^2 for refraction: by how much solid angle shrinks on its way in, and radiance grows."""
+        return where(reflects, 1.0, sqr(eta))
 
     def _share(self, f: Any) -> Any:
         """Probability of choosing reflection."""
         return f if self.transmission else 1.0 + 0.0 * f
 
-    def _squeeze(self, reflects: Any, eta: Any) -> Any:
-        """eta^2 for transmission: by how much solid angle shrinks on its way in, and radiance grows."""
-        return where(reflects, 1.0, sqr(eta))
-
-    def _carried(self, reflects: Any, eta: Any, mode: str) -> Any:
-        """Factor of the quantity that is carried: the eta^2 of the Jacobian cancels for radiance."""
-        return self._squeeze(reflects, eta) if mode == "importance" else 1.0
-
-    def _live(self, wo: Any, wi: Any) -> Any:
-        """Whether the pair can be joined by a rough lobe at all."""
-        return (wo.z * wi.z != 0.0) if self.transmission else (wo.z * wi.z > 0.0)
-
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """The sum of both lobes times |cos theta_i|; 0 where alpha makes them deltas."""
-        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
-        alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
-        m = self._normal(wo, wi, eta)
-        facets, spread, f = self._terms(wo, wi, m, eta, alpha)
-        reflects = wo.z * wi.z > 0.0
-        share = where(reflects, f, 1.0 - f) * self._carried(reflects, eta, mode)
-        return self.albedo * where(self._live(wo, wi) & ~smooth, facets * spread * share, 0.0)
+        facet = self._facet(wo, wi, eta)
+        f = self._reflectance_at(facet, eta)
+        value = self._value(facet) * where(facet.reflects, f, 1.0 - f)
+        # the eta^2 of the Jacobian cancels for radiance
+        return self.albedo * (value * self._squeeze(facet.reflects, eta) if mode == "importance" else value)
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         """Probability of the lobe, times the density of the normal, times dm/dwi."""
-        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
-        alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
-        m = self._normal(wo, wi, eta)
-        _, spread, f = self._terms(wo, wi, m, eta, alpha)
-        reflects = wo.z * wi.z > 0.0
-        share = where(reflects, self._share(f), 1.0 - self._share(f)) * self._squeeze(reflects, eta)
-        # a facet seen from its back, or one that would refract into the wrong side, is never sampled
-        seen = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
-        density = safe_div(share * microfacet.normal_pdf(self, wo, m, alpha) * spread, abs(dot(wo, m)))
-        return where(self._live(wo, wi) & seen & ~smooth, density, 0.0)
-
-    def terms(self, wo: Any, wi: Any) -> microfacet.Terms:
-        """D, G and F of the pair, at the normal that reflects or refracts wo into wi."""
-        wo, wi = frame.rotate(wo, self.rotation), frame.rotate(wi, self.rotation)
-        alpha, _ = self._widths()
-        eta = self._relative_eta(wo)
-        m = self._normal(wo, wi, eta)
-        ndf = distribution(self.ndf)
-        reflects = wo.z * wi.z > 0.0
-        cos_t = where(reflects, fresnel.cos_transmitted(abs(dot(wo, m)), eta), abs(dot(wi, m)))
-        f = self.reflectance(abs(dot(wo, m)), cos_t, eta)
-        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
-        if self.transmission:
-            g = where(reflects, g, masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha, transmits=True))
-        return microfacet.Terms(ndf.D(m, alpha), g, self.albedo * f)
+        facet = self._facet(wo, wi, eta)
+        share = self._share(self._reflectance_at(facet, eta))
+        return self._density(facet, eta) * where(facet.reflects, share, 1.0 - share)
 
     def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
         """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
-        wo = frame.rotate(wo, self.rotation)
+        turned = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
-        m = microfacet.sample_normal(self, wo, u.y, u.z, alpha)
-        m = where(smooth, frame.upright(wo), m)
-        # a facet faces the side of wo
-        facing = where(wo.z < 0.0, -m, m)
-        cos_o = abs(dot(wo, facing))
+        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
+        facing = where(wo.z < 0.0, -m, m)  # a facet faces the side of wo
+        cos_o = abs(dot(turned, facing))
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         f = self.reflectance(cos_o, cos_t, eta)
         share = self._share(f)
         reflects = u.x < share
-        wi = where(reflects, frame.reflect(wo, facing), frame.refract(wo, facing, cos_t, eta))
-        facets, spread, _ = self._terms(wo, wi, m, eta, alpha)
+        wi = where(reflects, frame.reflect(turned, facing), frame.refract(turned, facing, cos_t, eta))
+        wi = frame.rotate_back(wi, self.rotation)
+        right_side = where(reflects, wo.z * wi.z > 0.0, wo.z * wi.z < 0.0)
+        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        facet = self._facet(wo, wi, eta)
+        squeeze = self._squeeze(reflects, eta)
+        value = where(smooth, 1.0 / squeeze, self._value(facet))
+        density = where(smooth, 1.0, self._density(facet, eta))
+        if mode == "importance":
+            value = value * squeeze
         chance = where(reflects, share, 1.0 - share)
-        right_side = where(reflects, wo.z * wi.z > 0.0, wo.z * wi.z < 0.0) & (dot(wo, facing) > 0.0)
-        density = safe_div(microfacet.normal_pdf(self, wo, m, alpha) * spread * self._squeeze(reflects, eta), cos_o)
-        pdf = chance * where(smooth, 1.0, density)
-        pdf = where(right_side, pdf, 0.0)
-        ideal = 1.0 if mode == "importance" else 1.0 / self._squeeze(reflects, eta)
-        value = where(smooth, ideal, facets * spread * self._carried(reflects, eta, mode)) * where(reflects, f, 1.0 - f)
-        weight = self.albedo * where(pdf > 0.0, safe_div(value, pdf), 0.0)
-        relative = where(reflects, 1.0, eta)
-        return Sample(frame.rotate_back(wi, self.rotation), weight, pdf, smooth & right_side, relative)
+        pdf = where(right_side, chance * density, 0.0)
+        weight = safe_div(value, density)
+        if not self.transmission:  # else F cancels against the probability of the lobe
+            weight = weight * self._reflectance_at(facet, eta)
+        weight = self.albedo * where(pdf > 0.0, weight, 0.0)
+        return Sample(wi, weight, pdf, smooth & right_side, where(reflects, 1.0, eta))
+
+    def terms(self, wo: Any, wi: Any) -> microfacet.Terms:
+        """D, G and F of the pair, at the normal that reflects or refracts wo into wi."""
+        eta = self._relative_eta(wo)
+        facet = self._facet(wo, wi, eta)
+        f = self.albedo * self._reflectance_at(facet, eta)
+        return microfacet.Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
     def _widths(self) -> tuple[Any, Any]:
         """Widths, and whether the surface is smooth; where both indices are equal light goes straight on."""

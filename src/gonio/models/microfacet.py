@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..ops import abs, backend, function, maximum, vec2, where
+from ..ops import abs, backend, dot, function, maximum, safe_div, vec2, where
 from ..optics import masking
 from ..optics.ndf import distribution, distributions
 
@@ -77,14 +77,14 @@ def sample_normal(model: Any, wo: Any, u1: Any, u2: Any, alpha: Any) -> Any:
 
 
 @function
-def normal_pdf(model: Any, wo: Any, m: Any, alpha: Any) -> Any:
-    """Density of `sample_normal`, 1/sr."""
+def pdf_per_cosine(model: Any, wo: Any, m: Any, alpha: Any) -> Any:
+    """Density of `sample_normal` over |o.m|, 1/sr: the cosine cancels in dm/dwi (Walter2007, eq. 14 and 17)."""
     ndf = distribution(model.ndf)
     if model.sampling == "normals":
-        return ndf.pdf(m, alpha)
+        return safe_div(ndf.pdf(m, alpha), abs(dot(wo, m)))
     if _bounded(model):
-        return ndf.pdf_bounded(upper(wo), m, alpha)
-    return ndf.pdf_visible(wo, m, alpha)
+        return ndf.bounded_per_cosine(upper(wo), m, alpha)
+    return ndf.visible_per_cosine(wo, m, alpha)
 
 
 @function
@@ -92,5 +92,4 @@ def reflection(model: Any, wo: Any, wi: Any, m: Any, alpha: Any) -> Any:
     """D G / (4 |cos theta_o|): the microfacet BRDF without F, times |cos theta_i|."""
     ndf = distribution(model.ndf)
     g = masking.masking_shadowing(model.masking, ndf, wo, wi, m, alpha)
-    cos_o = abs(wo.z)
-    return where(cos_o > 0.0, g * ndf.D(m, alpha) / (4.0 * where(cos_o > 0.0, cos_o, 1.0)), 0.0)
+    return safe_div(g * ndf.D(m, alpha), 4.0 * abs(wo.z))

@@ -57,6 +57,7 @@ __all__ = [
     "pi",
     "pow",
     "record",
+    "rsqrt",
     "safe_div",
     "safe_sqrt",
     "set_precision",
@@ -186,18 +187,28 @@ def clamp(x: Any, low: Any, high: Any) -> Any:
     return minimum(maximum(x, low), high)
 
 
+def rsqrt(x: Any) -> Any:
+    """1 / sqrt(x); in float32 by the processor's estimate and a step of Newton's method, within 2 units."""
+    return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
+
+
+def _guarded(mask: Any, x: Any) -> Any:
+    """x where the mask holds, else 1: what a branch that is not chosen may take the gradient of."""
+    return where(mask, x, 1.0) if not is_drjit(x) or drjit().grad_enabled(x) else x
+
+
 @function
 def safe_sqrt(x: Any) -> Any:
     """sqrt(max(x, 0)), with gradient 0 instead of infinity where x <= 0."""
     positive = x > 0.0
-    return where(positive, sqrt(where(positive, x, 1.0)), 0.0)
+    return where(positive, sqrt(_guarded(positive, x)), 0.0)
 
 
 @function
 def safe_div(a: Any, b: Any) -> Any:
     """a / b, and 0 where b = 0."""
-    zero = b == 0.0
-    return where(zero, 0.0, a / where(zero, 1.0, b))
+    some = b != 0.0
+    return where(some, a / _guarded(some, b), 0.0)
 
 
 def vec2(x: Any, y: Any) -> Any:
@@ -236,7 +247,7 @@ def norm(v: Any) -> Any:
 @function
 def normalize(v: Any) -> Any:
     """v / |v|; v must not be 0."""
-    return v * (1.0 / norm(v))
+    return v * rsqrt(dot(v, v))
 
 
 def mean(spectrum: Any) -> Any:

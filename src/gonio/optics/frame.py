@@ -61,7 +61,7 @@ def half_vector(wo: Any, wi: Any) -> Any:
     """Normal of the facet that mirrors wo into wi, unit; z where wo = -wi, which no facet above does."""
     h = wo + wi
     length2 = dot(h, h)
-    return h * (1.0 / ops.sqrt(ops.maximum(length2, TINY)))
+    return h * ops.rsqrt(ops.maximum(length2, TINY))
 
 
 # The smallest normal float32 is 1.2e-38; its root, squared again, must not vanish in a quotient.

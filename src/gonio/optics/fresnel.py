@@ -20,40 +20,52 @@ KINDS = {
 
 @function
 def cos_transmitted(cos_i: Any, eta: Any) -> Any:
-    """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle."""
-    return safe_sqrt(1.0 - (1.0 - sqr(cos_i)) / sqr(eta))
+    """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle.
+
+    1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels nowhere but at the critical angle.
+    """
+    return safe_sqrt((eta - 1.0) * (eta + 1.0) + sqr(cos_i)) / eta
 
 
 @function
 def dielectric(cos_i: Any, cos_t: Any, eta: Any) -> Any:
-    """Exact reflectance of a dielectric: mean of the s and p polarized ones; 1 where cos_t = 0 (total reflection)."""
-    s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t)
-    p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t)
-    reflectance = 0.5 * (sqr(s) + sqr(p))
-    # cos_i = cos_t = 0 is grazing: 0/0 above
-    return ops.where(cos_t > 0.0, reflectance, 1.0)
+    """Exact reflectance of a dielectric: mean of the s and p polarized ones; 1 where cos_t = 0 (total reflection).
+
+    With q = eta cos_t:  r_s = (cos_i - q) / (cos_i + q),  r_p = (eta^2 cos_i - q) / (eta^2 cos_i + q), both multiplied
+    above and below by the denominator: by Snell's law (cos_i - q)(cos_i + q) = 1 - eta^2, which keeps its digits where
+    eta is near 1, and likewise (eta^2 cos_i - q)(eta^2 cos_i + q) = (eta^2 - 1)((eta^2 + 1) cos_i^2 - 1).
+    """
+    q, eta2 = eta * cos_t, sqr(eta)
+    under_s, under_p = cos_i + q, eta2 * cos_i + q
+    # one division for both; with cos_t over 1e-15 the product stays far above float32's smallest number
+    over = 1.0 / (under_s * under_p)
+    step = (eta - 1.0) * (eta + 1.0)
+    r_s = step * sqr(under_p * over)
+    r_p = step * ((eta2 + 1.0) * sqr(cos_i) - 1.0) * sqr(under_s * over)
+    return ops.where(cos_t > 1e-15, 0.5 * (sqr(r_s) + sqr(r_p)), 1.0)
 
 
 @function
 def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     """Exact reflectance of a conductor with complex index eta + i k (Born1999, ch. 14).
 
-    With sin^2 = s, cos^2 = c:  t = eta^2 - k^2 - s,  a^2 + b^2 = sqrt(t^2 + 4 eta^2 k^2),  a^2 = (a^2 + b^2 + t) / 2,
-    R_s = (a^2 + b^2 + c - 2 a cos) / (a^2 + b^2 + c + 2 a cos),
-    R_p = R_s (c (a^2 + b^2) + s^2 - 2 a cos s) / (c (a^2 + b^2) + s^2 + 2 a cos s).
+    With n = eta + i k, sin^2 = s, cos^2 = c and w = a + i b = sqrt(n^2 - s):  t = eta^2 - k^2 - s,
+    a^2 + b^2 = sqrt(t^2 + 4 eta^2 k^2),  a^2 = (a^2 + b^2 + t) / 2,
+    R_s = |cos - w|^2 / |cos + w|^2 = |n^2 - 1|^2 / |cos + w|^4, as cos^2 - w^2 = 1 - n^2: nothing cancels,
+    R_p / R_s = (c (a^2 + b^2) + s^2 - 2 a cos s) / (c (a^2 + b^2) + s^2 + 2 a cos s).
     """
     cos2 = sqr(cos_i)
     sin2 = 1.0 - cos2
     t = sqr(eta) - sqr(k) - sin2
     a2_b2 = sqrt(sqr(t) + 4.0 * sqr(eta * k))
     a = safe_sqrt(0.5 * (a2_b2 + t))
-    s1 = a2_b2 + cos2
-    s2 = 2.0 * cos_i * a
+    sum2 = a2_b2 + cos2 + 2.0 * cos_i * a
+    contrast = (sqr(eta - 1.0) + sqr(k)) * (sqr(eta + 1.0) + sqr(k))
     p1 = cos2 * a2_b2 + sqr(sin2)
-    p2 = s2 * sin2
+    p2 = 2.0 * cos_i * a * sin2
     # one division for both: R_s (1 + R_p / R_s) / 2; 0/0 is index 0 at normal incidence, which reflects all
-    below = (s1 + s2) * (p1 + p2)
-    return ops.where(below > 0.0, (s1 - s2) * p1 / ops.where(below > 0.0, below, 1.0), 1.0)
+    below = sqr(sum2) * (p1 + p2)
+    return ops.where(below > 0.0, contrast * p1 / ops.where(below > 0.0, below, 1.0), 1.0)
 
 
 @function

@@ -285,12 +285,12 @@ def _adapter_class(mi: ModuleType) -> type:
                     found[name] = ops.vec2(*reversed(ops.sincos(got[name]))) if got else None
                 else:
                     found[name] = got[name]
-            bound = self.model.bind(lambda parameter, value: found.get(parameter.name))
             for name, child in self.inner.items():
                 own = isinstance(child, GonioBSDF)
-                bound.__dict__[name] = child.at(si, active, inner=True) if own else Foreign(child, si, active)
+                found[name] = child.at(si, active, inner=True) if own else Foreign(child, si, active)
             if self.settled is not None:
-                bound.__dict__["_settled"] = self.settled
+                found["_settled"] = self.settled
+            bound = self.model.bound(found)
             if self.two_sided and not inner:
                 wrapped = object.__new__(TwoSided)
                 wrapped.__dict__.update(base=bound, _bound=True)

@@ -52,11 +52,11 @@ class NDF:
 
     def pdf_visible(self, v: Any, m: Any, alpha: Any) -> Any:
         """Density of `sample_visible`."""
-        return self.pdf(m, alpha)
+        return abs(dot(v, m)) * self.visible_per_cosine(v, m, alpha)
 
-    def visible_density(self, v: Any, m: Any, alpha: Any) -> Any:
-        """Density of visible normals, G1(v) |v.m| D(m) / |v.z| (Heitz2014b)."""
-        return safe_div(self.G1(v, alpha) * abs(dot(v, m)) * self.D(m, alpha), abs(v.z))
+    def visible_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
+        """`pdf_visible` over |v.m|: the cosine cancels in the density of what is mirrored at m (Walter2007, eq. 14)."""
+        return safe_div(self.pdf(m, alpha), abs(dot(v, m)))
 
     def sample_bounded(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
         """A visible normal whose reflection is less likely to fall below the surface; else `sample_visible`."""
@@ -64,4 +64,8 @@ class NDF:
 
     def pdf_bounded(self, v: Any, m: Any, alpha: Any) -> Any:
         """Density of `sample_bounded`."""
-        return self.pdf_visible(v, m, alpha)
+        return abs(dot(v, m)) * self.bounded_per_cosine(v, m, alpha)
+
+    def bounded_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
+        """`pdf_bounded` over |v.m|."""
+        return self.visible_per_cosine(v, m, alpha)

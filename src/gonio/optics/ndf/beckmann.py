@@ -9,8 +9,10 @@ from ...ops import (
     abs,
     atan2,
     clamp,
+    dot,
     erf,
     exp,
+    fma,
     function,
     is_single,
     log,
@@ -18,10 +20,13 @@ from ...ops import (
     minimum,
     normalize,
     pow,
+    rsqrt,
+    safe_div,
     safe_sqrt,
     sincos,
     sqr,
     sqrt,
+    vec2,
     vec3,
     where,
 )
@@ -42,7 +47,7 @@ def _horner(x: Any, coefficients: tuple[float, ...]) -> Any:
     """The polynomial with these coefficients, in rising powers."""
     value: Any = coefficients[-1]
     for c in reversed(coefficients[:-1]):
-        value = value * x + c
+        value = fma(value, x, c)
     return value
 
 
@@ -57,13 +62,15 @@ class Beckmann(NDF):
     @function
     def D(self, m: Any, alpha: Any) -> Any:
         """Beckmann density of normals, 1/sr."""
+        area = alpha.x * alpha.y
         z2 = sqr(m.z)
-        slope2 = sqr(m.x / alpha.x) + sqr(m.y / alpha.y)
+        across = vec2(m.x * alpha.y, m.y * alpha.x)
+        across2 = dot(across, across)
         # tan^2 / alpha^2 over 700 leaves exp under 1e-304; there z^4 may vanish in float32, and its gradient sooner
-        lit = (m.z > 0.0) & (slope2 < 700.0 * z2)
-        z2 = where(lit, z2, 1.0)
-        exponent = where(lit, slope2, 0.0) / z2
-        return where(lit, exp(-exponent) / (ops.pi * alpha.x * alpha.y * sqr(z2)), 0.0)
+        lit = (m.z > 0.0) & (across2 < 700.0 * sqr(area) * z2)
+        # one division, 1 / (area z^2), serves the exponent and the factor before it
+        q = where(lit, 1.0 / where(lit, area * z2, 1.0), 0.0)
+        return exp(-across2 * z2 * sqr(q)) * sqr(q) * (area * ops.inv_pi)
 
     def _cotangent(self, v: Any, alpha: Any) -> Any:
         """|v.z| / slant = 1 / (alpha tan), held below 1e9."""
@@ -148,6 +155,13 @@ class Beckmann(NDF):
         # far in the tail and at the cot, where c is flat, the step is all rounding
         return where(slope > 1e-3, x - excess / maximum(slope, 1e-3), x)
 
-    def pdf_visible(self, v: Any, m: Any, alpha: Any) -> Any:
-        """Density of visible normals."""
-        return self.visible_density(v, m, alpha)
+    @function
+    def visible_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of visible normals over |v.m|, G1 D / |v.z| (Heitz2014b); in float32 G1 / |v.z| as one quotient."""
+        if not is_single(v.z):
+            return safe_div(self.G1(v, alpha) * self.D(m, alpha), abs(v.z))
+        z = abs(v.z)
+        over = rsqrt(maximum(slant2(v, alpha), 1e-18))
+        a = z * over
+        near = a < 4.0
+        return self.D(m, alpha) * where(near, over * _horner(a, _G1_OVER), 1.0) / where(near, _horner(a, _G1_UNDER), z)

@@ -18,6 +18,7 @@ from ...ops import (
     sincos,
     sqr,
     sqrt,
+    vec2,
     vec3,
     where,
 )
@@ -28,7 +29,8 @@ from .base import NDF
 @function
 def slant2(v: Any, alpha: Any) -> Any:
     """(alpha_x v_x)^2 + (alpha_y v_y)^2: squared sine, stretched by the widths."""
-    return sqr(alpha.x * v.x) + sqr(alpha.y * v.y)
+    slant = vec2(alpha.x * v.x, alpha.y * v.y)
+    return dot(slant, slant)
 
 
 class GGX(NDF):
@@ -47,8 +49,8 @@ class GGX(NDF):
         powers of a narrow alpha leave float32.
         """
         area = alpha.x * alpha.y
-        stretched = sqr(m.x * alpha.y) + sqr(m.y * alpha.x) + sqr(m.z * area)
-        return where(m.z > 0.0, sqr(area / stretched) * area * ops.inv_pi, 0.0)
+        stretched = vec3(m.x * alpha.y, m.y * alpha.x, m.z * area)
+        return where(m.z > 0.0, sqr(area / dot(stretched, stretched)) * area * ops.inv_pi, 0.0)
 
     @function
     def Lambda(self, v: Any, alpha: Any) -> Any:
@@ -76,19 +78,19 @@ class GGX(NDF):
         return self._from_cap(stretched, stretched.z, u1, u2, alpha)
 
     def _from_cap(self, stretched: Any, depth: Any, u1: Any, u2: Any, alpha: Any) -> Any:
-        # the cap reaches down to z = -depth
-        z = (1.0 - u2) * (1.0 + depth) - depth
-        r = safe_sqrt((1.0 - z) * (1.0 + z))
+        # the cap reaches down to z = -depth; heights are counted from there, so that nothing cancels at its rim
+        lift = (1.0 - u2) * (1.0 + depth)
+        r = safe_sqrt((1.0 + depth - lift) * (1.0 - depth + lift))
         s, c = sincos((2.0 * ops.pi) * u1)
-        h = vec3(r * c + stretched.x, r * s + stretched.y, z + stretched.z)
+        h = vec3(r * c + stretched.x, r * s + stretched.y, lift + (stretched.z - depth))
         # grazing view and the lowest point of the cap add up to zero length; any facet upright then
         return normalize(vec3(alpha.x * h.x, alpha.y * h.y, maximum(h.z, 1e-12)))
 
     @function
-    def pdf_visible(self, v: Any, m: Any, alpha: Any) -> Any:
-        """Density of visible normals, G1 |v.m| D / |v.z|, with |v.z| cancelled: finite at grazing."""
+    def visible_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of visible normals over |v.m|, G1 D / |v.z|, with |v.z| cancelled: finite at grazing."""
         z = abs(v.z)
-        return 2.0 * abs(dot(v, m)) * self.D(m, alpha) / maximum(z + sqrt(sqr(z) + slant2(v, alpha)), 1e-30)
+        return 2.0 * self.D(m, alpha) / maximum(z + sqrt(sqr(z) + slant2(v, alpha)), 1e-30)
 
     @function
     def sample_bounded(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
@@ -97,11 +99,11 @@ class GGX(NDF):
         return self._from_cap(stretched, self._bound(v, alpha) * stretched.z, u1, u2, alpha)
 
     @function
-    def pdf_bounded(self, v: Any, m: Any, alpha: Any) -> Any:
-        """Density of `sample_bounded`: 2 |v.m| D / (k |v.z| + sqrt(v.z^2 + slant^2)) (Eto2023)."""
+    def bounded_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
+        """Density of `sample_bounded` over |v.m|: 2 D / (k |v.z| + sqrt(v.z^2 + slant^2)) (Eto2023)."""
         z = abs(v.z)
         length = sqrt(sqr(z) + slant2(v, alpha))
-        return 2.0 * abs(dot(v, m)) * self.D(m, alpha) / maximum(self._bound(v, alpha) * z + length, 1e-30)
+        return 2.0 * self.D(m, alpha) / maximum(self._bound(v, alpha) * z + length, 1e-30)
 
     def _bound(self, v: Any, alpha: Any) -> Any:
         """k: how far the cap reaches down, as a share of the full depth (Eto2023)."""
