@@ -103,9 +103,13 @@ class _Added(BSDF):
         s = self.base.sample(wo, u, mode)
         wi = where(broad, rule.sample(self, found, wo, u), s.wi)
         delta = s.delta & ~broad
-        density = self.pdf(wo, wi)
+        # what the base knows of its own sample is more exact than what its direction, once rounded, tells
+        base_pdf = where(broad, self.base.pdf(wo, wi), s.pdf)
+        base_value = where(broad, self.base.eval(wo, wi, mode), s.weight * s.pdf)
+        density = base_pdf * (1.0 - share) + rule.pdf(self, found, wo, wi) * share
         pdf = where(broad | (s.pdf > 0.0), where(delta, s.pdf * (1.0 - share), density), 0.0)
-        value = self.eval(wo, wi, mode) * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
+        value = base_value + self._extra(found, wo, wi, mode)
+        value = value * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
         eta = where(broad, rule.eta(self, wo, wi), s.eta)
         # a smooth base misses nothing: share = 0
         return Sample(wi, where(delta, s.weight * safe_div(1.0, 1.0 - share), value), pdf, delta, eta)

@@ -1,0 +1,338 @@
+"""Shaders run in a browser on many random pairs of directions and parameters, beside the float64 of Python."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any, NamedTuple
+
+import gonio as go
+import numpy as np
+from gonio.emit.program import Program
+from gonio.models.base import Parameter
+from gonio.ops import backend
+
+SIDE = 256  # the target is SIDE x SIDE pixels, one draw each
+COUNT = SIDE * SIDE
+TIGHT = 1e-5  # relative error that is always allowed
+MOVES = 8  # times the change of the float64 value when every input moves by one float32
+DIM = 1e-6  # values below are not judged
+
+
+class Draws(NamedTuple):
+    """Random inputs, all float32: directions, numbers and the parameters by path, one row a draw."""
+
+    wo: np.ndarray
+    wi: np.ndarray
+    u: np.ndarray
+    fields: dict[str, np.ndarray]
+
+    def columns(self) -> np.ndarray:
+        """Everything side by side, as the shader reads it."""
+        return np.concatenate([self.wo, self.wi, self.u, *self.fields.values()], axis=1).astype(np.float32)
+
+    def moved(self, rng: np.random.Generator) -> Draws:
+        """Every input one float32 up or down; what is 0 stays."""
+
+        def move(x: np.ndarray) -> np.ndarray:
+            step = np.nextafter(x, x + rng.choice(np.float32([-1.0, 1.0]), x.shape), dtype=np.float32)
+            return np.where(x == 0.0, x, step)
+
+        u = np.clip(move(self.u), 0.0, np.float32(0.99999994))
+        return Draws(move(self.wo), move(self.wi), u, {k: move(v) for k, v in self.fields.items()})
+
+
+# ------------------------------------------------------------------ inputs
+
+
+def draw(model: go.BSDF, rng: np.random.Generator, count: int = COUNT) -> Draws:
+    """Directions and parameters over all that is allowed, extremes among them."""
+    fields = dict(_fields(model, rng, count))
+    wo = _directions(rng, count, model.transmits)
+    wi = _directions(rng, count, model.transmits)
+    u = rng.random((count, 3)).astype(np.float32)
+    u = np.minimum(u, np.float32(0.99999994))
+    draws = Draws(wo, wi, u, fields)
+    # half of the pairs where the lobe is
+    sampled = reference(model, draws, "sample")[0].astype(np.float32)
+    good = np.isfinite(sampled).all(1) & (np.abs(np.linalg.norm(sampled, axis=1) - 1.0) < 1e-3)
+    wi = np.where((good & (rng.random(count) < 0.5))[:, None], sampled, wi)
+    return draws._replace(wi=wi)
+
+
+def _directions(rng: np.random.Generator, count: int, below: bool) -> np.ndarray:
+    v = rng.normal(size=(count, 3))
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    kind = rng.integers(0, 20, count)
+    z = np.where(kind == 0, 10.0 ** rng.uniform(-6, -1, count), v[:, 2])  # grazing
+    z = np.where(kind == 1, 1.0 - 10.0 ** rng.uniform(-7, -2, count), z)  # along the normal
+    phi = rng.uniform(0, 2 * np.pi, count)
+    r = np.sqrt(np.maximum(1 - z * z, 0.0))
+    v = np.stack([r * np.cos(phi), r * np.sin(phi), z], 1)
+    v[kind == 2] = (0.0, 0.0, 1.0)
+    up = ~((rng.random(count) < (0.5 if below else 0.1)))
+    v[:, 2] = np.where(up, np.abs(v[:, 2]), v[:, 2])
+    return v.astype(np.float32)
+
+
+def _fields(model: Any, rng: np.random.Generator, count: int, path: str = "") -> Any:
+    for name, parameter in model.parameters().items():
+        value = getattr(model, name)
+        if parameter.kind == "bsdf":
+            yield from _fields(value, rng, count, f"{path}{name}.")
+        elif parameter.numeric and not (parameter.kind == "angle" and isinstance(value, int | float) and value == 0):
+            yield f"{path}{name}", _values(type(model).__name__, parameter, value, rng, count)
+
+
+def _values(owner: str, parameter: Parameter, value: Any, rng: np.random.Generator, count: int) -> np.ndarray:
+    if parameter.kind == "alpha":
+        pair = 10.0 ** rng.uniform(-3.5, 0.0, (count, 2))
+        pair[rng.random((count, 2)) < 0.05] = 1.0
+        if not isinstance(value, tuple):
+            pair[:, 1] = pair[:, 0]
+        pair[rng.random(count) < 0.03] = 0.0
+        return pair.astype(np.float32)
+    if parameter.kind == "angle":
+        angle = rng.uniform(-np.pi, np.pi, count)
+        return np.stack([np.cos(angle), np.sin(angle)], 1).astype(np.float32)
+    shape = (count, 3 if parameter.kind == "spectrum" else 1)
+    low, high = parameter.low, parameter.high
+    if owner == "Dielectric" and parameter.name == "eta":
+        x = np.exp(rng.uniform(np.log(low), np.log(high), shape))
+        near = rng.random(shape) < 0.1
+        x = np.where(near, 1.0 + rng.choice([-1, 1], shape) * 10.0 ** rng.uniform(-3, -1, shape), x)
+    elif np.isinf(high):
+        x = rng.uniform(0.0, 10.0, shape) if parameter.name != "p" else 10.0 ** rng.uniform(-2, 3.5, shape)
+    else:
+        x = rng.uniform(low, high, shape)
+    x = np.where(rng.random(shape) < 0.03, low if np.isfinite(low) else 0.0, x)
+    return np.where(rng.random(shape) < 0.03, high, x).astype(np.float32) if np.isfinite(high) else x.astype(np.float32)
+
+
+# ------------------------------------------------------------------ Python
+
+
+def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ...]:
+    """What Python says in float64; each result as (N, channels) or (N,)."""
+    kind = backend.types("float64")
+    rows = iter(draws.fields.values())
+
+    def column(x: np.ndarray) -> Any:
+        return kind.float(np.ascontiguousarray(x, dtype=np.float64))
+
+    def vector(x: np.ndarray) -> Any:
+        return {2: kind.vec2, 3: kind.vec3}[x.shape[1]](*[column(c) for c in x.T])
+
+    def convert(parameter: Parameter, value: Any) -> Any:
+        if parameter.kind == "angle" and isinstance(value, int | float) and value == 0:
+            return None
+        x = next(rows)
+        return column(x[:, 0]) if x.shape[1] == 1 else vector(x)
+
+    bound: Any = model.bind(convert)
+    count = len(draws.wo)
+    found = getattr(bound, method)(vector(draws.wo), vector(draws.u if method == "sample" else draws.wi))
+    results = found if isinstance(found, tuple) else (found,)
+    return tuple(np.asarray(backend.to_numpy(r, count)) for r in results)
+
+
+# ------------------------------------------------------------------ the browser
+
+
+def pack(x: np.ndarray) -> str:
+    """float32 as base64."""
+    return base64.b64encode(np.ascontiguousarray(x, dtype="<f4").tobytes()).decode()
+
+
+def _filled(bundle: Any, draws: Draws, assign: str, types: dict[str, str]) -> list[str]:
+    lines, place = [], 9
+    by_path = {f["path"]: f for f in bundle.manifest["fields"]}
+    for path, rows in draws.fields.items():
+        n = rows.shape[1]
+        values = ", ".join(f"read({place + i})" for i in range(n))
+        field = by_path[path]
+        lines.append(f"{assign}{field['name']} = {types[field['type']]}({values});")
+        place += n
+    return lines
+
+
+GLSL_HEAD = """#version 300 es
+precision highp float; precision highp int; precision highp sampler2D; precision highp sampler3D;
+"""
+
+
+def glsl_program(bundle: Any, draws: Draws) -> str:
+    """A fragment shader that answers one draw a pixel."""
+    m = bundle.manifest
+    width = -(-draws.columns().shape[1] // 4)
+    f = m["functions"]
+    derived = ", derived" if m["derived"] else ""
+    lines = [f"{m['struct']} self;", *_filled(bundle, draws, "self.", {"float": "float", "vec2": "vec2", "vec3": "vec3"})]
+    if m["derived"]:
+        lines.append(f"{m['derived']['struct']} derived = {f['derive']}(self);")
+    lines += [
+        "vec3 wo = vec3(read(0), read(1), read(2)), wi = vec3(read(3), read(4), read(5));",
+        "vec3 u = vec3(read(6), read(7), read(8));",
+        f"o0 = vec4({f['eval']}(self{derived}, wo, wi), {f['pdf']}(self{derived}, wo, wi));",
+        f"Sample s = {f['sample']}(self{derived}, wo, u);",
+        "o1 = vec4(s.wi, s.pdf); o2 = vec4(s.weight, s.delta ? 1.0 : 0.0); o3 = vec4(s.eta, 0.0, 0.0, 0.0);",
+        "o4 = vec4(0.0); o5 = vec4(0.0);",
+    ]
+    if "terms" in f:
+        names = [t["name"] for t in m["terms"]]
+        lines.append(f"{m['struct']}Terms t = {f['terms']}(self{derived}, wo, wi);")
+        if "D" in names:
+            lines.append("o3.yz = vec2(t.D, t.G); o4 = vec4(t.F, 0.0);")
+        if "multi" in names:
+            lines.append("o5 = vec4(t.multi, 0.0);")
+    body = "\n    ".join(lines)
+    outs = "\n".join(f"layout(location = {i}) out vec4 o{i};" for i in range(6))
+    return f"""{GLSL_HEAD}{bundle.text}
+uniform sampler2D inputs;
+{outs}
+float read(int i) {{
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    return texelFetch(inputs, ivec2(at.x * {width} + i / 4, at.y), 0)[i % 4];
+}}
+void main() {{
+    {body}
+}}
+"""
+
+
+RUN_GLSL = """async ({text, inputs, width, textures, side}) => {
+  const floats = (s) => new Float32Array(Uint8Array.from(atob(s), c => c.charCodeAt(0)).buffer);
+  const canvas = document.createElement('canvas');
+  const gl = canvas.getContext('webgl2');
+  gl.getExtension('EXT_color_buffer_float');
+  const shader = (kind, source) => {
+    const s = gl.createShader(kind); gl.shaderSource(s, source); gl.compileShader(s);
+    if (!gl.getShaderParameter(s, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(s));
+    return s;
+  };
+  const program = gl.createProgram();
+  gl.attachShader(program, shader(gl.VERTEX_SHADER, `#version 300 es
+    void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0), 0.0, 1.0); }`));
+  gl.attachShader(program, shader(gl.FRAGMENT_SHADER, text));
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+  gl.useProgram(program);
+  let unit = 0;
+  const bind = (name, dim, size, channels, data) => {
+    const target = dim === 3 ? gl.TEXTURE_3D : gl.TEXTURE_2D;
+    const format = {1: [gl.R32F, gl.RED], 2: [gl.RG32F, gl.RG], 4: [gl.RGBA32F, gl.RGBA]}[channels];
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(target, gl.createTexture());
+    gl.texParameteri(target, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    if (dim === 3) gl.texImage3D(target, 0, format[0], ...size, 0, format[1], gl.FLOAT, data);
+    else gl.texImage2D(target, 0, format[0], ...size, 0, format[1], gl.FLOAT, data);
+    gl.uniform1i(gl.getUniformLocation(program, name), unit++);
+  };
+  bind('inputs', 2, [side * width, side], 4, floats(inputs));
+  for (const t of textures) bind(t.uniform, t.dimension, t.size, t.channels, floats(t.data));
+  const frame = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+  const buffers = [];
+  for (let i = 0; i < 6; i++) {
+    const t = gl.createTexture();
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, t);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, side, side);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, t, 0);
+    buffers.push(gl.COLOR_ATTACHMENT0 + i);
+  }
+  gl.drawBuffers(buffers);
+  gl.viewport(0, 0, side, side);
+  gl.drawArrays(gl.TRIANGLES, 0, 3);
+  const out = [];
+  for (let i = 0; i < 6; i++) {
+    gl.readBuffer(gl.COLOR_ATTACHMENT0 + i);
+    const data = new Float32Array(side * side * 4);
+    gl.readPixels(0, 0, side, side, gl.RGBA, gl.FLOAT, data);
+    const bytes = new Uint8Array(data.buffer);
+    let s = '';
+    for (let j = 0; j < bytes.length; j += 32768) s += String.fromCharCode(...bytes.subarray(j, j + 32768));
+    out.push(btoa(s));
+  }
+  const error = gl.getError();
+  if (error) throw new Error('WebGL error ' + error);
+  gl.getExtension('WEBGL_lose_context').loseContext();
+  return out;
+}"""
+
+
+def run_glsl(page: Any, bundle: Any, draws: Draws) -> dict[str, np.ndarray]:
+    """The shader's answers, by the names of `compared`."""
+    columns = draws.columns()
+    width = -(-columns.shape[1] // 4)
+    padded = np.zeros((len(columns), width * 4), np.float32)
+    padded[:, : columns.shape[1]] = columns
+    textures = [{**t, "data": pack(bundle.tables[t["uniform"]])} for t in bundle.manifest["textures"]]
+    side = int(np.sqrt(len(columns)))
+    given = {"text": glsl_program(bundle, draws), "inputs": pack(padded), "width": width, "textures": textures}
+    found = page.evaluate(RUN_GLSL, {**given, "side": side})
+    return unpack([np.frombuffer(base64.b64decode(x), "<f4").reshape(-1, 4) for x in found])
+
+
+def unpack(o: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """The six targets by name."""
+    return {
+        "eval": o[0][:, :3],
+        "pdf": o[0][:, 3],
+        "sample.wi": o[1][:, :3],
+        "sample.pdf": o[1][:, 3],
+        "sample.weight": o[2][:, :3],
+        "sample.delta": o[2][:, 3],
+        "sample.eta": o[3][:, 0],
+        "terms.D": o[3][:, 1],
+        "terms.G": o[3][:, 2],
+        "terms.F": o[4][:, :3],
+        "terms.multi": o[5][:, :3],
+    }
+
+
+# ------------------------------------------------------------------ the verdict
+
+
+def expected(model: go.BSDF, draws: Draws, terms: list[str]) -> dict[str, np.ndarray]:
+    """float64 by the same names."""
+    found = {"eval": reference(model, draws, "eval")[0], "pdf": reference(model, draws, "pdf")[0]}
+    for name, value in zip(go.Sample._fields, reference(model, draws, "sample"), strict=True):
+        found[f"sample.{name}"] = value.astype(float)
+    if terms:
+        for name, value in zip(terms, reference(model, draws, "terms"), strict=True):
+            found[f"terms.{name}"] = value
+    return found
+
+
+def excess(model: go.BSDF, draws: Draws, got: dict[str, np.ndarray], terms: list[str], seed: int = 0) -> dict[str, Any]:
+    """By name: (worst error over what is allowed, the draw where, what was got, what is right)."""
+    right = expected(model, draws, terms)
+    rng = np.random.default_rng(seed)
+    change = {name: np.zeros(value.shape) for name, value in right.items()}
+    for _ in range(MOVES):
+        near = expected(model, draws.moved(rng), terms)
+        for name in right:
+            change[name] = np.maximum(change[name], np.abs(near[name] - right[name]))
+    verdict = {}
+    for name, value in right.items():
+        if name not in got:
+            continue
+        mine = np.asarray(got[name], float)
+        size = np.abs(value)
+        if name == "sample.wi":  # a vector is measured by its length
+            size = np.linalg.norm(value, axis=1, keepdims=True) + 0 * value
+        allowed = np.maximum(TIGHT * size, MOVES * change[name])
+        error = np.abs(mine - value)
+        error[np.isnan(error)] = np.inf
+        ratio = np.where(size > DIM, error / np.maximum(allowed, 1e-300), np.where(error > DIM, np.inf, 0.0))
+        if name.startswith("sample.") and name != "sample.pdf":  # a failed sample has no direction
+            failed = (right["sample.pdf"] <= DIM) & (np.asarray(got["sample.pdf"]) <= DIM)
+            ratio[failed] = 0.0
+        worst = int(np.argmax(ratio.max(axis=1) if ratio.ndim == 2 else ratio))
+        verdict[name] = (float(ratio.max()), worst, mine[worst], value[worst], float((ratio > 1).mean()))
+    return verdict
+
+
+__all__ = ["COUNT", "Draws", "Program", "draw", "excess", "json", "reference", "run_glsl"]
