@@ -422,13 +422,17 @@ def bake(
     lut: Annotated[str, typer.Option(metavar="E,Eavg,dfg,glass", help="Which tables.")] = "",
     size: Annotated[int, typer.Option(metavar="N", help="Texels along each axis.")] = 128,
     method: Annotated[str, typer.Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature",
-    masking: Annotated[str, typer.Option(metavar="NAME", help="For a distribution.")] = "smith-correlated",
+    masking: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of a distribution: smith-correlated, ...")
+    ] = None,
     spp: Annotated[int, typer.Option(metavar="N", help="Samples a texel, where sampled.")] = 1024,
     points: Annotated[str, typer.Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley",
     seed: Annotated[int, typer.Option(metavar="N", help="Of independent points.")] = 0,
     layout: Annotated[str, typer.Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear",
-    aspect: Annotated[float, typer.Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds phi.")] = 1.0,
-    azimuths: Annotated[int, typer.Option(metavar="N", help="Slices along phi, with two widths.")] = 16,
+    aspect: Annotated[
+        float | None, typer.Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds the axis phi.")
+    ] = None,
+    azimuths: Annotated[int, typer.Option(metavar="N", help="Slices along phi, with two widths.")] = 24,
     store: Annotated[str, typer.Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E",
     flip: Annotated[bool, typer.Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True,
     as_json: Json = False,
@@ -452,6 +456,9 @@ def bake(
 
     if target in distributions():
         what: Any = target
+        if param or preset:
+            hint = "bake a material, such as conductor; alpha is an axis of the table"
+            raise InputError(f"'{target}' is a distribution, without parameters", "--param", hint)
     else:
         known = [*distributions(), *known_models()]
         if target.replace("_", "-") not in known:
@@ -486,11 +493,12 @@ def _print_tables(manifest: dict[str, Any], path: Path, as_json: bool) -> None:
     facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
     facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
     print(f"{path}: {', '.join(filter(None, facts))}")
-    table = _table("table", "axes", "shape", "max error", "rms error", "between nodes")
+    table = _table("table", "shape", "max error", "rms", "between")
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
         figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
-        table.add_row(name, ", ".join(manifest["dims"][name]), " x ".join(map(str, shape)), *figures)
+        dims = [*manifest["dims"][name], ""]
+        table.add_row(name, " x ".join(f"{n} {axis}".strip() for n, axis in zip(shape, dims, strict=False)), *figures)
     _print_rich(table)
     for axis, text in manifest["axes"].items():
         print(f"{axis:10} {text}")

@@ -9,7 +9,9 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.energy import bake as baking
-from gonio.energy import cache, quadrature
+from gonio.energy import baked as baked_files
+from gonio.energy import quadrature
+from gonio.energy.axes import Axes
 from gonio.render import tables
 
 REFERENCE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "kulla-conty"
@@ -64,7 +66,7 @@ def test_homework_pictures_read_back_pixel_by_pixel(tmp_path, store, flip):
 
 def test_a_folder_reads_back_what_was_written(tmp_path):
     baked = tables.bake("beckmann", tmp_path / "t", size=8)
-    found = baking.load(tmp_path / "t")
+    found = baked_files.load(tmp_path / "t")
     for name, array in baked.arrays.items():
         np.testing.assert_array_equal(found.arrays[name], array)
     assert json.loads((tmp_path / "t" / "manifest.json").read_text())["ndf"] == "beckmann"
@@ -77,26 +79,143 @@ def test_models_are_baked_with_their_own_fresnel():
     assert baked.arrays["E"].shape == (8, 8, 3)
     assert baked.manifest["masking"] == "smith-separable"
     glass = baking.bake(go.Dielectric(1.5), ["E"], size=8)
-    assert glass.arrays["E"].shape == (8, 8)
+    assert glass.arrays["E"].shape == (8, 8, 3)
 
 
-def test_altered_truncated_and_foreign_files_are_refused(tmp_path):
+@pytest.mark.parametrize("layout", ["linear", "stretched"])
+def test_two_widths_add_the_azimuth_as_an_axis(layout):
+    baked = baking.bake("beckmann", size=5, aspect=0.4, azimuths=3, layout=layout)
+    assert baked.manifest["dims"]["E"] == ["phi", "roughness", "mu"]
+    assert baked.arrays["E"].shape == (3, 5, 5)
+    assert baked.arrays["dfg"].shape == (3, 5, 5, 2)
+    assert set(baked.manifest["axes"]) == {"phi", "roughness", "mu"}
+    phi, roughness = baked.arrays["phi"], baked.arrays["roughness"]
+    mu = baked.arrays["mu"] if layout == "linear" else baked.arrays["mu"][2, 3]
+    metal = go.Conductor(alpha=(roughness[3] ** 2, 0.4 * roughness[3] ** 2), ndf="beckmann", fresnel="one")
+    drawn = go.albedo(metal, mu[4], phi[2], method="sampling", samples=1 << 17)
+    assert baked.arrays["E"][2, 3, 4] == pytest.approx(drawn.value[0, 0], abs=5 * drawn.error[0, 0] + 1e-5)
+
+
+def test_two_widths_swapped_are_the_table_turned():
+    wide, tall = (baking.bake("ggx", ["E", "Eavg"], size=6, aspect=a, azimuths=4) for a in (0.25, 4.0))
+    np.testing.assert_allclose(wide.arrays["E"], tall.arrays["E"][::-1], atol=2e-6)
+    np.testing.assert_allclose(wide.arrays["E_avg"], tall.arrays["E_avg"], atol=2e-6)
+
+
+def test_e_avg_of_two_widths_is_the_mean_over_all_directions():
+    baked = baking.bake("ggx", ["Eavg"], size=3, aspect=0.2)
+    x, w = quadrature.gauss(48)
+    phi = (np.arange(180) + 0.5) / 180 * 0.5 * np.pi
+    for r, found in zip(baked.arrays["roughness"], baked.arrays["E_avg"], strict=True):
+        e = quadrature.moments("ggx", "smith-correlated", x, r**2, 0.2 * r**2, phi[:, None]).whole
+        assert found == pytest.approx(float((e @ (2 * w * x)).mean()), abs=1e-5)
+
+
+def test_sampled_tables_of_two_widths_agree_with_the_quadrature():
+    baked = baking.bake("ggx", ["E", "Eavg"], size=8, aspect=0.3, azimuths=4, method="visible", spp=4096)
+    assert baked.manifest["error"]["E"]["max"] < 5e-3
+    assert baked.manifest["error"]["E_avg"]["max"] < 2e-2
+
+
+def test_a_stretched_layout_of_two_widths_interpolates_within_2e_3():
+    baked = baking.bake("ggx", ["E"], size=32, aspect=0.25, layout="stretched")
+    assert baked.manifest["error"]["E"]["max"] < 2e-5
+    assert baked.manifest["error"]["E"]["interpolation"] < 2e-3
+
+
+def test_the_error_between_nodes_is_what_a_reader_of_the_table_meets():
+    axes = Axes("linear", "ggx", "smith-correlated", 24)
+    baked = baking.bake("ggx", ["E"], size=24)
+    rng = np.random.default_rng(4)
+    row, column = rng.uniform(2.0, 23.0, 4000), rng.uniform(0.0, 23.0, 4000)
+    r0, c0 = np.minimum(row.astype(int), 22), np.minimum(column.astype(int), 22)
+    fr, fc = row - r0, column - c0
+    e = baked.arrays["E"]
+    between = (e[r0, c0] * (1 - fc) + e[r0, c0 + 1] * fc) * (1 - fr)
+    between += (e[r0 + 1, c0] * (1 - fc) + e[r0 + 1, c0 + 1] * fc) * fr
+    exact = quadrature.moments("ggx", "smith-correlated", *axes.at(row, column)[:2]).whole
+    met = np.abs(between - exact).max()
+    assert met / 2 < baked.manifest["error"]["E"]["interpolation"] < met * 2
+
+
+def test_glass_is_baked_from_both_sides_in_two_parts():
+    baked = baking.bake("ggx", ["glass"], size=6)
+    root, mu, roughness = (baked.arrays[n] for n in ("sqrt_f0", "mu", "roughness"))
+    eta = (1 + root[8]) / (1 - root[8])
+    for side, cos in (("thin", mu[4]), ("dense", -mu[4])):
+        table = baked.arrays[f"E_glass_{side}"]
+        assert table.shape == (16, 6, 6, 2)
+        whole = go.albedo(go.Dielectric(eta, roughness[3] ** 2), cos).value[0, 0]
+        assert table[8, 3, 4].sum() == pytest.approx(whole, abs=1e-3)
+        kept = go.albedo(go.Dielectric(eta, roughness[3] ** 2, transmission=False), mu[4]).value[0, 0]
+        if side == "thin":
+            assert table[8, 3, 4, 0] == pytest.approx(kept, abs=2e-4)
+
+
+def test_any_other_material_is_baked_over_the_cosine():
+    baked = baking.bake(go.KullaConty(go.Lambert((0.2, 0.5, 0.9))), size=4)
+    np.testing.assert_allclose(baked.arrays["E"], [[0.2, 0.5, 0.9]] * 4, atol=1e-5)
+    np.testing.assert_allclose(baked.arrays["E_avg"], [0.2, 0.5, 0.9], atol=1e-5)
+    assert baked.manifest["dims"] == {"E": ["mu"], "E_avg": []}
+
+
+def test_pictures_of_a_third_axis_stand_below_each_other(tmp_path):
+    baked = tables.bake("ggx", tmp_path / "t", lut=("E",), size=8, aspect=0.5, azimuths=3)
+    picture = read_png(tmp_path / "t" / "E.png")
+    assert picture.shape == (24, 8, 3)
+    np.testing.assert_array_equal(picture[..., 0], np.round(baked.arrays["E"].reshape(24, 8) * 255))
+
+
+def test_a_picture_or_an_empty_folder_is_no_table(tmp_path):
     tables.bake("ggx", tmp_path / "t", size=8)
-    file = tmp_path / "t" / "tables.npz"
-    whole = file.read_bytes()
-    file.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(go.InputError, match="damaged"):
-        baking.load(tmp_path / "t")
-    with np.load(__import__("io").BytesIO(whole)) as opened:
-        arrays = dict(opened)
-    arrays["E"] = arrays["E"] * 1.01
-    np.savez(file, **arrays)
-    with pytest.raises(go.InputError, match="not what the manifest says"):
-        baking.load(tmp_path / "t")
     with pytest.raises(go.InputError, match=r"'\.png' given"):
-        baking.load(tmp_path / "t" / "E.png")
+        baked_files.load(tmp_path / "t" / "E.png")
     with pytest.raises(go.InputError, match=r"no tables\.npz"):
-        baking.load(tmp_path)
+        baked_files.load(tmp_path)
+
+
+def test_every_cut_and_every_changed_byte_of_a_file_is_noticed(tmp_path):
+    tables.bake("ggx", tmp_path / "t", size=4, lut=("E",))
+    file = tmp_path / "t" / "tables.npz"
+    whole, truth = file.read_bytes(), baked_files.load(file)
+    rng = np.random.default_rng(2)
+    noticed = 0
+    for trial in range(400):
+        changed = bytearray(whole)
+        if trial % 4:
+            changed[rng.integers(len(whole))] ^= 1 << rng.integers(8)
+        else:
+            del changed[rng.integers(len(whole)) :]
+        file.write_bytes(changed)
+        try:
+            found = baked_files.load(file)
+        except go.InputError as error:
+            assert "damaged" in error.what or "altered" in error.what
+            noticed += 1
+        else:  # a date or another byte that says nothing
+            assert found.manifest == truth.manifest
+            assert all(np.array_equal(found.arrays[name], value) for name, value in truth.arrays.items())
+    assert noticed > 300
+
+
+@pytest.mark.parametrize("change", ["value", "manifest", "another", "none"])
+def test_an_altered_file_is_refused(tmp_path, change):
+    tables.bake("ggx", tmp_path / "t", size=4)
+    file = tmp_path / "t" / "tables.npz"
+    with np.load(file) as opened:
+        arrays = dict(opened)
+    if change == "value":
+        arrays["E"] = arrays["E"] * 1.0001
+    elif change == "manifest":
+        arrays["manifest"] = np.array(str(arrays["manifest"]).replace("smith-correlated", "smith-separable"))
+    elif change == "another":
+        arrays["extra"] = np.ones(3)
+    np.savez(file, **arrays)
+    if change == "none":  # packed anew, the content is the same
+        baked_files.load(file)
+        return
+    with pytest.raises(go.InputError, match="altered: "):
+        baked_files.load(file)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +229,10 @@ def test_altered_truncated_and_foreign_files_are_refused(tmp_path):
         ({"lut": ["F"]}, "unknown table"),
         ({"layout": "polar"}, "unknown layout"),
         ({"layout": "homework", "store": "E/2"}, "unknown 'E/2'"),
+        ({"layout": "homework", "aspect": 0.5}, "homework's layout"),
+        ({"aspect": 0.0}, "alpha_y / alpha_x = 0"),
+        ({"aspect": 0.5, "azimuths": 0}, "0 azimuths"),
+        ({"aspect": 0.5, "lut": ["glass"]}, "two widths"),
     ],
 )
 def test_bad_options_are_refused_and_nothing_is_written(tmp_path, options, text):
@@ -118,21 +241,38 @@ def test_bad_options_are_refused_and_nothing_is_written(tmp_path, options, text)
     assert not any(tmp_path.iterdir())
 
 
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("target", "options", "text"),
+    [
+        (go.Conductor(), {"masking": "smith-separable"}, "masking of a material"),
+        (go.Conductor(), {"aspect": 0.5}, "aspect of a material"),
+        (go.Conductor(), {"method": "ggx"}, "Conductor by 'ggx'"),
+        (go.Conductor(), {"lut": ["dfg"]}, "split sum of a material"),
+        (go.Conductor(), {"layout": "homework"}, "homework's layout"),
+        (go.Conductor(alpha=np.array([0.1, 0.2])), {}, "one value a ray"),
+        (go.Conductor(alpha=(0.0, 0.2)), {}, "alpha_y / alpha_x = inf"),
+        (go.Lambert(), {"layout": "stretched"}, "Lambert by quadrature, stretched"),
+        (go.Lambert(), {"lut": ["glass"]}, "table 'glass' of Lambert"),
+    ],
+)
+def test_what_a_material_does_not_have_is_refused(tmp_path, target, options, text):
+    with pytest.raises(go.InputError, match=text):
+        tables.bake(target, tmp_path / "t", size=4, **options)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_file_in_place_of_the_folder_and_a_missing_parent_are_refused(tmp_path):
     (tmp_path / "f").write_text("")
     with pytest.raises(go.InputError, match="is a file"):
         tables.bake("ggx", tmp_path / "f", size=4)
+    with pytest.raises(go.InputError, match="does not exist"):
+        tables.bake("ggx", tmp_path / "no" / "t", size=4)
+    assert [p.name for p in tmp_path.iterdir()] == ["f"]
 
 
-def test_a_damaged_cache_is_rebuilt_with_a_warning(tmp_path, monkeypatch):
-    monkeypatch.setenv("GONIO_CACHE", str(tmp_path))
-    first = cache.remember(("trial", 1), lambda: np.arange(3.0), "ggx")
-    (file,) = tmp_path.glob("trial-*.npz")
-    assert np.array_equal(cache.remember(("trial", 1), lambda: 1 / 0, "ggx"), first)
-    file.write_bytes(b"not a table")
-    with pytest.warns(go.GonioWarning, match="damaged or not ours"):
-        again = cache.remember(("trial", 1), lambda: np.arange(3.0), "ggx")
-    assert np.array_equal(again, first)
+def test_a_folder_that_cannot_be_written_is_one_clear_error():
+    with pytest.raises(go.InputError, match=r"cannot write|no permission"):
+        tables.bake("ggx", "/proc/tables", size=4)
 
 
 @pytest.mark.shared

@@ -130,7 +130,7 @@ def test_the_polynomials_meet_the_quadrature():
     ):
         rows = np.array(ops.lookup(curves.isotropic(ndf, masking), ops.inset(roughness, curves.ROWS))).T
         form = curves.form_of(ndf, masking)
-        bend = curves._numpy_knee(form, masking, roughness**2)
+        bend = curves.numpy_knee(form, masking, roughness**2)
         ours = curves.evaluate(form, rows[:, :-1], bend, np.broadcast_to(mu, (37, 60)))
         exact = 1.0 - quadrature.moments(ndf, masking, mu, roughness[:, None] ** 2).whole
         assert np.abs(ours - exact).max() < bar

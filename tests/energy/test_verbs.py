@@ -18,6 +18,27 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
     assert (tmp_path / "t.png").stat().st_size > 1000
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["ggx", "--aspect", "0.5", "--azimuths", "3"],
+        ["ggx", "--lut", "glass"],
+        ["conductor", "--preset", "Au", "-p", "alpha=[0.1,0.3]"],
+        ["lambert"],
+    ],
+    ids=["two-widths", "glass", "metal", "lambert"],
+)
+def test_every_kind_of_table_is_printed_and_drawn(tmp_path, capsys, words):
+    folder = tmp_path / "t"
+    assert cli._run(["bake", *words, "--size", "4", "-o", str(folder)]) == 0
+    text = capsys.readouterr().out
+    assert "max error" in text and "mu  " in text
+    assert cli._run(["info", str(folder)]) == 0
+    assert capsys.readouterr().out == text
+    assert cli._run(["plot", str(folder), "-o", str(tmp_path / "t.png")]) == 0
+    assert (tmp_path / "t.png").stat().st_size > 1000
+
+
 def test_a_model_with_parameters_is_baked(tmp_path, capsys):
     words = ["bake", "conductor", "--preset", "Au", "-p", "masking=smith-separable", "--lut", "E", "--size", "4"]
     assert cli._run([*words, "-o", str(tmp_path / "t"), "--json"]) == 0
@@ -25,7 +46,17 @@ def test_a_model_with_parameters_is_baked(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "words", [["bake", "ggx", "--size", "0"], ["bake", "gold"], ["bake", "ggx", "--masking", "x"], ["info", "missing"]]
+    "words",
+    [
+        ["bake", "ggx", "--size", "0"],
+        ["bake", "gold"],
+        ["bake", "ggx", "--masking", "x"],
+        ["bake", "ggx", "-p", "alpha=.3"],
+        ["bake", "ggx", "--aspect", "-1"],
+        ["bake", "ggx", "-o", "no/folder"],
+        ["compensation", "-o", "no/folder"],
+        ["info", "missing"],
+    ],
 )
 def test_bad_input_exits_with_2_and_writes_nothing(tmp_path, monkeypatch, capsys, words):
     monkeypatch.chdir(tmp_path)

@@ -73,7 +73,7 @@ def albedo(
     mu, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(mu, float)), np.asarray(phi, float))
     if mu.ndim != 1 or not np.all(np.abs(mu) <= 1.0):
         raise InputError("mu is a cosine: numbers in [-1, 1] expected", "albedo: mu")
-    _check_uniform(model)
+    check_uniform(model)
     if method in ("auto", "closed-form"):
         value = _closed_form(model, mu, phi)
         if value is not None:
@@ -98,11 +98,12 @@ def direction(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
 
 
-def _check_uniform(model: BSDF) -> None:
+def check_uniform(model: BSDF) -> None:
+    """Raise InputError where a parameter has one value a ray."""
     for parameter in model.parameters().values():
         value = getattr(model, parameter.name)
         if parameter.kind == "bsdf":
-            _check_uniform(value)
+            check_uniform(value)
         elif parameter.numeric and not backend.is_drjit(value):
             rows = np.ndim(value) - (parameter.kind == "spectrum") - isinstance(value, tuple | list)
             if rows > 0:
@@ -115,13 +116,15 @@ def _spectrum(value: Any, count: int) -> np.ndarray:
     return np.broadcast_to(value if value.ndim == 2 else np.atleast_1d(value), (count, 3)).astype(float)
 
 
-def _widths(model: Any) -> tuple[float, float]:
+def widths(model: Any) -> tuple[float, float]:
+    """(alpha_x, alpha_y) of a microfacet material as plain numbers."""
     alpha = model.alpha
     pair = alpha if isinstance(alpha, tuple | list) else (alpha, alpha)
     return float(pair[0]), float(pair[1])
 
 
-def _bound(model: BSDF) -> Any:
+def bound_in_float64(model: BSDF) -> Any:
+    """The model with its parameters as Dr.Jit values."""
     return model.bind(converter(backend.types("float64")))
 
 
@@ -138,7 +141,7 @@ def _closed_form(model: BSDF, mu: np.ndarray, phi: np.ndarray) -> np.ndarray | N
         return None if a is None or b is None else a * (1.0 - model.weight) + b * model.weight
     if isinstance(model, TwoSided):
         return _closed_form(model.base, np.abs(mu), phi)
-    smooth = type(model) in (Conductor, Dielectric) and max(_widths(model)) < SMOOTH
+    smooth = type(model) in (Conductor, Dielectric) and max(widths(model)) < SMOOTH
     if type(model) is Mirror or smooth:
         # one direction or two, each with its weight: the expectation over u1 is the sum over the choices of a lobe
         wo = direction(mu, phi)
@@ -153,7 +156,7 @@ def _smooth_glass(model: Dielectric, mu: np.ndarray) -> np.ndarray:
     if model.transmission:
         return _spectrum(model.albedo, len(mu))
     kind = backend.types("float64")
-    bound = _bound(model)
+    bound = bound_in_float64(model)
     cos = kind.float(np.abs(mu))
     eta = ops.where(kind.float(mu) >= 0.0, bound.eta, 1.0 / bound.eta)
     f = bound.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
@@ -165,9 +168,9 @@ def _smooth_glass(model: Dielectric, mu: np.ndarray) -> np.ndarray:
 
 def _rule(model: BSDF) -> Callable[[Any, np.ndarray, np.ndarray, bool], np.ndarray] | None:
     if type(model) is Conductor:
-        return _conductor if min(_widths(model)) >= SMOOTH else None
+        return _conductor if min(widths(model)) >= SMOOTH else None
     if type(model) is Dielectric:
-        return _dielectric if min(_widths(model)) >= SMOOTH and abs(float(model.eta) - 1.0) > 1e-6 else None
+        return _dielectric if min(widths(model)) >= SMOOTH and abs(float(model.eta) - 1.0) > 1e-6 else None
     if hasattr(model, "base") and getattr(model, "turned", None) is False and not model.stochastic:
         return _compensated if _rule(model.base) else None  # type: ignore[attr-defined]
     if isinstance(model, TwoSided) and _rule(model.base):
@@ -176,16 +179,21 @@ def _rule(model: BSDF) -> Callable[[Any, np.ndarray, np.ndarray, bool], np.ndarr
 
 
 def _shape(model: Any, phi: np.ndarray) -> dict[str, Any]:
-    ax, ay = _widths(model)
+    ax, ay = widths(model)
     turn = 0.0 if model.rotation is None else float(model.rotation)
     return {"alpha": ax, "alpha_y": None if ax == ay else ay, "phi": phi - turn}
 
 
 def _conductor(model: Conductor, mu: np.ndarray, phi: np.ndarray, fine: bool) -> np.ndarray:
-    nodes = quadrature.JUDGE if fine else quadrature.NODES
-    bound = _bound(model)
+    shape = _shape(model, phi)
+    judge = quadrature.JUDGE if shape["alpha_y"] is None else quadrature.TURNED_JUDGE
     value = quadrature.reflected(
-        model.ndf, model.masking, bound.reflectance, np.abs(mu), nodes=nodes, **_shape(model, phi)
+        model.ndf,
+        model.masking,
+        bound_in_float64(model).reflectance,
+        np.abs(mu),
+        nodes=judge if fine else None,
+        **shape,
     )
     return value * (mu > 0.0)[:, None]
 
@@ -204,7 +212,7 @@ def _compensated(model: Any, mu: np.ndarray, phi: np.ndarray, fine: bool) -> np.
     """The base by its own rule, times a factor of wo alone, or plus lobes that are alike all around the normal."""
     base = _rule(model.base)(model.base, mu, phi, fine)  # type: ignore[misc]
     kind = backend.types("float64")
-    bound = _bound(model)
+    bound = bound_in_float64(model)
     bound.settle()
     x, w = gauss(96 if fine else 64)
     wo = [backend.vector_of(d, 3, kind) for d in direction(mu, phi)]

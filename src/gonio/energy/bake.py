@@ -1,21 +1,18 @@
-"""Tables of E, E_avg and the split sum as arrays with a manifest: what `gonio bake` writes and `gonio info` reads.
+"""Tables of E, E_avg, the split sum and rough glass as arrays with a manifest: what `gonio bake` writes.
 
     baked = bake("ggx", masking="smith-separable", size=128)
     baked.arrays["E"]            # [roughness, mu]
     baked.manifest["error"]      # {"E": {"max": ..., "rms": ..., "interpolation": ...}, ...}
+    bake("ggx", aspect=0.25)     # two widths: E[phi, roughness, mu]
 
-Layouts of the axes, both N long:
-    linear     mu and roughness at texel centres (j + 1/2) / N: what shaders and the homework use
-    stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1) (`gonio.energy.curves`), in which E is
-               smooth: bilinear interpolation then errs by a hundredth of what it does on a linear axis
+The axes are in `gonio.energy.axes`, files and the homework's pictures in `gonio.energy.baked`.
 """
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,310 +22,371 @@ from ..errors import InputError, did_you_mean
 from ..models import BSDF
 from ..models.conductor import Conductor
 from ..models.dielectric import Dielectric
-from ..optics.ndf import distribution, distributions
-from . import curves, monte_carlo, quadrature
+from ..optics.ndf import distribution
+from . import baked, cache, curves, monte_carlo, quadrature
+from .albedo import albedo, bound_in_float64, check_uniform, widths
+from .axes import LAYOUTS, Axes, Points
+from .baked import Baked
 from .cache import content_hash
 
 LUTS = {
-    "E": "directional albedo with F = 1, or the model's own [roughness, mu]",
-    "Eavg": "its average over the cosine [roughness]",
-    "dfg": "split sum A, B: E = F0 A + B for Schlick's Fresnel [roughness, mu, 2]",
-    "glass": "albedo of rough glass from both sides [sqrt(F0), roughness, mu]",
+    "E": "directional albedo with F = 1, or the model's own [phi,] [roughness, mu]",
+    "Eavg": "its average over the cosine, and over azimuth [roughness]",
+    "dfg": "split sum A, B: E = F0 A + B for Schlick's Fresnel [phi,] [roughness, mu, 2]",
+    "glass": "power that rough glass reflects and transmits, from both sides [sqrt_f0, roughness, mu, 2]",
 }
-LAYOUTS = ("linear", "stretched")
+NAMES = {"E": ("E",), "Eavg": ("E_avg",), "dfg": ("dfg",), "glass": ("E_glass_thin", "E_glass_dense")}
 LARGEST = 4096
+AZIMUTHS = 24  # stretched, alpha_y = alpha_x / 4: linear between them errs by 1.2e-3
+LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
-SCHEMA = 1
-_NAMES = {"Eavg": "E_avg"}
+SCHEMA = 2
 
 
-@dataclass(frozen=True)
-class Baked:
-    """Arrays by name, the axes among them, and the manifest that describes them."""
+@dataclasses.dataclass(frozen=True)
+class _Target:
+    """What is baked over roughness: a distribution at F = 1 (model None), or a Conductor or Dielectric."""
 
-    arrays: dict[str, np.ndarray]
-    manifest: dict[str, Any]
+    model: Any
+    ndf: str
+    masking: str
 
-    def npz(self) -> bytes:
-        """tables.npz, the manifest inside it, the same bytes for the same content."""
-        stream = io.BytesIO()
-        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file:
-            for name, array in {**self.arrays, "manifest": np.array(json.dumps(self.manifest))}.items():
-                part = io.BytesIO()
-                np.save(part, array, allow_pickle=False)
-                file.writestr(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), part.getvalue())
-        return stream.getvalue()
+    def exact(self, points: Points, fine: bool = False) -> dict[str, np.ndarray]:
+        """E, and dfg of a distribution, by quadrature; `fine` judges the other."""
+        shape = {"mu": points.mu, "alpha": points.alpha, "alpha_y": points.alpha_y, "phi": points.phi}
+        judge = quadrature.JUDGE if points.alpha_y is None else quadrature.TURNED_JUDGE
+        nodes = judge if fine else None
+        if self.model is None:
+            found = quadrature.moments(self.ndf, self.masking, **shape, nodes=nodes)
+            return {"E": found.whole, "dfg": np.stack([found.whole - found.schlick, found.schlick], -1)}
+        if isinstance(self.model, Conductor):
+            reflectance = bound_in_float64(self.model).reflectance
+            return {"E": quadrature.reflected(self.ndf, self.masking, reflectance, **shape, nodes=nodes)}
+        glass_nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
+        eta, fresnel = float(self.model.eta), self.model.fresnel
+        power = quadrature.glass(self.ndf, self.masking, fresnel, eta=eta, nodes=glass_nodes, **shape)
+        total = power.reflected + (power.transmitted if self.model.transmits else 0.0)
+        return {"E": total[..., None] * np.broadcast_to(np.asarray(self.model.albedo, float), 3)}
+
+    def average(self, axes: Axes, rows: np.ndarray, fine: bool = False) -> np.ndarray:
+        """E_avg at rows of roughness: Gauss-Legendre in sqrt(mu), and even steps of azimuth over a quarter turn."""
+        x, w = quadrature.gauss(48 if fine else 32)
+        roughness = axes.roughness(rows)
+        if not axes.azimuths:
+            mu, alpha = np.broadcast_arrays(x**2, roughness[:, None] ** 2)
+            return np.einsum("rm...,m->r...", self.exact(Points(mu, alpha, None, 0.0), fine)["E"], 4.0 * w * x**3)
+        # steps of the azimuth halfway between that of directions and that of their slopes: neither end is left out
+        turn = (np.arange(count := 48 if fine else 24) + 0.5) / count * 0.5 * np.pi
+        k = np.sqrt(axes.aspect)
+        phi = np.arctan2(np.sin(turn), k * np.cos(turn))[:, None, None]
+        share = k / (np.sin(turn) ** 2 + (k * np.cos(turn)) ** 2) / count
+        along_x, along_y = axes.widths(roughness[:, None])
+        values = self.exact(Points(*np.broadcast_arrays(x**2, along_x, along_y, phi)), fine)["E"]
+        return np.einsum("prm...,m,p->r...", values, 4.0 * w * x**3, share)
 
 
 def bake(
     target: str | BSDF,
-    lut: tuple[str, ...] | list[str] = ("E", "Eavg", "dfg"),
+    lut: tuple[str, ...] | list[str] | None = None,
     size: int = 128,
     method: str = "quadrature",
-    masking: str = "smith-correlated",
+    masking: str | None = None,
     spp: int = 1024,
     points: str = "hammersley",
     seed: int = 0,
     layout: str = "linear",
+    aspect: float | None = None,
+    azimuths: int = AZIMUTHS,
 ) -> Baked:
-    """Tables of a distribution by name (F = 1), or of a Conductor or Dielectric; alpha = roughness^2 along the axis.
+    """Tables of a distribution by name (F = 1), or of a material.
 
+    target   a distribution, a Conductor or a Dielectric: alpha = roughness^2 along the axis. A Dielectric is seen from
+             outside. Of any other material E[mu] and E_avg as it stands
+    lut      which tables; None is E and Eavg, and dfg of a distribution
     method   "quadrature", "cosine", the distribution's name or "visible"; E_avg of a sampled table is integrated from
              its rows
-    masking  for a distribution by name; a model brings its own
-    Raises InputError for unknown names, sizes outside 1 to 4096 and spp < 1.
+    masking  of a distribution, smith-correlated if not given; a model brings its own
+    aspect   alpha_y / alpha_x of a distribution, the larger being roughness^2; other than 1 it adds the axis phi, a
+             quarter turn from x. A model brings its own, the ratio of its two widths; its rotation is left out
+    Raises InputError for unknown names, sizes outside 1 to 4096, spp < 1 and what the target does not have.
     """
-    model = None if isinstance(target, str) else target
-    if model is not None and not isinstance(model, Conductor | Dielectric):
-        raise InputError(f"{type(model).__name__} given", "bake", "a distribution by name, a Conductor or a Dielectric")
-    ndf = model.ndf if model is not None else distribution_name(str(target))
-    masking = quadrature.known_masking(model.masking if model is not None else masking)
+    material = isinstance(target, BSDF)
+    lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
     for name in lut:
         if name not in LUTS:
             raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, list(LUTS)))
+    for name, given in (("masking", masking), ("aspect", aspect)):
+        if material and given is not None:
+            raise InputError(f"{name} of a material given", f"--{name}", "a material brings its own, by its parameters")
+    if material and "dfg" in lut:
+        raise InputError(
+            "split sum of a material asked for", "--lut", "bake its distribution, such as ggx: it is for any F0"
+        )
     if layout not in LAYOUTS:
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
-    check_size(size)
-    if method != "quadrature" and method not in monte_carlo.methods(ndf):
-        known = ["quadrature", *monte_carlo.methods(ndf)]
-        raise InputError(f"unknown method '{method}'", "--method", did_you_mean(method, known))
-    if method != "quadrature" and (spp < 1 or model is not None):
-        what = f"{spp} samples asked for" if spp < 1 else "models are integrated by quadrature only"
-        raise InputError(
-            what, "--spp" if spp < 1 else "--method", "give 1 or more" if spp < 1 else "leave --method out"
-        )
+    if not 1 <= size <= LARGEST:
+        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {LARGEST}")
+    if material and not isinstance(target, Conductor | Dielectric):
+        return _any_material(target, lut, size, method, layout)  # type: ignore[arg-type]
+    model: Any = target if material else None
+    ndf = distribution(str(target) if model is None else model.ndf).name
+    masking = quadrature.known_masking(masking or "smith-correlated" if model is None else model.masking)
+    aspect = _aspect(model, 1.0 if aspect is None else aspect)
+    _check_method(method, ndf, model, spp)
+    if aspect != 1.0 and not 1 <= azimuths <= LARGEST:
+        raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {LARGEST}")
+    axes = Axes(layout, ndf, masking, size, aspect, azimuths if aspect != 1.0 else 0)
+    asked = _Target(model, ndf, masking)
 
-    roughness, mu = axes(layout, ndf, masking, size)
-    grid = np.broadcast_to(mu, (size, size)), np.broadcast_to(roughness[:, None] ** 2, (size, size))
     arrays: dict[str, np.ndarray] = {}
     errors: dict[str, dict[str, float]] = {}
     if {"E", "dfg"} & set(lut) or ("Eavg" in lut and method != "quadrature"):
-        tables, found = _directional(model, ndf, masking, grid, method, spp, points, seed)
+        tables, found = _directional(asked, axes, method, spp, points, seed)
         arrays.update({k: v for k, v in tables.items() if k in lut})
         errors.update({k: v for k, v in found.items() if k in lut})
         if "E" in arrays and size > 1:
-            errors["E"]["interpolation"] = _interpolation_error(model, ndf, masking, roughness, layout)
+            errors["E"]["interpolation"] = _between(lambda *index: asked.exact(axes.at(*index))["E"], axes)
     if "Eavg" in lut:
-        exact = _average(model, ndf, masking, roughness)
+        rows = np.arange(size)
+        exact = asked.average(axes, rows)
         if method == "quadrature":
-            finer = _average(model, ndf, masking, roughness, fine=True)
-            arrays["E_avg"], errors["E_avg"] = exact, _figures(exact - finer)
+            some = rows[:: 4 if axes.azimuths else 1]
+            arrays["E_avg"], off = exact, exact[some] - asked.average(axes, some, fine=True)
         else:
-            weight = 2.0 * mu * np.gradient(mu) if layout == "stretched" else 2.0 * mu / size
-            arrays["E_avg"] = np.sum(tables["E"] * weight, axis=1) / np.sum(weight * np.ones_like(mu), axis=-1)
-            errors["E_avg"] = _figures(arrays["E_avg"] - exact)
+            arrays["E_avg"] = _average_of_rows(tables["E"], axes)
+            off = arrays["E_avg"] - exact
+        errors["E_avg"] = _figures(off)
+    dims = {"E": list(axes.names), "dfg": list(axes.names), "E_avg": ["roughness"]}
+    nodes = axes.arrays()
     if "glass" in lut:
-        fresnel = model.fresnel if model is not None else "exact"
-        glass, found = _glass(ndf, masking, fresnel, roughness, mu, size)
+        if axes.azimuths:
+            raise InputError("glass with two widths asked for", "--lut", "this table has one width: leave --aspect out")
+        glass, found = _glass(axes, getattr(model, "fresnel", "exact"))
+        nodes["sqrt_f0"] = glass.pop("sqrt_f0")
         arrays.update(glass)
         errors.update(found)
+        dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
+    how = {} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}
+    text = axes.texts()
+    if "glass" in lut:
+        text["sqrt_f0"] = f"slice j at (eta - 1) / (eta + 1) = (j + 1/2) / {GLASS_STEPS} of 2/3; eta is dense over thin"
     manifest = {
-        "schema": SCHEMA,
         "target": _describe(target),
         "ndf": ndf,
         "masking": masking,
         "method": method,
-        **({} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}),
+        **how,
         "size": size,
         "layout": layout,
-        "alpha": "roughness^2",
-        "axes": _axes_text(layout, ndf, masking),
-        "texels": "bilinear between texel centres at (j + 1/2) / N in texture coordinates, clamped at the edges",
+        "alpha": "roughness^2" + (", the larger of both" if axes.azimuths else ""),
+        **({"aspect": aspect} if axes.azimuths else {}),
+        "axes": text,
+    }
+    return _sealed(arrays, nodes, dims, errors, manifest)
+
+
+def cached(target: str | BSDF, **options: Any) -> Baked:
+    """As `bake`, kept in the user's cache folder (`gonio.energy.cache`): what was baked before is only read.
+
+    Kept are distributions, Conductor and Dielectric; of other materials the formulas may stand anywhere.
+    """
+    if isinstance(target, BSDF) and not isinstance(target, Conductor | Dielectric):
+        return bake(target, **options)
+    key = (
+        "baked",
+        _describe(target),
+        None if isinstance(target, str) else _aspect(target, 1.0),
+        sorted(options.items()),
+    )
+    text = repr(key)
+
+    def write(made: Baked) -> bytes:
+        return Baked(made.arrays, {**made.manifest, "asked": text}).npz()
+
+    def read(path: Path) -> Baked:
+        found = baked.read(path)
+        if found.manifest.pop("asked", None) != text:
+            raise ValueError("not what was asked for")
+        return found
+
+    return cache.keep(key, lambda: bake(target, **options), write, read)
+
+
+def _sealed(
+    arrays: dict[str, np.ndarray], nodes: dict[str, np.ndarray], dims: dict[str, list[str]],
+    errors: dict[str, dict[str, float]], manifest: dict[str, Any],
+) -> Baked:  # fmt: skip
+    everything = {**arrays, **nodes}
+    more = {
+        "texels": "linear between nodes along every axis, held at the edges",
+        "dims": {name: dims[name] for name in arrays},
         "tables": {name: list(array.shape) for name, array in arrays.items()},
         "error": errors,
-        "hash": {name: content_hash(array) for name, array in arrays.items()},
+        "hash": {name: content_hash(array) for name, array in everything.items()},
     }
-    return Baked({**arrays, "mu": mu, "roughness": roughness}, manifest)
+    return Baked(everything, {"schema": SCHEMA, **manifest, **more})
 
 
-def distribution_name(name: str) -> str:
-    """A distribution's name; InputError where there is none."""
-    distribution(name)
-    return name
+def _aspect(model: Any, given: float) -> float:
+    """alpha_y / alpha_x as given, or of a model's widths."""
+    if model is not None:
+        check_uniform(model)
+        x, y = widths(model)
+        given = 1.0 if x == y else y / x if x > 0.0 else np.inf
+    if not 1.0 / LARGEST_ASPECT <= given <= LARGEST_ASPECT:
+        hint = f"give {1.0 / LARGEST_ASPECT:g} to {LARGEST_ASPECT:g}"
+        raise InputError(f"alpha_y / alpha_x = {given:g}", "--aspect", hint)
+    return given
 
 
-def check_size(size: int) -> None:
-    """Raise InputError for a table that cannot be."""
-    if not 1 <= size <= LARGEST:
-        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {LARGEST}")
-
-
-def axes(layout: str, ndf: str, masking: str, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """(roughness (N,), mu (N,) or, where stretched, (N, N) by row)."""
-    centres = (np.arange(size) + 0.5) / size
-    if layout == "linear":
-        return centres, centres
-    ends = np.linspace(0.0, 1.0, size) if size > 1 else np.ones(1)
-    return ends, stretched_mu(ndf, masking, ends[:, None], ends[None, :])
-
-
-def stretched_mu(ndf: str, masking: str, roughness: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The cosine at a place x in [0, 1] of the stretched axis."""
-    form = curves.form_of(ndf, masking)
-    bend = curves._numpy_knee(form, masking, np.maximum(roughness**2, quadrature.SMALLEST_ALPHA))
-    top = curves._numpy_squeeze(form, np.ones(1), bend)
-    return np.clip(curves._unsqueeze(form, x * top, bend), 0.0, 1.0)
-
-
-def _axes_text(layout: str, ndf: str, masking: str) -> dict[str, str]:
-    if layout == "linear":
-        return {"roughness": "row j at (j + 1/2) / N", "mu": "column j at (j + 1/2) / N"}
-    form = {
-        "hypot": "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))",
-        "wide": "sqrt(mu / (mu + 4 alpha))",
-        "root": "sqrt(mu / (mu + 4 k)), k the masking's",
-    }[curves.form_of(ndf, masking)]
-    return {"roughness": "row j at j / (N - 1)", "mu": f"column j at s(mu) / s(1) = j / (N - 1), s = {form}"}
+def _check_method(method: str, ndf: str, model: Any, spp: int) -> None:
+    known = ["quadrature", *monte_carlo.methods(ndf)]
+    if method not in known:
+        raise InputError(f"unknown method '{method}'", "--method", did_you_mean(method, known))
+    if method == "quadrature":
+        return
+    if spp < 1:
+        raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
+    if model is not None:
+        hint = "a model is baked by quadrature: leave --method out"
+        raise InputError(f"{type(model).__name__} by '{method}'", "--method", hint)
 
 
 def _figures(difference: np.ndarray) -> dict[str, float]:
     return {"max": float(np.max(np.abs(difference))), "rms": float(np.sqrt(np.mean(difference**2)))}
 
 
-def _exact(
-    model: BSDF | None, ndf: str, masking: str, mu: np.ndarray, alpha: np.ndarray, fine: bool = False
-) -> dict[str, np.ndarray]:
-    """E, and dfg of a distribution, by quadrature."""
-    if model is None:
-        found = quadrature.moments(ndf, masking, mu, alpha, nodes=quadrature.JUDGE if fine else quadrature.NODES)
-        return {"E": found.whole, "dfg": np.stack([found.whole - found.schlick, found.schlick], -1)}
-    if isinstance(model, Conductor):
-        from .albedo import _bound
-
-        nodes = quadrature.JUDGE if fine else quadrature.NODES
-        return {"E": quadrature.reflected(ndf, masking, _bound(model).reflectance, mu, alpha, nodes=nodes)}
-    nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
-    power = quadrature.glass(ndf, masking, model.fresnel, mu, alpha, float(model.eta), nodes=nodes)  # type: ignore[attr-defined]
-    total = power.reflected + (power.transmitted if model.transmits else 0.0)
-    return {"E": total * float(np.mean(model.albedo))}  # type: ignore[attr-defined]
-
-
 def _directional(
-    model: BSDF | None, ndf: str, masking: str, grid: tuple[np.ndarray, np.ndarray], method: str, spp: int,
-    points: str, seed: int,
-) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:  # fmt: skip
-    exact = _exact(model, ndf, masking, *grid)
+    asked: _Target, axes: Axes, method: str, spp: int, points: str, seed: int
+) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
+    exact = asked.exact(axes.nodes())
     if method == "quadrature":
         # judged at the columns where it is hardest, next to grazing and next to the normal, and at every fourth
-        n = grid[0].shape[1]
+        n = axes.size
         some = np.unique(np.concatenate([np.arange(min(4, n)), np.arange(0, n, 4), [n - 1]]))
-        judge = _exact(model, ndf, masking, grid[0][:, some], grid[1][:, some], fine=True)
-        return exact, {name: _figures(exact[name][:, some] - judge[name]) for name in exact}
-    estimate = monte_carlo.estimate(ndf, masking, *grid, method, spp, points, seed).value
+        slices = [np.arange(0, axes.azimuths, 5)] if axes.azimuths else []
+        here = np.ix_(*slices, np.arange(n), some)
+        judge = asked.exact(axes.at(*here), fine=True)
+        return exact, {name: _figures(exact[name][here] - judge[name]) for name in exact}
+    at = axes.nodes()
+    estimate = monte_carlo.estimate(
+        axes.ndf, axes.masking, at.mu, at.alpha, method, spp, points, seed, alpha_y=at.alpha_y, phi=at.phi
+    ).value
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
 
 
-def _average(model: BSDF | None, ndf: str, masking: str, roughness: np.ndarray, fine: bool = False) -> np.ndarray:
-    x, w = quadrature.gauss(48 if fine else 32)
-    mu, alpha = np.broadcast_arrays(x**2, roughness[:, None] ** 2)
-    values = _exact(model, ndf, masking, mu, alpha, fine)["E"]
-    return np.einsum("rm...,m->r...", values, 4.0 * w * x**3)
+def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:
+    """E_avg of a table as its nodes have it: each stands for the stretch halfway to its neighbours."""
+    nodes = axes.nodes()
+    weight = 2.0 * nodes.mu * (np.gradient(nodes.mu, axis=-1) if axes.size > 1 else 1.0)
+    if axes.azimuths > 1:
+        weight = weight * np.gradient(axes.phi(np.arange(axes.azimuths)))[:, None, None]
+    others = tuple(i for i, name in enumerate(axes.names) if name != "roughness")
+    return np.sum(table * weight, axis=others) / np.sum(weight, axis=others)
 
 
-def _interpolation_error(model: BSDF | None, ndf: str, masking: str, roughness: np.ndarray, layout: str) -> float:
-    """Largest error of bilinear interpolation for roughness >= 0.1, at the cells' centres and edges' middles."""
-    size = len(roughness)
-    rows = np.flatnonzero(roughness[:-1] >= 0.1)
+def _between(value: Callable[..., np.ndarray], axes: Axes, extra: int = 0) -> float:
+    """Largest error of linear interpolation for roughness >= 0.1: at the middles of cells and of their edges.
+
+    value  E at indices, whole or half
+    extra  nodes of an axis before those of `axes`
+    """
+    shape = (*([extra] if extra else []), *axes.shape)
+    rows = np.flatnonzero(axes.roughness(np.arange(axes.size))[:-1] >= 0.1)
     if not len(rows):
         return 0.0
-    rows = rows[:: max(1, len(rows) // 24)]
-    columns = np.arange(size - 1) if size <= 128 else np.unique(np.geomspace(1, size - 1, 128).astype(int) - 1)
+    deep = len(shape) > 2
+    rows = rows[:: max(1, len(rows) // (8 if deep else 24))]
+    last = axes.size - 1
+    count = 48 if deep else 128
+    # columns crowd toward grazing, where E bends most
+    columns = np.arange(last) if last < count else np.unique(np.geomspace(1, last, count).astype(int) - 1)
+    cells = [np.arange(max(n - 1, 1)) for n in shape[:-2]] + [rows, columns]
+    free = [n > 1 for n in shape]
+    middles = {tuple(0.5 * f for f in free)}
+    middles |= {tuple(0.5 * (i == axis) for i in range(len(shape))) for axis in range(len(shape)) if free[axis]}
     worst = 0.0
-    for row_part, column_part in ((0.5, 0.5), (0.0, 0.5), (0.5, 0.0)):
-
-        def value(a: float, b: float) -> np.ndarray:
-            r = roughness[rows] + a * (roughness[rows + 1] - roughness[rows])
-            if layout == "linear":
-                mu = ((columns + b + 0.5) / size)[None, :]
-            else:
-                mu = stretched_mu(ndf, masking, r[:, None], ((columns + b) / (size - 1))[None, :])
-            mu, alpha = np.broadcast_arrays(mu, r[:, None] ** 2)
-            return _exact(model, ndf, masking, mu, alpha)["E"]
-
-        between = sum(
-            (row_part if i else 1.0 - row_part) * (column_part if j else 1.0 - column_part) * value(i, j)
-            for i in ((0, 1) if row_part else (0,))
-            for j in ((0, 1) if column_part else (0,))
+    corners = {
+        step: value(*np.ix_(*[c + s for c, s in zip(cells, step, strict=True)]))
+        for step in product(*[(0, 1) if f else (0,) for f in free])
+    }
+    for middle in middles:
+        straight = sum(
+            table * np.prod([part if s else 1.0 - part for s, part in zip(step, middle, strict=True)])
+            for step, table in corners.items()
         )
-        worst = max(worst, float(np.max(np.abs(between - value(row_part, column_part)))))
+        there = value(*np.ix_(*[c + part for c, part in zip(cells, middle, strict=True)]))
+        worst = max(worst, float(np.max(np.abs(straight - there))))
     return worst
 
 
-def _glass(
-    ndf: str, masking: str, fresnel: str, roughness: np.ndarray, mu: np.ndarray, size: int
-) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
-    root = (np.arange(GLASS_STEPS) + 0.5) / GLASS_STEPS * curves.LARGEST_ROOT
-    eta = ((1.0 + root) / (1.0 - root))[:, None, None]
-    shape = (GLASS_STEPS, size, size)
-    cos, alpha = np.broadcast_to(mu, shape), np.broadcast_to((roughness**2)[:, None], shape)
-    arrays: dict[str, np.ndarray] = {"sqrt_f0": root}
+def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, dict[str, float]]]:
+    """Both sides over (sqrt_f0, roughness, mu): reflected and transmitted power; their sum is E."""
+
+    def root(index: Any) -> Any:
+        return (index + 0.5) / GLASS_STEPS * curves.LARGEST_ROOT
+
+    def power(dense: bool, fine: bool, step: Any, *index: Any) -> np.ndarray:
+        at = axes.at(*index)
+        eta = (1.0 + root(step)) / (1.0 - root(step))
+        nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
+        ratio = 1.0 / eta if dense else eta
+        return np.stack(quadrature.glass(axes.ndf, axes.masking, fresnel, at.mu, at.alpha, ratio, nodes=nodes), -1)
+
+    arrays: dict[str, np.ndarray] = {"sqrt_f0": root(np.arange(GLASS_STEPS))}
     errors = {}
-    some = (slice(None, None, 5), slice(None, None, 7), slice(None, None, 7))
-    for side, ratio in (("thin", eta), ("dense", 1.0 / eta)):
-        ratio = np.broadcast_to(ratio, shape)
-        name = f"E_glass_{side}"
-        arrays[name] = sum(quadrature.glass(ndf, masking, fresnel, cos, alpha, ratio))  # type: ignore[assignment]
-        judge = quadrature.glass(
-            ndf, masking, fresnel, cos[some], alpha[some], ratio[some], nodes=quadrature.GLASS_JUDGE
-        )
-        errors[name] = _figures(arrays[name][some] - sum(judge))
+    every = np.ix_(np.arange(GLASS_STEPS), *map(np.arange, axes.shape))
+    some = np.ix_(np.arange(0, GLASS_STEPS, 5), *[np.arange(0, n, 7) for n in axes.shape])
+    for name, dense in zip(NAMES["glass"], (False, True), strict=True):
+        arrays[name] = power(dense, False, *every)
+        errors[name] = _figures((arrays[name][some] - power(dense, True, *some)).sum(-1))
+        if axes.size > 1:
+
+            def whole(*index: Any, dense: bool = dense) -> np.ndarray:
+                return power(dense, False, *index).sum(-1)
+
+            errors[name]["interpolation"] = _between(whole, axes, GLASS_STEPS)
     return arrays, errors
 
 
-def _describe(target: str | BSDF) -> Any:
+def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, method: str, layout: str) -> Baked:
+    """E[mu] and E_avg of a material without a roughness of its own, from above, by `gonio.energy.albedo`."""
+    kind = type(model).__name__
+    if set(lut) - {"E", "Eavg"}:
+        wrong = next(name for name in lut if name not in ("E", "Eavg"))
+        raise InputError(f"table '{wrong}' of {kind}", "--lut", "of this material E and Eavg: --lut E,Eavg")
+    if layout != "linear" or method != "quadrature":
+        raise InputError(f"{kind} by {method}, {layout}", "bake", "this material is baked by quadrature, linear in mu")
+    mu = (np.arange(size) + 0.5) / size
+    arrays, errors, dims = {}, {}, {"E": ["mu"], "E_avg": []}
+    if "E" in lut:
+        found = albedo(model, mu)
+        arrays["E"], errors["E"] = found.value, _figures(found.error)
+    if "Eavg" in lut:
+        x, w = quadrature.gauss(24)
+        found = albedo(model, x**2)
+        arrays["E_avg"] = 4.0 * (w * x**3) @ found.value
+        errors["E_avg"] = _figures(4.0 * (w * x**3) @ found.error)
+    manifest = {
+        "target": _describe(model),
+        "ndf": getattr(model, "name", kind),
+        "masking": "",
+        "method": method,
+        "size": size,
+        "layout": layout,
+        "axes": {"mu": "column j at (j + 1/2) / N"},
+    }
+    return _sealed(arrays, {"mu": mu}, dims, errors, manifest)
+
+
+def _describe(target: Any) -> Any:
+    """A target as the manifest names it; a width that is an axis is left out."""
     if isinstance(target, str):
         return target
-    values = {n: getattr(target, n) for n in target.parameters() if n not in ("alpha", "rotation", "sampling")}
-    return {"model": target.name, **{n: np.asarray(v).tolist() for n, v in values.items()}}
-
-
-# --------------------------------------------------------------------------- reading
-
-
-def load(path: str | Path) -> Baked:
-    """The tables in a folder, or in a tables.npz. InputError where it is not one, or is damaged or altered."""
-    path = Path(path)
-    file_path = path / "tables.npz" if path.is_dir() else path
-    hint = "gonio bake ggx -o DIR writes one"
-    if not file_path.is_file():
-        raise InputError("no tables.npz here", str(path), hint)
-    if file_path.suffix.lower() != ".npz":
-        raise InputError(f"a '{file_path.suffix}' given, a folder or a tables.npz expected", str(path), hint)
-    try:
-        with np.load(file_path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        manifest = json.loads(str(arrays.pop("manifest")))
-        hashes = manifest["hash"]
-    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError("damaged, or not written by gonio bake", str(file_path), "bake it again") from error
-    altered = [name for name, value in hashes.items() if name not in arrays or content_hash(arrays[name]) != value]
-    if altered:
-        raise InputError(f"'{altered[0]}' is not what the manifest says", str(file_path), "altered: bake it again")
-    return Baked(arrays, manifest)
-
-
-# --------------------------------------------------------------------------- the homework's pictures
-
-
-def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict[str, np.ndarray]:
-    """E and E_avg as the homework has them: (N, N, 3) of 8 bits, x = n.v, three equal channels, E_avg along the row.
-
-    store  "E" or "1-E"
-    flip   True: the bottom row is the lowest roughness; False: the top row is
-    """
-    if store not in ("E", "1-E"):
-        raise InputError(f"unknown '{store}'", "--store", "E or 1-E")
-    size = baked.manifest["size"]
-    pictures: dict[str, np.ndarray] = {}
-    for name in ("E", "E_avg"):
-        if name not in baked.arrays:
-            continue
-        value = baked.arrays[name]
-        value = np.broadcast_to(value[:, None], (size, size)) if value.ndim == 1 else value
-        value = np.clip(1.0 - value if store == "1-E" else value, 0.0, 1.0)
-        value = value[::-1] if flip else value
-        pictures[name] = np.repeat(np.round(value * 255.0).astype(np.uint8)[..., None], 3, axis=-1)
-    return pictures
-
-
-__all__ = ["LUTS", "Baked", "bake", "distributions", "homework_pictures", "load"]
+    swept = ("alpha", "rotation", "sampling") if isinstance(target, Conductor | Dielectric) else ()
+    found: dict[str, Any] = {"model": target.name}
+    for name, parameter in target.parameters().items():
+        if name not in swept:
+            value = getattr(target, name)
+            found[name] = _describe(value) if parameter.kind == "bsdf" else np.asarray(value).tolist()
+    return found

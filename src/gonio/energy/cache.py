@@ -1,26 +1,26 @@
 """Tables that were computed once: kept in the user's cache folder by a hash of what they are.
 
-The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file that is truncated, altered or
-not ours is rebuilt, with a warning; a folder that cannot be written is no hindrance.
+The folder is `$GONIO_CACHE`, else `$XDG_CACHE_HOME/gonio`, else `~/.cache/gonio`. A file's name is the hash of what was
+asked for and of the formulas behind it; inside stands the hash of its content. A file that is truncated, altered or not
+ours is rebuilt, with a warning; a folder that cannot be written is no hindrance.
 """
 
 from __future__ import annotations
 
 import hashlib
-import inspect
 import io
 import os
 import warnings
-import zipfile
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from ..errors import GonioWarning
-from ..optics import fresnel, masking, special
-from ..optics.ndf import base, distribution, ggx
+
+Kept = TypeVar("Kept")
 
 
 def folder() -> Path:
@@ -37,53 +37,64 @@ def content_hash(values: np.ndarray) -> str:
     return hashlib.sha256(repr(array.shape).encode() + array.tobytes()).hexdigest()
 
 
-def _fingerprint(key: tuple, ndf: str) -> str:
-    """Hash of what is asked for and of the formulas behind it: changed optics make new tables."""
-    from . import quadrature
-
-    modules = {m.__name__: m for m in (fresnel, masking, special, base, ggx, quadrature)}
-    own = inspect.getmodule(type(distribution(ndf)))
-    modules[type(distribution(ndf)).__module__] = own  # type: ignore[assignment]
-    text = "".join(inspect.getsource(modules[name]) for name in sorted(modules))
-    return hashlib.sha256((repr(key) + text).encode()).hexdigest()
+@lru_cache
+def _formulas() -> str:
+    """Hash of the source of every room that a table depends on: changed optics make new tables."""
+    package = Path(__file__).parent.parent
+    files = sorted(p for room in ("energy", "models", "optics") for p in (package / room).rglob("*.py"))
+    return hashlib.sha256(b"\0".join(p.read_bytes() for p in files)).hexdigest()
 
 
-def remember(key: tuple, build: Callable[[], np.ndarray], ndf: str) -> np.ndarray:
-    """The array that `key` names, read from the cache or built and kept.
+def _path(key: tuple) -> tuple[Path, str]:
+    """(file, full name) of what `key` names; its first entry says what kind of thing it is."""
+    name = hashlib.sha256((repr(key) + _formulas()).encode()).hexdigest()
+    return folder() / f"{key[0]}-{name[:32]}.npz", name
 
-    key  everything the array depends on besides the formulas of the optics, which are added
+
+def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], read: Callable[[Path], Kept]) -> Kept:
+    """What `key` names, read from the cache or built and kept there.
+
+    key   everything that it depends on besides the formulas of the rooms, which are added
+    read  raises ValueError where the file is not what `write` made
     """
-    name = _fingerprint(key, ndf)
-    path = folder() / f"{key[0]}-{name[:32]}.npz"
-    found = _read(path, name)
-    if found is not None:
-        return found
-    values = np.asarray(build(), dtype=np.float64)
-    stream = io.BytesIO()
-    np.savez(stream, values=values, name=np.array(name), hash=np.array(content_hash(values)))
+    path, _ = _path(key)
+    if path.is_file():
+        try:
+            return read(path)
+        except ValueError as error:
+            warnings.warn(f"{path}: {error}; it is built again", GonioWarning, stacklevel=3)
+    made = build()
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(stream.getvalue())
+        part.write_bytes(write(made))
         os.replace(part, path)
     except OSError:
         pass  # a read-only home costs time, not correctness
     finally:
         if part.exists():
             part.unlink(missing_ok=True)
-    return values
+    return made
 
 
-def _read(path: Path, name: str) -> np.ndarray | None:
-    if not path.is_file():
-        return None
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            values: Any = file["values"]
-            fine = str(file["name"]) == name and str(file["hash"]) == content_hash(values)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        fine = False
-    if fine:
+def remember(key: tuple, build: Callable[[], np.ndarray]) -> np.ndarray:
+    """The array that `key` names, as `keep` keeps it."""
+    _, name = _path(key)
+
+    def write(values: np.ndarray) -> bytes:
+        stream = io.BytesIO()
+        np.savez(stream, values=values, name=np.array(name), hash=np.array(content_hash(values)))
+        return stream.getvalue()
+
+    def read(path: Path) -> np.ndarray:
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                values = file["values"]
+                fine = str(file["name"]) == name and str(file["hash"]) == content_hash(values)
+        except Exception as error:  # a file of any content: zip, zlib and NumPy each have their own ways to fail
+            raise ValueError("damaged, or not ours") from error
+        if not fine:
+            raise ValueError("altered, or not ours")
         return values
-    warnings.warn(f"{path} is damaged or not ours: building the table again", GonioWarning, stacklevel=3)
-    return None
+
+    return keep(key, lambda: np.asarray(build(), dtype=np.float64), write, read)

@@ -29,7 +29,6 @@ DEGREE = 10  # errs by 1e-4 (GGX, Beckmann), 5e-4 (Beckmann's rational fit, whic
 CHANNELS = DEGREE + 2  # the last is M_avg
 LOBE_NODES = 256  # the density between them is off by 1e-4; with 64 a furnace by sampling was 4e-4 short
 NODES_OF_FIT = 64
-VERSION = 3
 
 
 # How mu is bent into s, by form:   s(mu)                              bend
@@ -65,17 +64,17 @@ def squeeze(form: str, mu: Any, bend: Any) -> Any:
     return ratio if form == "ratio" else sqrt(ratio)
 
 
-def _numpy_knee(form: str, masking: str, alpha: np.ndarray) -> np.ndarray:
+def numpy_knee(form: str, masking: str, alpha: np.ndarray) -> np.ndarray:
     k = (np.sqrt(alpha) + 1.0) ** 2 / 8.0 if masking == "schlick-direct" else alpha / 2.0
     return k * (4.0 if form == "root" else 8.0)
 
 
-def _numpy_squeeze(form: str, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
+def numpy_squeeze(form: str, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
     ratio = mu / (np.hypot(mu, bend) if form == "hypot" else mu + bend)
     return ratio if form == "ratio" else np.sqrt(ratio)
 
 
-def _unsqueeze(form: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
+def unsqueeze(form: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
     ratio = s if form == "ratio" else s**2
     return bend * ratio / (np.sqrt(1.0 - ratio**2) if form == "hypot" else 1.0 - ratio)
 
@@ -87,8 +86,8 @@ def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) ->
     Returns (rows, CHANNELS); the last channel is M_avg, of the polynomial where that is not negative.
     """
     x = -np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
-    top = _numpy_squeeze(form, np.ones(1), bend[:, None])
-    mu = _unsqueeze(form, 0.5 * (x + 1.0) * top, bend[:, None])
+    top = numpy_squeeze(form, np.ones(1), bend[:, None])
+    mu = unsqueeze(form, 0.5 * (x + 1.0) * top, bend[:, None])
     value = missing(np.clip(mu, 0.0, 1.0))
     basis = np.polynomial.chebyshev.chebvander(x, DEGREE)
     rows = []
@@ -112,7 +111,7 @@ def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) ->
 
 def evaluate(form: str, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """M of rows of coefficients at mu (rows, nodes), as `missing` computes it."""
-    x = 2.0 * _numpy_squeeze(form, mu, bend[:, None]) / _numpy_squeeze(form, np.ones(1), bend[:, None]) - 1.0
+    x = 2.0 * numpy_squeeze(form, mu, bend[:, None]) / numpy_squeeze(form, np.ones(1), bend[:, None]) - 1.0
     total = np.zeros(np.broadcast_shapes(x.shape, (len(bend), 1)))
     for power in range(DEGREE, -1, -1):
         total = total * x + coefficients[:, power, None]
@@ -128,12 +127,12 @@ def isotropic(ndf: str, masking: str) -> Table:
         form = form_of(ndf, masking)
         return fit(
             form,
-            _numpy_knee(form, masking, alpha),
+            numpy_knee(form, masking, alpha),
             lambda mu: 1.0 - quadrature.moments(ndf, masking, mu, alpha[:, None]).whole,
         )
 
-    key = ("curves", VERSION, ndf, masking, ROWS, DEGREE)
-    return Table(f"missing_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build, ndf))
+    key = ("curves", ndf, masking, ROWS, DEGREE)
+    return Table(f"missing_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
 @lru_cache
@@ -141,7 +140,7 @@ def lobe(ndf: str, masking: str) -> Table:
     """mu^2 over (roughness, u): the inverse of the share of M mu below mu, to sample the lobe proportional to it."""
     alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
     form = form_of(ndf, masking)
-    bend = _numpy_knee(form, masking, alpha)
+    bend = numpy_knee(form, masking, alpha)
     inverse = _inverse(form, isotropic(ndf, masking).values[:, :-1], bend, LOBE_NODES)
     return Table(f"lobe_{ndf}_{masking}".replace("-", "_"), inverse[..., None])
 
@@ -180,7 +179,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
                 at = quadrature.moments(ndf, masking, mu, big[:, None], small[:, None], phi[:, None], nodes=(28, 28))
                 return 1.0 - at.whole
 
-            by_azimuth.append(fit(form, _numpy_knee(form, masking, seen), missing, nodes=24)[:, :-1])
+            by_azimuth.append(fit(form, numpy_knee(form, masking, seen), missing, nodes=24)[:, :-1])
         found = np.einsum("jy,yrk->rkj", to_powers, np.array(by_azimuth))
         # M_avg: over azimuth and cosine, of the fit itself
         turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
@@ -191,15 +190,15 @@ def anisotropic(ndf: str, masking: str) -> Table:
             seen = np.sqrt(big**2 * cos2 + small**2 * sin2)
             here = (big * cos2 - small * sin2) / (big * cos2 + small * sin2)
             rows = np.einsum("rkj,rj->rk", found, here[:, None] ** np.arange(HARMONICS))
-            values = evaluate(form, rows, _numpy_knee(form, masking, seen), node[None, :] ** 2)
+            values = evaluate(form, rows, numpy_knee(form, masking, seen), node[None, :] ** 2)
             average += values @ (4.0 * weight * node**3) / len(turns)
         table = np.zeros((len(big), TURNED))
         table[:, : (DEGREE + 1) * HARMONICS] = found.reshape(len(big), -1)
         table[:, -1] = average
         return table.reshape(ASPECTS, ASPECT_ROWS, TURNED)
 
-    key = ("turned", VERSION, ndf, masking, ASPECTS, ASPECT_ROWS, HARMONICS, DEGREE)
-    return Table(f"missing_turned_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build, ndf))
+    key = ("turned", ndf, masking, ASPECTS, ASPECT_ROWS, HARMONICS, DEGREE)
+    return Table(f"missing_turned_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
 def _azimuth(y: float, big: np.ndarray, small: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -233,11 +232,11 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
                 power = quadrature.glass(ndf, masking, fresnel, mu, alphas[:, None], ratio[:, None])
                 return 1.0 - power.reflected - power.transmitted
 
-            sides.append(fit(form, _numpy_knee(form, masking, alphas), missing, nodes=36))
+            sides.append(fit(form, numpy_knee(form, masking, alphas), missing, nodes=36))
         return np.array(sides).reshape(2, GLASS_ETAS, GLASS_ROWS, CHANNELS)
 
-    key = ("glass", VERSION, ndf, masking, fresnel, GLASS_ETAS, GLASS_ROWS, DEGREE)
-    values = cache.remember(key, build, ndf)
+    key = ("glass", ndf, masking, fresnel, GLASS_ETAS, GLASS_ROWS, DEGREE)
+    values = cache.remember(key, build)
     stem = f"missing_glass_{ndf}_{masking}_{fresnel}".replace("-", "_")
     return {side: Table(f"{stem}_{side}", v) for side, v in zip(SIDES, values, strict=True)}
 
@@ -249,7 +248,7 @@ def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():
         form = form_of(ndf, masking, side)
-        bend = _numpy_knee(form, masking, np.tile(alpha, GLASS_ETAS))
+        bend = numpy_knee(form, masking, np.tile(alpha, GLASS_ETAS))
         inverse = _inverse(form, table.values.reshape(-1, CHANNELS)[:, :-1], bend, GLASS_LOBE_NODES)
         name = table.name.replace("missing", "lobe")
         tables[side] = Table(name, inverse.reshape(GLASS_ETAS, GLASS_ROWS, GLASS_LOBE_NODES, 1))

@@ -56,9 +56,12 @@ def estimate(
     points: str = "hammersley",
     seed: int = 0,
     precision: str = "float32",
+    alpha_y: Any = None,
+    phi: Any = 0.0,
 ) -> Estimate:
     """E at each (mu, alpha) from `spp` samples.
 
+    alpha_y, phi  the width along y, where it is another one, and the azimuth of wo
     points  "hammersley": the same points at every texel, as the homework has it; "independent": new ones everywhere
     Returns float64 arrays of the broadcast shape. Raises InputError for unknown names and spp < 1.
     """
@@ -71,12 +74,13 @@ def estimate(
         raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
     dr = backend.drjit()
     kind = backend.types(precision)
-    arrays = np.broadcast_arrays(np.asarray(mu, float), np.asarray(alpha, float))
+    given = (mu, alpha, alpha if alpha_y is None else alpha_y, phi)
+    arrays = np.broadcast_arrays(*[np.asarray(a, float) for a in given])
     shape, count = arrays[0].shape, arrays[0].size
-    mu_, alpha_ = [backend.float_of(a.ravel(), kind) for a in arrays]
-    sin_o = dr.sqrt((1.0 - mu_) * (1.0 + mu_))
-    wo = ops.vec3(sin_o, 0.0 * sin_o, mu_)
-    widths = kind.vec2(alpha_, alpha_)
+    mu_, along_x, along_y, turn = [backend.float_of(a.ravel(), kind) for a in arrays]
+    sin_o, (sin_phi, cos_phi) = dr.sqrt((1.0 - mu_) * (1.0 + mu_)), dr.sincos(turn)
+    wo = ops.vec3(sin_o * cos_phi, sin_o * sin_phi, mu_)
+    widths = kind.vec2(along_x, along_y)
     chosen = distribution(ndf)
     first, second = [kind.float(c) for c in (hammersley(spp).T if points == "hammersley" else np.zeros((2, 1)))]
     generator = kind.module.PCG32(size=count, initstate=seed)

@@ -16,8 +16,11 @@ t (alpha_x cos b, alpha_y sin b), so that dm = alpha_x alpha_y cos^3(theta_m) t 
     anisotropy is gone from everything but the boundary and G;
   - t = sinh(x) spends the same number of nodes on each octave of slope, from the peak through GGX's long tail;
   - across b - b_o = +-pi/2 the boundary leaps from theta_o's complement, small at grazing, to nearly pi/2, within an
-    angle of about cot(theta_o). With b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and
-    sinh(a) = (pi/2) / cot(theta_o), the leap takes as long in x as everything else.
+    angle of about w = mu |(alpha_x sin b_o, alpha_y cos b_o)| / S, cot(theta_o) with one width. With
+    b - b_o = pi/2 - chi, chi = (pi/2) sinh(a x) / sinh(a) and sinh(a) = (pi/2) / w, the leap takes as long in x as
+    everything else;
+  - where m's azimuth is o's the integrand has an edge at grazing. With one width that is b = b_o, the end of both half
+    turns anyway; with two it lies beside, and the half turns are made to end there.
 
 **Glass.** Reflection and transmission share the normals that o sees, theta_m < pi/2 + min(delta, 0). F has a root at
 the critical angle, o.m = cos_c; along a stretched azimuth o.m = A cos(theta_m - delta), so the root is met at
@@ -46,6 +49,9 @@ from ..optics.ndf import NDF, distribution
 # to 2e-7, and to 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.
 NODES = (40, 32)
 JUDGE = (60, 48)  # what NODES are judged by
+# The same for two widths: with a ratio down to .1, 1.2e-5; where they are all but equal, NODES would do
+TURNED_NODES = (64, 32)
+TURNED_JUDGE = (96, 48)
 # Glass: over (each of three pieces of chi, each of five pieces of x)
 GLASS_NODES = (12, 10)
 GLASS_JUDGE = (24, 20)
@@ -102,14 +108,14 @@ def moments(
     alpha: Any,
     alpha_y: Any = None,
     phi: Any = 0.0,
-    nodes: tuple[int, int] = NODES,
+    nodes: tuple[int, int] | None = None,
 ) -> Moments:
     """E at each (mu, alpha): the albedo of D G / (4 cos cos) with F = 1, and with F = (1 - o.m)^5.
 
     mu              cosine of wo, an array or a number in [0, 1]
     alpha, alpha_y  widths along x and y; alpha_y None is isotropic
     phi             azimuth of wo, radians
-    nodes           Gauss-Legendre nodes in azimuth and slope
+    nodes           Gauss-Legendre nodes in azimuth and slope; None is NODES, or TURNED_NODES with two widths
     Returns float64 arrays of the broadcast shape.
     """
     known_masking(masking_name)
@@ -124,7 +130,7 @@ def moments(
 
 def reflected(
     ndf: str, masking_name: str, reflectance: Callable[[Any], Any], mu: Any, alpha: Any, alpha_y: Any = None,
-    phi: Any = 0.0, nodes: tuple[int, int] = NODES,
+    phi: Any = 0.0, nodes: tuple[int, int] | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Albedo of a microfacet BRDF with any Fresnel reflectance: a function of the facet's cosine to a spectrum.
 
@@ -165,7 +171,9 @@ def glass(
     return TwoWays(*over_normals(ndf, terms, 2, mu, alpha, alpha_y, phi, eta=eta, nodes=nodes))
 
 
-def average(ndf: str, masking_name: str, alpha: Any, nodes: tuple[int, int] = NODES, count: int = 32) -> np.ndarray:
+def average(
+    ndf: str, masking_name: str, alpha: Any, nodes: tuple[int, int] | None = None, count: int = 32
+) -> np.ndarray:
     """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by Gauss-Legendre in sqrt(mu)."""
     x, w = gauss(count)
     alpha = np.asarray(alpha, float)
@@ -174,7 +182,7 @@ def average(ndf: str, masking_name: str, alpha: Any, nodes: tuple[int, int] = NO
 
 def over_normals(
     ndf: str, terms: Callable[..., tuple[Any, ...]], channels: int, mu: Any, alpha: Any, alpha_y: Any, phi: Any,
-    eta: Any = None, nodes: tuple[int, int] = NODES,
+    eta: Any = None, nodes: tuple[int, int] | None = None,
 ) -> list[np.ndarray]:  # fmt: skip
     """int D(m) (o.m) / mu terms(...) dm over the normals that mirror o above the surface or, with eta, that o sees.
 
@@ -182,6 +190,7 @@ def over_normals(
     Returns one array a channel, of the broadcast shape.
     """
     isotropic = alpha_y is None
+    nodes = nodes or (NODES if isotropic else TURNED_NODES)
     given = [mu, alpha, alpha if isotropic else alpha_y, phi, 2.0 if eta is None else eta]
     arrays = np.broadcast_arrays(*[np.asarray(v, float) for v in given])
     shape, flat = arrays[0].shape, [a.ravel() for a in arrays]
@@ -241,9 +250,16 @@ def _over_slopes(
     sin_bo = dr.select(length > 0.0, stretched.y / length, 0.0)
 
     # chi = (pi/2) sinh(a x) / sinh(a), x in [-1, 1]; the leap's width is held below 1, where it is no leap
-    leap = dr.minimum(mu / dr.maximum(sin_o, 1e-9), 1.0)
+    across = dr.norm(ops.vec2(alpha.x * sin_bo, alpha.y * cos_bo))
+    leap = dr.minimum(mu * across / dr.maximum(length, 1e-9 * across), 1.0)
     a = _asinh(0.5 * ops.pi / leap)
-    x = 2.0 * chi - 1.0
+    # the edge where m's azimuth is o's lies off b_o by beta
+    edge_x, edge_y = wo.x / alpha.x, wo.y / alpha.y
+    beta = dr.atan2(edge_y * cos_bo - edge_x * sin_bo, edge_x * cos_bo + edge_y * sin_bo)
+    beta = dr.select(length > 0.0, beta, 0.0)
+    top = _signed_asinh((0.5 * ops.pi - side * beta) / leap) / a
+    x = (top + 1.0) * chi - 1.0
+    stretch = 0.5 * (top + 1.0)
     if eta is not None:
         # where A = cos_c: cos(phi_m - phi_o) = +-q; two cuts in chi, or none
         cos_c = dr.sqrt(dr.maximum(1.0 - dr.square(eta), 0.0))
@@ -251,23 +267,23 @@ def _over_slopes(
         cut = (cos_c > mu) & (q < 1.0)
         turn = dr.acos(dr.minimum(q, 1.0))
         ends = []
-        for psi, fallback in ((turn, 1.0 / 3.0), (ops.pi - turn, -1.0 / 3.0)):
+        for psi, fallback in ((turn, top / 3.0), (ops.pi - turn, -1.0 / 3.0)):
             s_, c_ = dr.sincos(phi + side * psi)
             bx, by = c_ / alpha.x, s_ / alpha.y
             relative = side * dr.atan2(by * cos_bo - bx * sin_bo, bx * cos_bo + by * sin_bo)
             chi_cut = 0.5 * ops.pi - relative
             ends.append(dr.select(cut, _signed_asinh(chi_cut / leap) / a, fallback))
-        # pieces [-1, low], [low, high], [high, 1]; chi arrives as the piece's number plus the place in it
+        # pieces [-1, low], [low, high], [high, top]; chi arrives as the piece's number plus the place in it
         high, low = ends
         piece = dr.floor(chi)
         start = dr.select(piece < 0.5, -1.0, dr.select(piece < 1.5, low, high))
-        stop = dr.select(piece < 0.5, low, dr.select(piece < 1.5, high, 1.0))
+        stop = dr.select(piece < 0.5, low, dr.select(piece < 1.5, high, top))
         s_ = chi - piece
         x = start + (stop - start) * s_ * s_ * (3.0 - 2.0 * s_)
-        chi_weight = chi_weight * 3.0 * s_ * (1.0 - s_) * (stop - start)  # of x over [0, 1]: half
+        stretch = 3.0 * s_ * (1.0 - s_) * (stop - start)  # of x over [0, 1]: half
     grow = dr.exp(a * x)
     angle = 0.5 * leap * (grow - 1.0 / grow)
-    weight = chi_weight * (leap * a) * (grow + 1.0 / grow)
+    weight = chi_weight * stretch * (leap * a) * (grow + 1.0 / grow)
 
     # the unit vector of b = b_o + pi/2 - chi, stretched: the slope of the normals at t = 1
     sin_b, cos_b = side * dr.cos(angle), dr.sin(angle)

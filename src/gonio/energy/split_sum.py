@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..models import microfacet
 from ..ops import Table, inset, lookup, maximum, sqrt
 from . import cache, curves, quadrature
+from .axes import stretched_mu
 from .monte_carlo import hammersley
 
 SIZE = 64
@@ -26,14 +27,12 @@ def schlick_table(ndf: str, masking: str) -> Table:
     """B over (roughness, s(mu) / s(1)), nodes at both ends of each axis."""
 
     def build() -> np.ndarray:
-        from .bake import stretched_mu
-
         ends = np.linspace(0.0, 1.0, SIZE)
-        mu = stretched_mu(ndf, masking, ends[:, None], ends[None, :])
+        mu = stretched_mu(ndf, masking, ends[:, None] ** 2, ends[None, :])
         return quadrature.moments(ndf, masking, mu, ends[:, None] ** 2).schlick[..., None]
 
-    key = ("schlick", 2, ndf, masking, SIZE)
-    return Table(f"schlick_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build, ndf))
+    key = ("schlick", ndf, masking, SIZE)
+    return Table(f"schlick_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
 def reflected(base: Any, f0: Any, whole: Any, wo: Any) -> Any:

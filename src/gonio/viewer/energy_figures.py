@@ -1,51 +1,133 @@
-"""Figures of energy: the tables E and E_avg with axes, and the compensations side by side."""
+"""Figures of energy: baked tables with axes, and the compensations side by side."""
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..energy import comparison
-from ..energy.bake import load
+from ..energy.baked import Baked, load
+from ..render import tables
 from . import figures
+
+SLICES = 4  # of a table with three axes, at most
+
+
+class _Panel(NamedTuple):
+    """One picture of a figure: a table over roughness and mu, or a curve."""
+
+    title: str
+    values: np.ndarray
+    curve: str = ""  # the axis that it runs along
 
 
 def plot_tables(folder: str | Path, output: Path | None = None) -> Path:
-    """Draw a baked folder: E over n.v and roughness, low roughness at the bottom as in the homework, and E_avg."""
+    """Draw a baked folder: every table over n.v and roughness, low roughness at the bottom as in the homework.
+
+    Slices of a third axis stand side by side; E_avg, and what depends on the cosine alone, is a curve.
+    """
+    import matplotlib as mpl
     from matplotlib.figure import Figure
 
     baked = load(folder)
     path = figures.check_output(output or Path(f"{Path(folder).resolve().stem}-tables.png"))
-    names = [n for n in ("E", "E_avg") if n in baked.arrays]
-    figure = Figure(figsize=(4.6 * len(names), 4.0), layout="constrained")
-    m = baked.manifest
-    figure.suptitle(f"{m['ndf']}, {m['masking']}, {m['method']}", fontsize=10)
-    for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names, strict=True):
-        value = baked.arrays[name]
-        if name == "E_avg":
-            axes.plot(baked.arrays["roughness"], value, color="0.2")
-            axes.set(xlabel="roughness", ylabel="E_avg", xlim=(0, 1), ylim=(0, 1.02))
-            axes.grid(alpha=0.3)
-            continue
-        value = value.mean(-1) if value.ndim == 3 else value
-        image = axes.imshow(value, origin="lower", extent=(0, 1, 0, 1), cmap="gray", vmin=0, vmax=1)
-        stretched = m["layout"] == "stretched"
-        axes.set(xlabel="s(n.v) / s(1)" if stretched else "n.v", ylabel="roughness")
-        figure.colorbar(image, ax=axes, label="E")
-    figure.savefig(path, dpi=150)
-    return path
+    rows = [row for name in baked.manifest["dims"] for row in _rows(baked, name)]
+    curves = [panel for row in rows for panel in row if panel.curve]
+    rows = [row for row in rows if not row[0].curve] or [[]]
+    rows[0] = rows[0] + curves
+    columns = max(map(len, rows))
+    with mpl.rc_context(figures.STYLE):
+        figure = Figure(figsize=(3.4 * columns + 0.8, 3.7 * len(rows) + 0.4), layout="constrained")
+        figure.suptitle(_title(baked.manifest), fontsize=11)
+        grid = figure.subplots(len(rows), columns, squeeze=False)
+        for line, row in zip(grid, rows, strict=True):
+            for axes, panel in zip(line, row, strict=False):
+                _draw(axes, panel, baked)
+            for axes in line[len(row) :]:
+                axes.set_axis_off()
+        if any(not panel.curve for row in rows for panel in row):
+            scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, 1), "gray")
+            figure.colorbar(scale, ax=grid, shrink=0.8 / len(rows), pad=0.01)
+        return figures.save(figure, path, 150, f"gonio plot {folder}")
 
 
-def plot_comparison(found: dict[str, Any], folder: Path) -> Path:
+def _title(manifest: dict[str, Any]) -> str:
+    target = manifest["target"] if isinstance(manifest["target"], str) else manifest["target"]["model"]
+    parts = [
+        target,
+        *([manifest["ndf"]] if manifest["ndf"] not in target else []),
+        manifest["masking"],
+        manifest["method"],
+    ]
+    if "aspect" in manifest:
+        parts.append(f"alpha_y / alpha_x = {manifest['aspect']:g}")
+    return ", ".join(filter(None, parts))
+
+
+def _rows(baked: Baked, name: str) -> list[list[_Panel]]:
+    """The pictures of one table, a row for each channel that means something else: slices of a third axis."""
+    values, dims = baked.arrays[name], baked.manifest["dims"][name]
+    if not dims:
+        return []
+    if len(dims) == 1:
+        return [[_Panel(name, values, dims[0])]]
+    if name == "dfg":
+        parts = {"A": values[..., 0], "B": values[..., 1]}
+    elif name.startswith("E_glass"):
+        parts = {f"from the {name.removeprefix('E_glass_')} side": values.sum(-1)}
+    else:
+        parts = {name: values.mean(-1) if values.ndim > len(dims) else values}
+    if len(dims) == 2:
+        return [[_Panel(title, part) for title, part in parts.items()]]
+    along = baked.arrays[dims[0]]
+    chosen = np.unique(np.linspace(0, len(along) - 1, SLICES).round().astype(int))
+    return [
+        [_Panel(f"{title}, {_place(dims[0], along[index])}", part[index]) for index in chosen]
+        for title, part in parts.items()
+    ]
+
+
+def _place(axis: str, value: float) -> str:
+    """A node of a third axis in words."""
+    if axis == "phi":
+        return f"phi = {np.degrees(value):.0f}°"
+    return f"eta = {(1.0 + value) / (1.0 - value):.2f}"
+
+
+def _draw(axes: Any, panel: _Panel, baked: Baked) -> None:
+    if not panel.curve:
+        stretched = baked.manifest["layout"] == "stretched"
+        axes.imshow(panel.values, origin="lower", extent=(0, 1, 0, 1), cmap="gray", vmin=0, vmax=1)
+        axes.set(xlabel="s(n.v) / s(1)" if stretched else "n.v", ylabel="roughness", title=panel.title)
+        return
+    colours = figures.CHANNELS if panel.values.ndim == 2 else (figures.INK,)
+    for column, colour in zip(np.atleast_2d(panel.values.T), colours, strict=True):
+        axes.plot(baked.arrays[panel.curve], column, color=colour)
+    top = max(1.02, 1.02 * float(panel.values.max()))
+    axes.set(xlabel="n.v" if panel.curve == "mu" else panel.curve, xlim=(0, 1), ylim=(0, top), title=panel.title)
+    axes.set_box_aspect(1)
+    axes.grid()
+
+
+def plot_comparison(found: dict[str, Any], folder: Path) -> None:
     """Write compensation.png and compensation.json to a folder: albedo against roughness, and distance to the walk."""
+    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    folder.mkdir(parents=True, exist_ok=True)
-    figure = Figure(figsize=(13, 6.4), layout="constrained")
-    axes = figure.subplots(2, len(comparison.MATERIALS))
+    with mpl.rc_context(figures.STYLE):
+        figure = Figure(figsize=(13, 6.4), layout="constrained")
+        _compare(found, figure.subplots(2, len(comparison.MATERIALS)))
+        picture = io.BytesIO()
+        figure.savefig(picture, dpi=120, format="png", facecolor="white")
+    tables.write_all(folder, {"compensation.png": picture.getvalue(), "compensation.json": json.dumps(found).encode()})
+
+
+def _compare(found: dict[str, Any], axes: Any) -> None:
+    """A column for each material: albedo of every method above, its distance to the walk below."""
     roughness = found["roughness"]
     middle = len(found["mu"]) // 2
     colours = {m: f"C{index}" for index, m in enumerate(comparison.METHODS)}
@@ -66,7 +148,3 @@ def plot_comparison(found: dict[str, Any], folder: Path) -> Path:
     axes[1, 0].set_ylabel("RMS distance to the walk")
     axes[0, 0].legend(fontsize=7)
     axes[1, 1].legend(fontsize=7)
-    path = folder / "compensation.png"
-    figure.savefig(path, dpi=120)
-    (folder / "compensation.json").write_text(json.dumps(found))
-    return path

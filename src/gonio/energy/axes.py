@@ -1,0 +1,129 @@
+"""The axes of baked tables: where each node of each layout stands.
+
+    linear     nodes at texel centres, (j + 1/2) / N of roughness, mu and, with two widths, phi over a quarter turn:
+               what shaders and the homework use
+    stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1) (`gonio.energy.curves`), in which E is
+               smooth: bilinear interpolation then errs by a hundredth of what it does on a linear axis
+
+Two widths: the larger is roughness^2, and their ratio is the table's. E is even in phi about both axes of the surface,
+so a quarter turn is all, and a mirrored edge is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import curves, quadrature
+
+LAYOUTS = ("linear", "stretched")
+
+
+class Points(NamedTuple):
+    """Where E is asked for, as `quadrature.moments` takes it."""
+
+    mu: np.ndarray
+    alpha: np.ndarray
+    alpha_y: np.ndarray | None
+    phi: Any
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Axes of a table over ([phi,] roughness, mu).
+
+    size      nodes of roughness and of mu
+    aspect    alpha_y / alpha_x
+    azimuths  nodes of phi; 0 where there is one width and no such axis
+    """
+
+    layout: str
+    ndf: str
+    masking: str
+    size: int
+    aspect: float = 1.0
+    azimuths: int = 0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The axes, slowest first."""
+        return ("phi", "roughness", "mu") if self.azimuths else ("roughness", "mu")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Nodes along each."""
+        return (self.azimuths, self.size, self.size) if self.azimuths else (self.size, self.size)
+
+    def at(self, *index: Any) -> Points:
+        """The points at indices, whole or between nodes, one array an axis; they broadcast."""
+        roughness = self.roughness(index[-2])
+        if not self.azimuths:
+            mu, alpha = np.broadcast_arrays(self.mu(index[-1], roughness), roughness**2)
+            return Points(mu, alpha, None, 0.0)
+        phi = self.phi(index[0])
+        return Points(*np.broadcast_arrays(self.mu(index[-1], roughness, phi), *self.widths(roughness), phi))
+
+    def nodes(self) -> Points:
+        """Every node."""
+        return self.at(*np.ix_(*map(np.arange, self.shape)))
+
+    def roughness(self, index: Any) -> np.ndarray:
+        """Roughness at an index."""
+        return self._unit(index, self.size)
+
+    def phi(self, index: Any) -> np.ndarray:
+        """Azimuth at an index; stretched: equal steps of the azimuth of slopes divided by their widths."""
+        turn = self._unit(index, self.azimuths) * (0.5 * np.pi)
+        return turn if self.layout == "linear" else np.arctan2(np.sin(turn), self.aspect * np.cos(turn))
+
+    def mu(self, index: Any, roughness: Any, phi: Any = 0.0) -> np.ndarray:
+        """Cosine at an index, of a row and slice."""
+        x = self._unit(index, self.size)
+        if self.layout == "linear":
+            return x + 0.0 * roughness + 0.0 * phi
+        alpha_x, alpha_y = self.widths(roughness)
+        return stretched_mu(self.ndf, self.masking, np.hypot(alpha_x * np.cos(phi), alpha_y * np.sin(phi)), x)
+
+    def widths(self, roughness: Any) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha_x, alpha_y); the larger is roughness^2."""
+        alpha = np.asarray(roughness) ** 2
+        return alpha * min(1.0, 1.0 / self.aspect), alpha * min(1.0, self.aspect)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The nodes of each axis by name; mu by row (and slice) where it is stretched."""
+        index = np.ix_(*map(np.arange, self.shape))
+        nodes = self.at(*index)
+        mu = nodes.mu if self.layout == "stretched" else nodes.mu[(0,) * (len(self.shape) - 1)]
+        found = {"mu": np.array(mu), "roughness": self.roughness(np.arange(self.size))}
+        return {**found, "phi": self.phi(np.arange(self.azimuths))} if self.azimuths else found
+
+    def texts(self) -> dict[str, str]:
+        """What a person needs to find a node again."""
+        if self.layout == "linear":
+            text = {"roughness": "row j at (j + 1/2) / N", "mu": "column j at (j + 1/2) / N"}
+            return {**text, "phi": "slice j at (j + 1/2) / N of 90 degrees from x"} if self.azimuths else text
+        form = {
+            "hypot": "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))",
+            "wide": "sqrt(mu / (mu + 4 alpha))",
+            "root": "sqrt(mu / (mu + 4 k)), k the masking's",
+        }[curves.form_of(self.ndf, self.masking)]
+        text = {"roughness": "row j at j / (N - 1)", "mu": f"column j at s(mu) / s(1) = j / (N - 1), s = {form}"}
+        if self.azimuths:
+            text["mu"] += ", alpha = |(alpha_x cos phi, alpha_y sin phi)|"
+            text["phi"] = "slice j at tan(phi) = (alpha_x / alpha_y) tan(j / (N - 1) of 90 degrees)"
+        return text
+
+    def _unit(self, index: Any, count: int) -> np.ndarray:
+        if self.layout == "linear":
+            return (np.asarray(index) + 0.5) / count
+        return np.asarray(index) / (count - 1) if count > 1 else np.asarray(index) * 0.0 + 1.0
+
+
+def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The cosine at a place x in [0, 1] of the stretched axis of a width."""
+    form = curves.form_of(ndf, masking)
+    bend = curves.numpy_knee(form, masking, np.maximum(alpha, quadrature.SMALLEST_ALPHA))
+    top = curves.numpy_squeeze(form, np.ones(1), bend)
+    return np.clip(curves.unsqueeze(form, x * top, bend), 0.0, 1.0)

@@ -1,0 +1,95 @@
+"""Baked tables as one thing: arrays with the manifest that describes them, to and from a file, and as the homework's
+pictures."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .cache import content_hash
+
+
+@dataclass(frozen=True)
+class Baked:
+    """Arrays by name, the axes among them, and the manifest that describes them."""
+
+    arrays: dict[str, np.ndarray]
+    manifest: dict[str, Any]
+
+    def npz(self) -> bytes:
+        """tables.npz, the manifest and its hash inside it; the same bytes for the same content."""
+        text = json.dumps(self.manifest)
+        texts = {"manifest": np.array(text), "seal": np.array(_seal(text))}
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file:
+            for name, array in {**self.arrays, **texts}.items():
+                part = io.BytesIO()
+                np.save(part, array, allow_pickle=False)
+                file.writestr(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), part.getvalue())
+        return stream.getvalue()
+
+
+def _seal(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read(path: Path) -> Baked:
+    """The tables in a file. ValueError with the reason where it is damaged, altered or foreign."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        text, seal = str(arrays.pop("manifest")), str(arrays.pop("seal"))
+        manifest = json.loads(text)
+        hashes = dict(manifest["hash"])
+    except Exception as error:  # a file of any content: zip, zlib, NumPy and json each have their own ways to fail
+        raise ValueError("damaged, or not written by gonio bake") from error
+    altered = ["manifest"] if seal != _seal(text) else []
+    altered += [name for name, value in hashes.items() if name not in arrays or content_hash(arrays[name]) != value]
+    altered += [name for name in arrays if name not in hashes]
+    if altered:
+        raise ValueError(f"altered: '{altered[0]}' is not what was written")
+    return Baked(arrays, manifest)
+
+
+def load(path: str | Path) -> Baked:
+    """The tables in a folder, or in a tables.npz. InputError where it is not one, or is damaged or altered."""
+    path = Path(path)
+    file_path = path / "tables.npz" if path.is_dir() else path
+    hint = "gonio bake ggx -o DIR writes one"
+    if not file_path.is_file():
+        raise InputError("no tables.npz here", str(path), hint)
+    if file_path.suffix.lower() != ".npz":
+        raise InputError(f"a '{file_path.suffix}' given, a folder or a tables.npz expected", str(path), hint)
+    try:
+        return read(file_path)
+    except ValueError as error:
+        raise InputError(str(error), str(file_path), "bake it again") from error
+
+
+def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict[str, np.ndarray]:
+    """E and E_avg as the homework has them: (N, N, 3) of 8 bits, x = n.v, three equal channels, E_avg along the row.
+
+    store  "E" or "1-E"
+    flip   True: the bottom row is the lowest roughness; False: the top row is
+    """
+    if store not in ("E", "1-E"):
+        raise InputError(f"unknown '{store}'", "--store", "E or 1-E")
+    size = baked.manifest["size"]
+    pictures: dict[str, np.ndarray] = {}
+    for name in ("E", "E_avg"):
+        if name not in baked.arrays:
+            continue
+        value = baked.arrays[name]
+        value = np.broadcast_to(value[:, None], (size, size)) if value.ndim == 1 else value
+        value = np.clip(1.0 - value if store == "1-E" else value, 0.0, 1.0)
+        value = value[::-1] if flip else value
+        pictures[name] = np.repeat(np.round(value * 255.0).astype(np.uint8)[..., None], 3, axis=-1)
+    return pictures
