@@ -12,6 +12,7 @@ physically what would be seen if every surface stood alone and were convex.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,7 @@ class _Foreground(Transport):
         super().__init__(mi, scene, sensor, settings, aovs=False)
         self.alone = lights is not None
         if self.alone:
-            self.lights = Lights(mi, lights)
+            self.lights = _Transparent(mi, lights)
 
     def begin(self, pixel: Any, key: Any, index: Any) -> tuple[Any, list[Any]]:
         """As the base's, for lanes that meet a surface; the feature is 1 there."""
@@ -70,3 +71,32 @@ class _Foreground(Transport):
     def unoccluded(self, si: Any, point: Any, active: Any) -> Any:
         """All lights are in sight where they stand apart."""
         return active if self.alone else super().unoccluded(si, point, active)
+
+
+class _Transparent(Lights):
+    """Lights that do not hide each other: a ray meets every lamp on its way, and the environment behind them.
+
+    Light sampling traces no shadow ray here, so what a sampled direction finds must not be hidden either.
+    """
+
+    def last_hit(self, ray: Any, solid_angle: Any, active: Any, weigh: Callable[[Any, Any], Any]) -> Any:
+        """The sum over all lights on the ray, each weighed with its own density."""
+        if self.rectangle is not None or self.count == 0:
+            return super().last_hit(ray, solid_angle, active, weigh)
+        mi, origin = self.mi, ray.o
+        found, still = mi.Spectrum(0), active
+        for _ in self.scene.shapes():
+            si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, still)
+            still = still & si.is_valid()
+            found += self._arriving(origin, si, solid_angle, still, weigh)
+            ray = si.spawn_ray(ray.d)
+        if self.has_environment:
+            beyond = dr.zeros(mi.SurfaceInteraction3f)
+            beyond.t, beyond.wi, beyond.wavelengths = dr.inf, -ray.d, ray.wavelengths
+            found += self._arriving(origin, beyond, solid_angle, active, weigh)
+        return found
+
+    def _arriving(self, origin: Any, si: Any, solid_angle: Any, active: Any, weigh: Callable[[Any, Any], Any]) -> Any:
+        radiance = dr.select(active, self.emitted(si, active), 0)
+        pdf = self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
+        return dr.select(active, weigh(radiance, pdf), 0)

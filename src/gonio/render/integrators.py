@@ -347,10 +347,9 @@ class Transport:
 
     def begin(self, pixel: Any, key: Any, index: Any) -> tuple[_Path, list[Any]]:
         """The first vertex of a sample: (the path that goes on from it, [r, g, b, features of this vertex])."""
-        path = self.first(pixel, key, index)
+        path, features = self.first(pixel, key, index), list[Any]()
         if self.settings.integrator in ("normal", "uv"):
             return path, self.show(path.hit.compute_surface_interaction(path.ray))
-        features: list[Any] = []
         path = self.extend(path, key, features)
         return path, [*self.rgb(path.radiance, path.ray.wavelengths), *features]
 
@@ -369,7 +368,7 @@ class Transport:
             colour = (si.sh_frame.n + 1) * 0.5
         else:
             colour = self.mi.Color3f(si.uv.x, si.uv.y, 0)
-        features = [0, 0, 0, *si.sh_frame.n] if self.aovs else []
+        features = (0, 0, 0, *si.sh_frame.n) if self.aovs else ()
         return [dr.select(si.is_valid(), v, 0) for v in (*colour, *features)]
 
     def camera_ray(self, pixel: Any, key: Any, index: Any) -> tuple[Any, Any]:
@@ -435,10 +434,11 @@ class Transport:
         ray = si.spawn_ray(si.to_world(bs.wo))
         # The last ray can only find light: no surface beyond it is shaded.
         end = active & last
-        found, found_pdf = lights.last_hit(ray, ray.o, solid_angle, end)
-        if self.samples_lights:
-            found = dr.select(pdf > 0, found * mis(pdf, found_pdf), found)
-        radiance = radiance + throughput * dr.select(end, found, 0)
+
+        def weigh(light: Any, light_pdf: Any) -> Any:
+            return dr.select(pdf > 0, light * mis(pdf, light_pdf), light) if self.samples_lights else light
+
+        radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
 
         active = active & ~last
         hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)

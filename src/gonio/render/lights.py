@@ -10,6 +10,7 @@ Three parts:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -354,8 +355,8 @@ class Lights:
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
         return ds.emitter.pdf_direction(it, ds, active) * dr.gather(mi.Float, self.by_pointer, number, active)
 
-    def last_hit(self, ray: Any, origin: Any, solid_angle: Any, active: Any) -> tuple[Any, Any]:
-        """What a path's last ray adds: (radiance that arrives along it, density as in `pdf`).
+    def last_hit(self, ray: Any, solid_angle: Any, active: Any, weigh: Callable[[Any, Any], Any]) -> Any:
+        """What a path's last ray adds: the radiance that arrives along it, `weigh`ed with its density as in `pdf`.
 
         All that this ray can still find is a light; with one rectangle the ray is traced only where it points at it.
         """
@@ -363,7 +364,7 @@ class Lights:
         if self.rectangle is None:
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, active)
             radiance = self.emitted(si, active)
-            return radiance, self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
+            return weigh(radiance, self.pdf(ray.o, solid_angle, si, active & dr.any(radiance != 0)))
         distance, uv, hit = self.rectangle.hit(ray.o, ray.d)
         active = active & hit & (distance < ray.maxt)
         ds = dr.zeros(mi.DirectionSample3f)
@@ -377,7 +378,7 @@ class Lights:
         active &= dr.any(radiance != 0)
         active &= ~self.scene.ray_test(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
-        return dr.select(active, radiance, 0), pdf
+        return weigh(dr.select(active, radiance, 0), pdf)
 
 
 @dataclass

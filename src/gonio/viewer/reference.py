@@ -57,7 +57,7 @@ class Reference:
         self._render: foreground.Foreground | None = None
         self._balls = _Balls(self.mi)
         self._lamps = _Lamps(self.mi)
-        self._whole: tuple[Any, Any] = (None, None)
+        self._whole: tuple[tuple[Any, Any], Any] = ((None, None), None)
         self._rate = 0.0  # samples per pixel and second
 
     @property
@@ -81,10 +81,9 @@ class Reference:
         sensor = self._sensor(scene)
         if scene.transport == "path":
             settings = integrators.Settings("path", max_depth=scene.max_depth)
-            key = (id(self._balls.parts), id(self._lamps.parts))
-            if self._whole[0] != key:
-                self._whole = key, self.mi.load_dict({"type": "scene", **self._balls.parts, **self._lamps.parts})
-            render = foreground.Foreground(self._whole[1], settings, sensor)
+            whole = self._together()
+            self._lamps.write(whole, scene.state.lights)
+            render = foreground.Foreground(whole, settings, sensor)
         else:
             # a light without extent is never met by a sampled direction: sampling the BSDF would be for nothing
             integrator = "direct" if self._lamps.extended else "directSampleLight"
@@ -97,6 +96,13 @@ class Reference:
             raise InputError(f"unknown material '{row.material}'", f"{where}/material", f"known: {known}")
         bsdf = stage.replaced(self.stage.materials[row.material].bsdf, dict(row.choices), f"{where}/choices")
         return [stage.replaced(bsdf, dict(ball), f"{where}/balls/{i}") for i, ball in enumerate(row.balls)]
+
+    def _together(self) -> Any:
+        """Balls and lights in one scene."""
+        parts = (self._balls.parts, self._lamps.parts)
+        if any(a is not b for a, b in zip(self._whole[0], parts, strict=True)):
+            self._whole = parts, self.mi.load_dict({"type": "scene", **parts[0], **parts[1]})
+        return self._whole[1]
 
     def _sensor(self, scene: messages.Scene) -> Any:
         camera, mi = scene.state.camera, self.mi
@@ -111,8 +117,8 @@ class Reference:
                 "type": "perspective",
                 "fov": camera.fov,
                 "fov_axis": "y",
-                "near_clip": camera.distance * 1e-4,
-                "far_clip": camera.distance * 1e3,
+                "near_clip": 1e-3,  # the clips are literals of the kernel: values that moved would compile one
+                "far_clip": 1e8,
                 "to_world": mi.ScalarTransform4f().look_at(list(eye), list(target), up),
                 "film": {
                     "type": "hdrfilm",
@@ -248,12 +254,19 @@ class _Lamps:
             self._scene = self.mi.load_dict({"type": "scene", **self.parts})
             self._structure = structure
             self.extended = any(light.type in ("area", "environment") for light in given)
-        for n, light in enumerate(given):
-            self._set(self.mi.traverse(self.parts[f"light{n}"]), light)
+        self.write(self._scene, given)
         return self._scene
 
+    def write(self, scene: Any, given: list[Any]) -> None:
+        """Put the lights' values into a scene that holds them; by way of the scene, which then moves its geometry."""
+        parameters = self.mi.traverse(scene)
+        for n, light in enumerate(given):
+            for name, value in self._values(light).items():
+                parameters[f"light{n}.{name}"] = value
+        parameters.update()
+
     def _plugin(self, light: Any, pictures: dict[str, np.ndarray]) -> dict[str, Any]:
-        """The kind of light; values follow by `_set`."""
+        """The kind of light; values follow by `write`."""
         white = {"type": "rgb", "value": [1.0, 1.0, 1.0]}
         match light:
             case messages.Directional():
@@ -266,16 +279,16 @@ class _Lamps:
                 return textures.environment(self.mi, pictures[key])
         return {"type": "constant", "radiance": white}
 
-    def _set(self, parameters: Any, light: Any) -> None:
+    def _values(self, light: Any) -> dict[str, Any]:
+        """A light's parameters by Mitsuba's names."""
         mi = self.mi
         match light:
             case messages.Directional():
                 toward = -np.array(light.direction) / np.linalg.norm(light.direction)
-                parameters["to_world"] = mi.Transform4f(_looking(toward))
-                parameters["irradiance.value"] = mi.Color3f(*light.irradiance)
+                turn = mi.Transform4f(_looking(toward))
+                return {"to_world": turn, "irradiance.value": mi.Color3f(*light.irradiance)}
             case messages.Point():
-                parameters["position"] = mi.Point3f(*light.position)
-                parameters["intensity.value"] = mi.Color3f(*light.intensity)
+                return {"position": mi.Point3f(*light.position), "intensity.value": mi.Color3f(*light.intensity)}
             case messages.Area():
                 to_world = np.eye(4)
                 normal = np.cross(light.u, light.v)
@@ -283,16 +296,13 @@ class _Lamps:
                     raise InputError("an area light whose edges are parallel", "lights", "give two that span an area")
                 to_world[:3, :3] = np.stack([light.u, light.v, normal / np.linalg.norm(normal)], 1)
                 to_world[:3, 3] = light.center
-                parameters["to_world"] = mi.Transform4f(to_world)
-                parameters["emitter.radiance.value"] = mi.Color3f(*light.radiance)
+                radiance = mi.Color3f(*light.radiance)
+                return {"to_world": mi.Transform4f(to_world), "emitter.radiance.value": radiance}
             case messages.Environment(image=None):
-                parameters["radiance.value"] = mi.Color3f(*light.constant) * light.scale
-            case messages.Environment():
-                # half a turn: see textures.environment
-                turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation) + 180.0)
-                parameters["to_world"] = turn
-                parameters["scale"] = float(light.scale)
-        parameters.update()
+                return {"radiance.value": mi.Color3f(*light.constant) * light.scale}
+        # half a turn: see textures.environment
+        turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation) + 180.0)
+        return {"to_world": turn, "scale": float(light.scale)}
 
 
 def _looking(toward: np.ndarray) -> np.ndarray:

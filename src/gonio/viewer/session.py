@@ -38,6 +38,7 @@ class Session:
         self.pictures: dict[str, Any] = {}
         self.reference: Reference | None = None
         self.shown_samples = 0
+        self.started = 0.0  # when this picture was begun
 
     # ------------------------------------------------------------------ in the server's thread
 
@@ -247,7 +248,7 @@ class Renderer:
             reference.pictures = pictures
             reference.show(scene)
             session.shown_samples = 0
-            session.started = time.perf_counter()  # type: ignore[attr-defined]
+            session.started = time.perf_counter()
         reference.advance()
         if session.sent == session.acknowledged and _worth_showing(reference, session.shown_samples):
             self._send_frame(session, reference)
@@ -261,7 +262,7 @@ class Renderer:
             "id": reference.scene.id,
             "frame": session.sent,
             "spp": reference.samples,
-            "seconds": round(time.perf_counter() - session.started, 4),  # type: ignore[attr-defined]
+            "seconds": round(time.perf_counter() - session.started, 4),
             "done": reference.done,
         }
         session.send_from_thread(messages.frame(header, reference.image()))

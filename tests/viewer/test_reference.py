@@ -1,0 +1,197 @@
+"""The live reference: closed forms, additivity, and nothing compiled when a value changes."""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+from typing import Any
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import InputError
+from gonio.ops.backend import drjit
+from gonio.viewer import messages, stage
+from gonio.viewer.reference import Reference
+
+dr = drjit()
+SUN = {"type": "directional", "direction": [0.48, 0.6, 0.64], "irradiance": [2.0, 1.0, 0.5]}
+WHITE = {"type": "environment", "constant": [1.0, 1.0, 1.0]}
+
+
+def scene(what: stage.Stage, lights: list[Any], size: tuple[int, int] = (96, 54), spp: int = 64, **more: Any) -> Any:
+    """A message that shows all rows of a stage; `balls` replaces their values."""
+    balls = more.pop("balls", None)
+    rows = [{"material": row.material, "balls": balls or [ball.values for ball in row.balls]} for row in what.rows]
+    state = {"rows": rows, "lights": lights, "camera": {**what.framed(), **more.pop("camera", {})}}
+    text = {"type": "scene", "id": 1, "width": size[0], "height": size[1], "state": state, "spp": spp, **more}
+    return messages.parse(json.dumps(text))
+
+
+def picture(reference: Reference, message: Any) -> np.ndarray:
+    reference.show(message)
+    while not reference.done:
+        reference.advance()
+    return reference.image()
+
+
+def one_ball(bsdf: go.BSDF) -> stage.Stage:
+    return stage.Stage("one", {"m0": stage.Material("one", bsdf)}, (stage.Row("one", "m0", (stage.Ball("one"),)),))
+
+
+def normals(size: tuple[int, int], camera: dict[str, Any], supersampling: int = 24) -> np.ndarray:
+    """Normals of a ball at the origin that the rays of a supersampled pixel grid meet, (h s, w s, 3); NaN beside it.
+
+    Camera on +z; |o + t d| = 1.
+    """
+    width, height = (n * supersampling for n in size)
+    half = math.tan(math.radians(camera["fov"]) / 2)
+    x = ((np.arange(width) + 0.5) / width * 2 - 1) * half * width / height
+    y = (1 - (np.arange(height) + 0.5) / height * 2) * half
+    d = np.stack([*np.broadcast_arrays(x[None, :], y[:, None]), -np.ones((height, width))], -1)
+    d /= np.linalg.norm(d, axis=-1, keepdims=True)
+    o = np.array([0.0, 0.0, camera["distance"]])
+    b = d @ o
+    with np.errstate(invalid="ignore"):
+        return o + (-b - np.sqrt(b**2 - o @ o + 1.0))[..., None] * d
+
+
+def boxes(values: np.ndarray, supersampling: int = 24) -> np.ndarray:
+    """Means over the pixels of a supersampled grid."""
+    height, width = (n // supersampling for n in values.shape[:2])
+    return values.reshape(height, supersampling, width, supersampling, -1).mean((1, 3))
+
+
+def test_a_lambert_ball_under_a_directional_light_is_the_closed_form() -> None:
+    what = one_ball(go.Lambert(albedo=(0.8, 0.5, 0.2)))
+    found = picture(Reference(what), scene(what, [SUN], spp=256))
+    n = normals((96, 54), what.framed())
+    on_ball = np.isfinite(n[..., :1])
+    cosine = np.maximum(np.nan_to_num(n) @ np.array(SUN["direction"]), 0.0)[..., None]
+    expected = boxes(np.where(on_ball, cosine / np.pi * np.array([0.8, 0.5, 0.2]) * SUN["irradiance"], 0.0))
+    assert boxes(on_ball * 1.0)[..., 0] == pytest.approx(found[..., 3], abs=0.02)
+    # 576 regular and 256 stratified points a pixel: the terminator and the edge of the ball are all that differs
+    assert np.abs(found[..., :3] - expected).max() < 0.01
+    assert found[..., :3].sum() == pytest.approx(expected.sum(), rel=1e-3)
+
+
+def test_two_balls_neither_shadow_nor_light_each_other() -> None:
+    # light from the right, along the row: with shadows the left ball would be dark
+    lambert = stage.Material("one", go.Lambert(albedo=1.0))
+    two = stage.Stage("two", {"m0": lambert}, (stage.Row("", "m0", (stage.Ball("a"), stage.Ball("b"))),))
+    side = {**SUN, "direction": [1.0, 0.0, 0.0]}
+    reference = Reference(two)
+    alone = picture(reference, scene(two, [side], size=(96, 48), camera={"distance": 400.0, "fov": 1.0}))
+    left, right = alone[:, :48, :3].sum(), alone[:, 48:, :3].sum()
+    assert left == pytest.approx(right, rel=0.01)
+    shadowed = picture(reference, scene(two, [side], size=(96, 48), transport="path", max_depth=2,
+                                        camera={"distance": 400.0, "fov": 1.0}))  # fmt: skip
+    assert shadowed[:, :48, :3].sum() < 0.05 * left
+
+
+def test_a_white_furnace_gives_back_the_coverage() -> None:
+    compensated = go.KullaConty(base=go.Conductor(eta=0.0, k=1.0, alpha=0.5))
+    what = one_ball(compensated)
+    found = picture(Reference(what), scene(what, [WHITE], spp=256))
+    inside = found[..., 3] == 1.0
+    assert inside.sum() > 200
+    assert found[inside][:, :3].mean() == pytest.approx(1.0, abs=2e-3)
+
+
+def test_lights_add_up() -> None:
+    what = one_ball(go.Conductor.preset("Au", alpha=0.3))
+    point = {"type": "point", "position": [0.0, 3.0, 3.0], "intensity": [5.0, 5.0, 5.0]}
+    area = {"type": "area", "center": [3, 0, 3], "u": [0.5, 0, -0.5], "v": [0, 1, 0], "radiance": [2.0, 2.0, 2.0]}
+    reference = Reference(what)
+    parts = [picture(reference, scene(what, [light], spp=512))[..., :3].mean((0, 1)) for light in (SUN, point, area)]
+    together = picture(reference, scene(what, [SUN, point, area], spp=512))[..., :3].mean((0, 1))
+    assert min(part.min() for part in parts) > 0.0
+    assert together == pytest.approx(sum(parts), rel=0.01)
+
+
+def test_an_environment_comes_from_where_the_format_says() -> None:
+    what = one_ball(go.Lambert(albedo=1.0))
+    reference = Reference(what)
+    pixels = np.zeros((8, 16, 3), np.float32)
+    pixels[3:5, 3:5] = 1.0  # around u = 1/4: p = pi/2, the direction +x
+    reference.pictures["k"] = pixels
+    light = {"type": "environment", "image": {"key": "k"}}
+    right = picture(reference, scene(what, [light], spp=256))[..., 0]
+    assert right[:, 48:].sum() > 3 * right[:, :48].sum()
+    turned = picture(reference, scene(what, [{**light, "rotation": math.pi}], spp=256))[..., 0]
+    assert turned[:, :48].sum() > 3 * turned[:, 48:].sum()
+    bright = picture(reference, scene(what, [{**light, "scale": 2.0}], spp=256))[..., 0]
+    assert bright.sum() == pytest.approx(2 * right.sum(), rel=0.02)
+
+
+@pytest.mark.parametrize("light", ["directional", "area", "environment"])
+def test_a_changed_value_compiles_nothing(light: str) -> None:
+    gc.collect()  # of other tests' scenes: a kernel knows all materials and lights that are alive
+    what = stage.homework()
+    reference = Reference(what)
+
+    def lights(x: float) -> list[Any]:
+        return {
+            "directional": [{**SUN, "direction": [x, 0.5, 1.0]}],
+            "area": [{"type": "area", "center": [x, 2, 5], "u": [1, 0, x], "v": [0, 1, 0], "radiance": [x, 2, 3]}],
+            "environment": [{**WHITE, "constant": [x, 1.0, 1.0]}],
+        }[light]
+
+    def show(x: float) -> None:
+        rows = [[{p: [0.04 + x, 0.04 + x] for p in ball.values} for ball in row.balls] for row in what.rows]
+        message = scene(what, lights(x), spp=3, camera={"azimuth": x, "distance": 10 + x}).model_dump()
+        for row, balls in zip(message["state"]["rows"], rows, strict=True):
+            row["balls"] = balls
+        picture(reference, messages.parse(json.dumps(message)))
+
+    show(0.1)
+    show(0.2)  # the second time nothing is new any more
+    before = reference._balls._scene
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        show(0.37)
+        history = dr.kernel_history([dr.KernelType.JIT])
+    assert reference._balls._scene is before
+    assert len(history) > 2
+    compiled = [(kernel["size"], kernel["operation_count"]) for kernel in history if not kernel["cache_hit"]]
+    assert compiled == []
+
+
+def test_values_reach_the_picture() -> None:
+    what = one_ball(go.Lambert(albedo=0.5))
+    reference = Reference(what)
+    half = picture(reference, scene(what, [SUN]))
+    more = picture(reference, scene(what, [SUN], balls=[{"albedo": [1.0, 0.5, 0.0]}]))
+    assert more[..., 0].sum() == pytest.approx(2 * half[..., 0].sum(), rel=1e-3)
+    assert more[..., 1].sum() == pytest.approx(half[..., 1].sum(), rel=1e-3)
+    assert more[..., 2].sum() == 0.0
+
+
+def test_every_pass_is_the_same_picture_whatever_the_pauses() -> None:
+    what = one_ball(go.Lambert())
+    one, other = Reference(what), Reference(what)
+    first = picture(one, scene(what, [SUN], spp=32))
+    other.show(scene(what, [SUN], spp=32))
+    other._rate = 1e9
+    while not other.done:
+        other.advance()
+    assert np.array_equal(first, other.image())
+
+
+@pytest.mark.parametrize(
+    ("change", "what_is_wrong"),
+    [
+        ({"material": "m9"}, "unknown material 'm9'"),
+        ({"choices": {"masking": "wrong"}}, "unknown masking 'wrong'"),
+        ({"choices": {"nothing": "wrong"}}, "unknown parameter 'nothing'"),
+        ({"balls": [{"alpha": -1.0}]}, ">= 0"),
+        ({"balls": [{"beta": 1.0}]}, "unknown parameter 'beta'"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_clear_error(change: dict[str, Any], what_is_wrong: str) -> None:
+    what = one_ball(go.Conductor())
+    message = scene(what, [SUN]).model_dump()
+    message["state"]["rows"][0].update(change)
+    with pytest.raises(InputError, match=what_is_wrong):
+        Reference(what).show(messages.parse(json.dumps(message)))
