@@ -41,7 +41,7 @@ from .stage import Stage
 
 LOOPBACK = "127.0.0.1"
 MOST_SESSIONS = 8  # each holds a scene and a picture in memory
-MOST_CONNECTIONS = 256
+MOST_CONNECTIONS = 200  # that have not asked for anything yet
 REQUEST_SECONDS = 10.0  # for a request's headers to arrive, and for a session's first message
 STALL_SECONDS = 30.0  # for a frame to be taken
 FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
@@ -138,7 +138,8 @@ class Application:
         try:
             await session.run(REQUEST_SECONDS, STALL_SECONDS)
         finally:
-            self.sessions.remove(session)
+            if session in self.sessions:
+                self.sessions.remove(session)
             self.renderer.forget(session)
 
     def _make_room(self) -> bool:
@@ -148,6 +149,7 @@ class Application:
         idle = next((session for session in self.sessions if not session.asked), None)
         if idle is None:
             return False
+        self.sessions.remove(idle)
         idle.end(LATE, "made room for another page")
         return True
 
@@ -202,7 +204,7 @@ class Server(uvicorn.Server):
             ws_ping_interval=20.0,
             ws_ping_timeout=20.0,
             h11_max_incomplete_event_size=16 << 10,
-            limit_concurrency=MOST_CONNECTIONS,
+            limit_concurrency=MOST_CONNECTIONS + 64,  # what has asked for something; refused with 503 beyond
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             lifespan="off",
