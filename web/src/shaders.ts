@@ -28,7 +28,13 @@ export interface Program {
   uniform(name: string): WebGLUniformLocation | null;
 }
 
-const sameChoices = (a: Choices, b: Choices) => Object.keys(a).every((key) => !(key in b) || a[key] === b[key]);
+/** What a variant's choices are: those it was made for, and the model's own for the rest. */
+export function variantChoice(variant: Variant, path: string): string | boolean | undefined {
+  const own = variant.choices[path];
+  return own !== undefined ? own : (variant.manifest.parameters.find((p) => p.path === path)?.value as string | boolean | undefined);
+}
+
+const fits = (variant: Variant, choices: Choices) => Object.keys(choices).every((path) => choices[path] === variantChoice(variant, path));
 
 export class ShaderLibrary {
   private programs = new Map<string, Program>();
@@ -48,7 +54,7 @@ export class ShaderLibrary {
   /** The variant that fits all choices, or null where the page lacks it (a live page asks the server for it). */
   find(id: string, choices: Choices): Shader | null {
     const material = this.material(id);
-    const index = material.variants.findIndex((v) => sameChoices(choices, v.choices));
+    const index = material.variants.findIndex((v) => fits(v, choices));
     return index < 0 ? null : this.at(material, index);
   }
 

@@ -1,0 +1,74 @@
+/** From linear radiance to the screen: exposure, tone curve, sRGB; in a pass of its own, over what was summed. */
+import type { Tone } from "./data";
+import { HEADER, link, type Program } from "./shaders";
+
+export const TONES: Record<Tone, { index: number; doc: string }> = {
+  none: { index: 0, doc: "Clipped at 1, then sRGB." },
+  reinhard: { index: 1, doc: "x / (1 + x), as the homework has it, then sRGB." },
+  filmic: { index: 2, doc: "Fit of the ACES curve (Narkowicz 2016), then sRGB." },
+};
+
+/** `vec3 tone_mapped(vec3 linear, int curve)` and `vec3 srgb(vec3)`: for whoever draws a picture to the screen. */
+export const TONE_GLSL = `
+vec3 srgb(vec3 c) {
+  c = clamp(c, 0.0, 1.0);
+  return mix(12.92 * c, 1.055 * pow(max(c, vec3(1e-6)), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}
+vec3 tone_mapped(vec3 c, int curve) {
+  c = max(c, vec3(0.0));
+  if (curve == 1) c = c / (1.0 + c);
+  if (curve == 2) c = c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
+  return srgb(c);
+}
+`;
+
+export const FULLSCREEN_VERTEX = `${HEADER}
+void main() { gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float(gl_VertexID >> 1) - 1.0, 0.0, 1.0); }
+`;
+
+const FRAGMENT = `${HEADER}${TONE_GLSL}
+uniform sampler2D picture;      // sums
+uniform float samples, exposure;
+uniform int curve;
+uniform bool has_sign;          // a difference: what is negative is blue, what is positive orange
+uniform vec3 theme;             // colour behind the balls, sRGB
+uniform bool in_environment;
+uniform sampler2D environment_map;
+uniform float has_map, environment_scale, environment_rotation;
+uniform vec3 environment_constant, right, up, back;
+uniform vec2 half_size, size;
+out vec4 color;
+
+vec3 behind(vec2 p) {
+  if (has_map < 0.5) return environment_constant * environment_scale;
+  vec3 d = normalize(right * p.x * half_size.x + up * p.y * half_size.y - back);
+  float angle = atan(d.x, d.z) - environment_rotation;
+  vec2 uv = vec2(angle * 0.15915494309189535, acos(clamp(d.y, -1.0, 1.0)) * 0.3183098861837907);
+  return textureLod(environment_map, uv, 0.0).rgb * environment_scale;
+}
+
+void main() {
+  vec2 position = gl_FragCoord.xy / size;
+  vec4 sum = texture(picture, position) / samples;
+  if (has_sign) {
+    float value = dot(sum.rgb, vec3(1.0 / 3.0)) / max(sum.a, 1e-6) * exposure;
+    vec3 hue = value >= 0.0 ? vec3(1.0, 0.55, 0.15) : vec3(0.2, 0.5, 1.0);
+    color = vec4(mix(theme, srgb(hue * min(abs(value), 1.0)), sum.a), 1.0);
+    return;
+  }
+  if (in_environment) {
+    vec3 light = sum.rgb + (1.0 - min(sum.a, 1.0)) * behind(2.0 * position - 1.0);
+    color = vec4(tone_mapped(light * exposure, curve), 1.0);
+    return;
+  }
+  // The theme's colour is paper, not light: it is mixed in on the screen, so that rims stay smooth.
+  vec3 ball = tone_mapped(sum.rgb / max(sum.a, 1e-6) * exposure, curve);
+  color = vec4(mix(theme, ball, min(sum.a, 1.0)), 1.0);
+}
+`;
+
+let program: Program | null = null;
+export function displayProgram(gl: WebGL2RenderingContext): Program {
+  program ??= link(gl, "display", FULLSCREEN_VERTEX, FRAGMENT);
+  return program;
+}

@@ -1,0 +1,232 @@
+/**
+ * The picture around the balls, and what is made of it on the GPU by the materials' own sampling: the albedo E(mu)
+ * of every ball and, for the split sum, the environment blurred by the lobe at a few widths.
+ */
+import { type Values, decodeBase64 } from "./data";
+import { albedoText, prefilterText } from "./glsl";
+import type { Shader, ShaderLibrary } from "./shaders";
+import { createTarget, floatToHalf, sequence, type Target } from "./targets";
+import { FULLSCREEN_VERTEX } from "./display";
+
+export interface EnvironmentPicture {
+  /** Changes with the picture: what was made of the old one is made anew. */
+  key: string;
+  width: number;
+  height: number;
+  texture: WebGLTexture;
+  /** Float16 RGBA, top row first, as a live server wants it. */
+  half: Uint16Array;
+}
+
+let made = 0;
+
+export function createEnvironment(gl: WebGL2RenderingContext, width: number, height: number, half: Uint16Array): EnvironmentPicture {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, width, height, 0, gl.RGBA, gl.HALF_FLOAT, half);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.REPEAT);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+  made += 1;
+  return { key: `environment${made}`, width, height, texture, half };
+}
+
+export function environmentFromData(gl: WebGL2RenderingContext, width: number, height: number, data: string): EnvironmentPicture {
+  return createEnvironment(gl, width, height, new Uint16Array(decodeBase64(data).buffer as ArrayBuffer));
+}
+
+/** From float RGB(A), largest side 2048: more than that the eye does not see in a ball. */
+export function environmentFromFloats(gl: WebGL2RenderingContext, width: number, height: number, floats: Float32Array, channels: 3 | 4): EnvironmentPicture {
+  const step = Math.max(1, Math.ceil(width / 2048));
+  const [w, h] = [Math.floor(width / step), Math.floor(height / step)];
+  const half = new Uint16Array(4 * w * h);
+  for (let y = 0; y < h; y++)
+    for (let x = 0; x < w; x++)
+      for (let c = 0; c < 4; c++) {
+        if (c === 3) {
+          half[4 * (y * w + x) + 3] = 0x3c00;
+          continue;
+        }
+        let sum = 0;
+        for (let j = 0; j < step; j++) for (let i = 0; i < step; i++) sum += floats[channels * ((y * step + j) * width + x * step + i) + c] as number;
+        half[4 * (y * w + x) + c] = floatToHalf(sum / (step * step));
+      }
+  return createEnvironment(gl, w, h, half);
+}
+
+const ALBEDO_WIDTH = 128;
+const ALBEDO_ROWS = 64;
+const ALBEDO_SAMPLES = 128;
+const ALBEDO_PASSES = 96; // 12,288 points a node: E(mu) to about 1e-4, far below the 1/255 that a screen shows
+
+/** E(mu) of many balls, a row each, summed up over passes. */
+export class AlbedoTables {
+  private target: Target | null = null;
+  private rows = new Map<string, { row: number; passes: number; used: number }>();
+  private clock = 0;
+
+  constructor(
+    private gl: WebGL2RenderingContext,
+    private shaders: ShaderLibrary,
+    private full: boolean,
+  ) {}
+
+  get texture(): WebGLTexture | null {
+    return this.target?.texture ?? null;
+  }
+
+  /** The row of a ball; `fresh` tells that its sum is not complete yet. Runs `passes` more passes when it is not. */
+  row(shader: Shader, values: Values, passes: number): { row: number; complete: boolean; finished: boolean } {
+    const { gl } = this;
+    this.target ??= createTarget(gl, ALBEDO_WIDTH, ALBEDO_ROWS, this.full, false);
+    const key = `${shader.key} ${JSON.stringify(values)}`;
+    this.clock += 1;
+    let entry = this.rows.get(key);
+    if (!entry) {
+      entry = { row: this.freeRow(), passes: 0, used: this.clock };
+      this.rows.set(key, entry);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(0, entry.row, ALBEDO_WIDTH, 1);
+      gl.clearColor(0, 0, 0, 0);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      gl.disable(gl.SCISSOR_TEST);
+    }
+    entry.used = this.clock;
+    const before = entry.passes;
+    const limit = this.full ? ALBEDO_PASSES : 8; // float16 sums saturate
+    if (entry.passes < limit) {
+      const program = this.shaders.program(`albedo ${shader.key}`, FULLSCREEN_VERTEX, albedoText(shader, ALBEDO_SAMPLES));
+      gl.useProgram(program.handle);
+      this.shaders.bind(program, shader, values, 0);
+      gl.uniform1f(program.uniform("width"), ALBEDO_WIDTH);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
+      gl.viewport(0, entry.row, ALBEDO_WIDTH, 1);
+      gl.disable(gl.DEPTH_TEST);
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE);
+      for (let i = 0; i < passes && entry.passes < limit; i++, entry.passes++) {
+        gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * ALBEDO_SAMPLES));
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
+      }
+      gl.disable(gl.BLEND);
+    }
+    return { row: entry.row, complete: entry.passes >= limit, finished: before < limit && entry.passes >= limit };
+  }
+
+  /** An unused row, or the one that was not asked for the longest. */
+  private freeRow(): number {
+    if (this.rows.size < ALBEDO_ROWS) {
+      const taken = new Set([...this.rows.values()].map((e) => e.row));
+      for (let row = 0; row < ALBEDO_ROWS; row++) if (!taken.has(row)) return row;
+    }
+    const [oldest, entry] = [...this.rows].reduce((a, b) => (a[1].used <= b[1].used ? a : b));
+    this.rows.delete(oldest);
+    return entry.row;
+  }
+}
+
+const LEVELS = 6;
+const LEVEL_SAMPLES = 64;
+const LEVEL_PASSES = 4;
+
+interface Prefiltered {
+  texture: WebGLTexture;
+  framebuffers: WebGLFramebuffer[];
+  width: number;
+  passes: number;
+}
+
+/** The environment blurred by a material's lobe, one mip level a width: roughness 0 to 1 over the levels. */
+export class PrefilteredEnvironments {
+  private made = new Map<string, Prefiltered>();
+
+  constructor(
+    private gl: WebGL2RenderingContext,
+    private shaders: ShaderLibrary,
+    private full: boolean,
+  ) {}
+
+  /** Texture and level for a ball. */
+  of(shader: Shader, values: Values, picture: EnvironmentPicture): { texture: WebGLTexture; level: number; finished: boolean } {
+    const alpha = shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null);
+    const rest = { ...values };
+    if (alpha) delete rest[alpha.path];
+    // Maps are made in the environment's own frame, so turning it makes nothing anew.
+    const key = `${shader.key} ${picture.key} ${JSON.stringify(rest)}`;
+    let entry = this.made.get(key);
+    if (!entry) {
+      if (this.made.size >= 8) this.forget();
+      entry = this.create(alpha ? LEVELS : 1, alpha ? 256 : 64);
+      this.made.set(key, entry);
+    }
+    const before = entry.passes;
+    if (entry.passes < LEVEL_PASSES) this.pass(entry, shader, values, alpha?.path ?? null, picture);
+    const width = alpha ? [values[alpha.path] as number | number[]].flat() : [0];
+    const mean = Math.sqrt(width.reduce((a, b) => a * b, 1) ** (1 / width.length));
+    return {
+      texture: entry.texture,
+      level: Math.min(mean, 1) * (entry.framebuffers.length - 1),
+      finished: before < LEVEL_PASSES && entry.passes >= LEVEL_PASSES,
+    };
+  }
+
+  private create(levels: number, width: number): Prefiltered {
+    const { gl } = this;
+    const linear = this.full && gl.getExtension("OES_texture_float_linear");
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, levels, linear ? gl.RGBA32F : gl.RGBA16F, width, width / 2);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.REPEAT);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    const framebuffers: WebGLFramebuffer[] = [];
+    for (let level = 0; level < levels; level++) {
+      const framebuffer = gl.createFramebuffer();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, level);
+      gl.clearColor(0, 0, 0, 0);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      framebuffers.push(framebuffer);
+    }
+    return { texture, framebuffers, width, passes: 0 };
+  }
+
+  private pass(entry: Prefiltered, shader: Shader, values: Values, alpha: string | null, picture: EnvironmentPicture): void {
+    const { gl } = this;
+    const program = this.shaders.program(`prefilter ${shader.key}`, FULLSCREEN_VERTEX, prefilterText(shader, LEVEL_SAMPLES));
+    gl.useProgram(program.handle);
+    gl.disable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE);
+    entry.framebuffers.forEach((framebuffer, level) => {
+      const size = entry.width >> level;
+      const roughness = level / Math.max(entry.framebuffers.length - 1, 1);
+      const width = Math.max(roughness * roughness, 1e-3);
+      this.shaders.bind(program, shader, alpha ? { ...values, [alpha]: [width, width] } : values, 1);
+      gl.activeTexture(gl.TEXTURE0);
+      gl.bindTexture(gl.TEXTURE_2D, picture.texture);
+      gl.uniform1i(program.uniform("environment_map"), 0);
+      gl.uniform1f(program.uniform("has_map"), 1);
+      gl.uniform1f(program.uniform("environment_scale"), 1);
+      gl.uniform1f(program.uniform("environment_rotation"), 0);
+      gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * LEVEL_SAMPLES));
+      gl.uniform2f(program.uniform("size"), size, size / 2);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+      gl.viewport(0, 0, size, size / 2);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    });
+    gl.disable(gl.BLEND);
+    entry.passes += 1;
+  }
+
+  private forget(): void {
+    for (const entry of this.made.values()) {
+      this.gl.deleteTexture(entry.texture);
+      for (const framebuffer of entry.framebuffers) this.gl.deleteFramebuffer(framebuffer);
+    }
+    this.made.clear();
+  }
+}

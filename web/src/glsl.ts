@@ -1,0 +1,374 @@
+/**
+ * The shader text around a material: where the surface is, which light falls on it, what of it is shown.
+ *
+ * How the surface scatters is never written here; it is called by the names that the manifest gives.
+ */
+import type { Manifest } from "./data";
+import { HEADER, type Shader } from "./shaders";
+import type { Term } from "./state";
+
+export const MAX_LIGHTS = 8;
+
+/** How an environment acts on the surface. */
+export type EnvironmentUse = "none" | "sampled" | "albedo" | "split-sum";
+
+export interface ShadingKey {
+  geometry: "sphere" | "mesh";
+  lights: boolean;
+  environment: EnvironmentUse;
+  term: Term;
+}
+
+const SIZES = { float: 1, vec2: 2, vec3: 3 } as const;
+
+/** Flat varyings: WebGL 2 promises 15 vectors a stage, of which a mesh needs four. */
+const MOST_VARYINGS = 11;
+
+/** Derived values travel from the vertex shader, where they are computed once, in as few vec4 as will hold them. */
+export function derivedVaryings(manifest: Manifest): { vectors: number; pack: string; unpack: string } | null {
+  const { derived, functions } = manifest;
+  if (!derived || !functions.derive) return null;
+  const parts: string[] = [];
+  const arguments_: string[] = [];
+  for (const field of derived.fields) {
+    const size = SIZES[field.type];
+    const slots: string[] = [];
+    for (let i = 0; i < size; i++) {
+      slots.push(`derived_${parts.length >> 2}.${"xyzw"[parts.length & 3]}`);
+      parts.push(size === 1 ? `d.${field.name}` : `d.${field.name}.${"xyz"[i]}`);
+    }
+    arguments_.push(size === 1 ? (slots[0] as string) : `${field.type}(${slots.join(", ")})`);
+  }
+  const vectors = Math.ceil(parts.length / 4);
+  if (vectors > MOST_VARYINGS) return null;
+  while (parts.length & 3) parts.push("0.0");
+  const stores: string[] = [];
+  for (let v = 0; v < vectors; v++) stores.push(`  derived_${v} = vec4(${parts.slice(4 * v, 4 * v + 4).join(", ")});`);
+  return {
+    vectors,
+    pack: `  ${derived.struct} d = ${functions.derive}(material);\n${stores.join("\n")}`,
+    unpack: `${derived.struct}(${arguments_.join(", ")})`,
+  };
+}
+
+/** The material's text, its uniform, and `call("eval", "wo, wi")` with the arguments that its functions want. */
+export function materialText(shader: Shader, derived = "derived_values()"): { text: string; call: (name: "eval" | "pdf" | "sample" | "terms", rest: string) => string } {
+  const { manifest } = shader;
+  const extra = manifest.derived ? `, ${derived}` : "";
+  return {
+    text: `${shader.text}\nuniform ${manifest.struct} material;\n`,
+    call: (name, rest) => {
+      const named = manifest.functions[name];
+      if (!named) throw new Error(`${manifest.title} has no function '${name}'.`);
+      return `${named}(material${extra}, ${rest})`;
+    },
+  };
+}
+
+const CAMERA = `
+uniform vec3 eye, right, up, back;
+uniform vec2 half_size;   // tangents of half the field of view, across and up
+uniform vec2 jitter;      // position in the pixel, -1/2 ... 1/2 pixels, in device coordinates
+uniform vec3 ball_center;
+`;
+
+const DEPTH_RANGE = `
+// z toward the viewer, negative in front of the camera; near and far chosen for balls of radius 1
+float page_depth(float z) {
+  const float near = 0.05, far = 1000.0;
+  return (far + near + 2.0 * far * near / z) / (far - near);
+}
+`;
+
+/** For the pass that finds what of a mesh is in front: depth alone, the same positions to the bit. */
+export const DEPTH_VERTEX = `${HEADER}${CAMERA}${DEPTH_RANGE}
+layout(location = 0) in vec3 mesh_position;
+invariant gl_Position;
+void main() {
+  vec3 world = mesh_position + ball_center;
+  vec3 d = world - eye;
+  vec3 v = vec3(dot(d, right), dot(d, up), dot(d, back));
+  gl_Position = vec4(v.xy / half_size + jitter * v.z, -v.z * page_depth(v.z), -v.z);
+}
+`;
+export const DEPTH_FRAGMENT = `${HEADER}out vec4 color;\nvoid main() { color = vec4(0.0); }\n`;
+
+export function vertexText(shader: Shader, geometry: "sphere" | "mesh"): string {
+  const varyings = derivedVaryings(shader.manifest);
+  let flat = "";
+  for (let v = 0; v < (varyings?.vectors ?? 0); v++) flat += `flat out vec4 derived_${v};\n`;
+  const material = varyings ? materialText(shader).text : "";
+  const derive = varyings ? varyings.pack : "";
+  if (geometry === "sphere")
+    return `${HEADER}${material}${CAMERA}${flat}
+uniform vec4 bounds;   // of the ball in the picture, device coordinates
+out vec3 ray;
+void main() {
+${derive}
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+  vec2 position = mix(bounds.xy, bounds.zw, corner);
+  vec2 through = (position + jitter) * half_size;
+  ray = right * through.x + up * through.y - back;
+  gl_Position = vec4(position, 0.0, 1.0);
+}
+`;
+  return `${HEADER}${material}${CAMERA}${flat}${DEPTH_RANGE}
+layout(location = 0) in vec3 mesh_position;
+layout(location = 1) in vec3 mesh_normal;
+layout(location = 2) in vec3 mesh_tangent;
+invariant gl_Position;
+out vec3 world, world_normal, world_tangent;
+void main() {
+${derive}
+  world = mesh_position + ball_center;
+  world_normal = mesh_normal;
+  world_tangent = mesh_tangent;
+  vec3 d = world - eye;
+  vec3 v = vec3(dot(d, right), dot(d, up), dot(d, back));
+  gl_Position = vec4(v.xy / half_size + jitter * v.z, -v.z * page_depth(v.z), -v.z);
+}
+`;
+}
+
+const ENVIRONMENT = `
+uniform sampler2D environment_map;
+uniform float has_map;
+uniform vec3 environment_constant;
+uniform float environment_scale, environment_rotation;
+
+vec2 environment_uv(vec3 d) {
+  float p = atan(d.x, d.z) - environment_rotation;
+  return vec2(p * 0.15915494309189535, acos(clamp(d.y, -1.0, 1.0)) * 0.3183098861837907);
+}
+
+vec3 environment_radiance(vec3 d) {
+  if (has_map < 0.5) return environment_constant * environment_scale;
+  return textureLod(environment_map, environment_uv(d), 0.0).rgb * environment_scale;
+}
+`;
+
+const RANDOM = `
+uniform vec3 random_point;       // of a low-discrepancy sequence, this picture's
+uniform vec2 area_point;
+
+// PCG in three dimensions (Jarzynski and Olano 2020): a shift of the sequence for every pixel
+vec3 page_shift(uvec2 pixel, uint salt) {
+  uvec3 v = uvec3(pixel, salt) * 1664525u + 1013904223u;
+  v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
+  v ^= v >> 16u;
+  v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
+  return vec3(v >> 8u) / 16777216.0;
+}
+`;
+
+const LIGHTS = `
+uniform int light_count;
+uniform ivec4 light_kind[${MAX_LIGHTS}];   // x: 0 directional, 1 point, 2 area
+uniform vec3 light_place[${MAX_LIGHTS}];   // direction, position or centre
+uniform vec3 light_power[${MAX_LIGHTS}];   // irradiance, intensity or radiance
+uniform vec3 light_u[${MAX_LIGHTS}], light_v[${MAX_LIGHTS}];
+
+// What a light sends to the point: direction toward it, and irradiance at perpendicular incidence.
+vec3 page_light_at(int i, vec3 where, out vec3 direction) {
+  int kind = light_kind[i].x;
+  if (kind == 0) { direction = light_place[i]; return light_power[i]; }
+  vec3 to = light_place[i] - where;
+  vec3 power = light_power[i];
+  if (kind == 2) {
+    vec2 s = 2.0 * fract(area_point + page_shift(uvec2(gl_FragCoord.xy), uint(i) + 7u).xy) - 1.0;
+    to += s.x * light_u[i] + s.y * light_v[i];
+    // both sides shine; area = 4 |u x v|, cosine at the light = |to . (u x v)| / (|to| |u x v|)
+    power *= 4.0 * abs(dot(to, cross(light_u[i], light_v[i]))) / max(length(to), 1e-6);
+  }
+  float squared = max(dot(to, to), 1e-12);
+  direction = to * inversesqrt(squared);
+  return power / squared;
+}
+`;
+
+const ALBEDO = `
+uniform sampler2D albedo_table;   // x: sqrt(mu) at texel centres, y: ball; sums over alpha samples
+uniform float albedo_row;
+
+vec3 page_albedo(float mu) {
+  float width = float(textureSize(albedo_table, 0).x);
+  float x = clamp(sqrt(max(mu, 0.0)) * width - 0.5, 0.0, width - 1.0);
+  int i = int(min(floor(x), width - 2.0));
+  vec4 a = texelFetch(albedo_table, ivec2(i, int(albedo_row)), 0);
+  vec4 b = texelFetch(albedo_table, ivec2(i + 1, int(albedo_row)), 0);
+  return mix(a.rgb / a.a, b.rgb / b.a, x - float(i));
+}
+`;
+
+const SPLIT = `
+uniform sampler2D prefiltered;    // levels of the environment, sums over alpha samples
+uniform float prefiltered_level;
+
+vec3 prefiltered_radiance(vec3 d) {
+  vec4 sum = textureLod(prefiltered, environment_uv(d), prefiltered_level);
+  return sum.rgb / max(sum.a, 1e-6);
+}
+`;
+
+/** What of the scattering a term shows, as the value of eval would be: expression over `wo` and `wi`. */
+function scattered(shader: Shader, term: Term): string {
+  const { call } = materialText(shader);
+  const has = (name: string) => shader.manifest.terms?.some((t) => t.name === name) ?? false;
+  if (term === "single") return has("single") ? `${call("terms", "wo, wi")}.single` : call("eval", "wo, wi");
+  if (term === "multi") return has("multi") ? `${call("terms", "wo, wi")}.multi` : "vec3(0.0)";
+  if (term === "difference") return has("single") ? `${call("eval", "wo, wi")} - ${call("terms", "wo, wi")}.single` : "vec3(0.0)";
+  return call("eval", "wo, wi");
+}
+
+/** D, G and F are numbers at a half vector, not light: the page shows the number itself. */
+export const isFactor = (term: Term): term is "D" | "G" | "F" => term === "D" || term === "G" || term === "F";
+
+export function hasTerm(manifest: Manifest, term: Term): boolean {
+  if (term === "full" || term === "rows" || term === "compensated") return true;
+  const name = term === "difference" ? "single" : term;
+  return Boolean(manifest.functions.terms && manifest.terms?.some((t) => t.name === name));
+}
+
+export function fragmentText(shader: Shader, key: ShadingKey): string {
+  const varyings = derivedVaryings(shader.manifest);
+  let flat = "";
+  for (let v = 0; v < (varyings?.vectors ?? 0); v++) flat += `flat in vec4 derived_${v};\n`;
+  const { manifest } = shader;
+  const { text, call } = materialText(shader);
+  const derived = manifest.derived
+    ? `${manifest.derived.struct} derived_values() { return ${varyings ? varyings.unpack : `${manifest.functions.derive}(material)`}; }\n`
+    : "";
+  const factor = isFactor(key.term);
+  const parts = [HEADER, text, CAMERA, DEPTH_RANGE, flat, derived, RANDOM];
+  const body: string[] = [];
+  if (factor) {
+    const known = hasTerm(manifest, key.term);
+    parts.push(LIGHTS);
+    // Without such a light the half vector is the normal.
+    body.push("  vec3 wi = vec3(-wo.xy, wo.z);");
+    body.push("  if (light_count > 0) { vec3 d; page_light_at(0, surface, d); wi = d * frame; }");
+    if (known) body.push(`  if (wi.z > 0.0 && wo.z > 0.0) radiance = vec3(${call("terms", "wo, wi")}.${key.term});`);
+  } else {
+    if (key.lights) {
+      parts.push(LIGHTS);
+      body.push(`  for (int i = 0; i < light_count; i++) {
+    vec3 d;
+    vec3 irradiance = page_light_at(i, surface, d);
+    vec3 wi = d * frame;
+    radiance += irradiance * (${scattered(shader, key.term)});
+  }`);
+    }
+    if (key.environment !== "none") parts.push(ENVIRONMENT);
+    if (key.environment === "sampled") {
+      const whole = key.term === "full" || key.term === "compensated" || key.term === "rows";
+      body.push("  vec3 u = fract(random_point + page_shift(uvec2(gl_FragCoord.xy), 3u));");
+      body.push(`  Sample s = ${call("sample", "wo, u")};`);
+      body.push("  vec3 wi = s.wi;");
+      const weight = whole ? "s.weight" : `s.pdf > 0.0 && !s.delta ? (${scattered(shader, key.term)}) / s.pdf : vec3(0.0)`;
+      body.push(`  vec3 weight = ${weight};`);
+      // A sample that goes nowhere has weight 0 and may have any direction.
+      body.push("  if (any(notEqual(weight, vec3(0.0)))) radiance += weight * environment_radiance(normalize(frame * wi));");
+    } else if (key.environment === "albedo") {
+      parts.push(ALBEDO);
+      body.push("  radiance += page_albedo(wo.z) * environment_constant * environment_scale;");
+    } else if (key.environment === "split-sum") {
+      parts.push(ALBEDO, SPLIT);
+      body.push("  vec3 mirrored = frame * vec3(-wo.xy, wo.z);");
+      body.push("  radiance += page_albedo(wo.z) * prefiltered_radiance(mirrored) * environment_scale;");
+    }
+  }
+  const place =
+    key.geometry === "sphere"
+      ? `  // Nearest hit with the unit sphere at the centre; from the closest approach, which loses fewer bits than b^2 - c.
+  vec3 toward = normalize(ray);
+  vec3 from = eye - ball_center;
+  float along = -dot(from, toward);
+  vec3 closest = from + along * toward;
+  float inside = 1.0 - dot(closest, closest);
+  if (inside <= 0.0) discard;
+  vec3 n = normalize(closest - sqrt(inside) * toward);
+  vec3 surface = ball_center + n;
+  vec2 t = vec2(n.z, -n.x);
+  vec3 tangent = dot(t, t) > 1e-12 ? normalize(vec3(t.x, 0.0, t.y)) : vec3(1.0, 0.0, 0.0);
+  vec3 outward = -toward;
+  gl_FragDepth = 0.5 + 0.5 * page_depth(dot(surface - eye, back)) - nearer;`
+      : `  vec3 surface = world;
+  vec3 n = normalize(world_normal);
+  vec3 outward = normalize(eye - surface);
+  // Interpolated normals may turn away from the viewer at the rim: the side seen is the outside.
+  if (dot(n, outward) < 0.0) n = normalize(n - 1.001 * dot(n, outward) * outward);
+  vec3 tangent = page_across(world_tangent, n);`;
+  const inputs = key.geometry === "sphere" ? "in vec3 ray;\nuniform float draw_gain, draw_cover, nearer;\n" : `in vec3 world, world_normal, world_tangent;
+uniform float draw_gain, draw_cover;
+vec3 page_across(vec3 t, vec3 n) {
+  t -= dot(t, n) * n;
+  if (dot(t, t) < 1e-8) t = abs(n.y) < 0.9 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0) - n.x * n;
+  return normalize(t);
+}
+`;
+  return `${parts.join("")}${inputs}
+layout(location = 0) out vec4 color;
+void main() {
+${place}
+  mat3 frame = mat3(tangent, cross(n, tangent), n);
+  vec3 wo = outward * frame;
+  vec3 radiance = vec3(0.0);
+${body.join("\n")}
+  // One bad sample would stay in the sum for good. What is not finite counts as missing light, and the eye sees a dot.
+  if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
+  color = vec4(draw_gain * radiance, draw_cover);
+}
+`;
+}
+
+/** E(mu) of a ball, by the material's own sampling: rows of the albedo table. */
+export function albedoText(shader: Shader, samples: number): string {
+  const { text, call } = materialText(shader, "derived_here()");
+  const { manifest } = shader;
+  const derived = manifest.derived ? `${manifest.derived.struct} derived_here() { return ${manifest.functions.derive}(material); }\n` : "";
+  return `${HEADER}${text}${derived}
+uniform vec3 random_point;
+uniform float width;
+layout(location = 0) out vec4 color;
+void main() {
+  float t = gl_FragCoord.x / width;
+  float mu = t * t;
+  vec3 wo = vec3(sqrt(max(1.0 - mu * mu, 0.0)), 0.0, mu);
+  vec3 sum = vec3(0.0);
+  // R3 (Roberts 2018); the page moves the starting point on from pass to pass
+  for (int i = 0; i < ${samples}; i++) {
+    vec3 u = fract(random_point + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
+    vec3 weight = ${call("sample", "wo, u")}.weight;
+    if (!any(isnan(weight)) && !any(isinf(weight))) sum += weight;
+  }
+  color = vec4(sum, ${samples}.0);
+}
+`;
+}
+
+/** One level of the prefiltered environment: seen straight on, where the lobe goes, with the weights normalised. */
+export function prefilterText(shader: Shader, samples: number): string {
+  const { text, call } = materialText(shader, "derived_here()");
+  const { manifest } = shader;
+  const derived = manifest.derived ? `${manifest.derived.struct} derived_here() { return ${manifest.functions.derive}(material); }\n` : "";
+  return `${HEADER}${text}${derived}${RANDOM}${ENVIRONMENT}
+uniform vec2 size;
+layout(location = 0) out vec4 color;
+void main() {
+  vec2 uv = gl_FragCoord.xy / size;
+  float p = 6.283185307179586 * uv.x + environment_rotation, theta = 3.141592653589793 * uv.y;
+  vec3 n = vec3(sin(theta) * sin(p), cos(theta), sin(theta) * cos(p));
+  vec3 t = normalize(abs(n.y) < 0.99 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0) - n.x * n);
+  mat3 frame = mat3(t, cross(n, t), n);
+  vec4 sum = vec4(0.0);
+  vec3 start = random_point + page_shift(uvec2(gl_FragCoord.xy), 11u);
+  for (int i = 0; i < ${samples}; i++) {
+    vec3 u = fract(start + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
+    Sample s = ${call("sample", "vec3(0.0, 0.0, 1.0), u")};
+    float weight = dot(s.weight, vec3(1.0 / 3.0));
+    if (weight > 0.0) sum += weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), 0.0).rgb, 1.0);
+  }
+  color = sum;
+}
+`;
+}

@@ -1,0 +1,324 @@
+/**
+ * Draws the balls into a float picture of sums, one sample a pixel at a time, and that picture to the screen.
+ *
+ * A sample's position in the pixel and its random numbers come from low-discrepancy sequences, so that the sum tends
+ * to the box-filtered picture that a path tracer makes. Only the pixels that a ball may cover are visited.
+ */
+import type { Values, Vec3 } from "./data";
+import { TONES, displayProgram } from "./display";
+import { AlbedoTables, type EnvironmentPicture, PrefilteredEnvironments } from "./environment";
+import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, fragmentText, isFactor, vertexText } from "./glsl";
+import { actingLights, bindLights, environmentOf, localLights } from "./lights";
+import type { MeshBuffers } from "./meshes";
+import type { Picture, Presenter } from "./panel";
+import type { Program, Shader, ShaderLibrary } from "./shaders";
+import type { State, Term } from "./state";
+import { type Target, areaSequence, createTarget, deleteTarget, floatBlending, readTarget, sequence } from "./targets";
+import { type Frame, cameraFrame, length, sphereBounds, sub } from "./vectors";
+
+export interface DrawnBall {
+  slot: number;
+  ball: number;
+  shader: Shader;
+  values: Values;
+  center: Vec3;
+}
+
+/** What the page shows now, resolved: the renderer knows nothing of rows or links. */
+export interface Scene {
+  state: State;
+  balls: DrawnBall[];
+  environment: EnvironmentPicture | null;
+  mesh: MeshBuffers | null;
+  /** sRGB of the page behind the balls. */
+  paper: Vec3;
+}
+
+interface Draw extends DrawnBall {
+  gain: number;
+  cover: number;
+  nearer: number;
+}
+
+/** A sum of positions in the pixel is done sooner than one of random directions. */
+const SAMPLES_STILL = 256;
+const SAMPLES_RANDOM = 4096;
+const SAMPLES_HALF = 64; // float16 sums: at 64 a sample is still 16 units in the last place
+
+export class Renderer {
+  samples = 0;
+  /** Draw calls and pictures since the page was loaded, for tests and the status line. */
+  frames = 0;
+  private target: Target | null = null;
+  private readonly full: boolean;
+  private readonly albedo: AlbedoTables;
+  private readonly prefiltered: PrefilteredEnvironments;
+  private readonly empty: WebGLVertexArrayObject;
+  private black: WebGLTexture;
+  private restart = false;
+
+  constructor(
+    readonly gl: WebGL2RenderingContext,
+    readonly shaders: ShaderLibrary,
+  ) {
+    this.full = floatBlending(gl);
+    this.albedo = new AlbedoTables(gl, shaders, this.full);
+    this.prefiltered = new PrefilteredEnvironments(gl, shaders, this.full);
+    // Vertex shaders that count vertices need no buffers, but a default VAO that others may have changed will not do.
+    this.empty = gl.createVertexArray();
+    this.black = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, this.black);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
+  get width(): number {
+    return this.target?.width ?? 0;
+  }
+  get height(): number {
+    return this.target?.height ?? 0;
+  }
+
+  resize(width: number, height: number): void {
+    if (this.target?.width === width && this.target.height === height) return;
+    deleteTarget(this.gl, this.target);
+    this.target = createTarget(this.gl, width, height, this.full, true);
+    this.samples = 0;
+  }
+
+  invalidate(): void {
+    this.samples = 0;
+  }
+
+  limit(scene: Scene): number {
+    const lights = actingLights(scene.state);
+    const random =
+      lights.some((l) => l.type === "area") ||
+      (environmentOf(lights) !== null && scene.balls.some((b) => this.environmentUse(scene, b.shader) === "sampled"));
+    const wanted = random && !isFactor(scene.state.view.term) ? SAMPLES_RANDOM : SAMPLES_STILL;
+    return this.full ? wanted : Math.min(wanted, SAMPLES_HALF);
+  }
+
+  done(scene: Scene): boolean {
+    return this.samples >= this.limit(scene);
+  }
+
+  /** Adds one sample to every pixel. `hurry` leaves tables that refine over time for later. */
+  step(scene: Scene, hurry: boolean): void {
+    const { gl, target } = this;
+    if (!target) return;
+    const frame = cameraFrame(scene.state.camera);
+    const draws = this.draws(scene, frame);
+    // Tables first: they have their own framebuffers.
+    const prepared = draws.map((draw) => ({ draw, ...this.prepare(scene, draw, hurry) }));
+    if (this.restart) {
+      this.restart = false;
+      this.samples = 0;
+    }
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.viewport(0, 0, target.width, target.height);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.disable(gl.CULL_FACE);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(true);
+    gl.depthFunc(gl.LEQUAL);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clearDepth(1);
+    gl.clear(gl.DEPTH_BUFFER_BIT | (this.samples === 0 ? gl.COLOR_BUFFER_BIT : 0));
+    if (scene.mesh) this.depthPass(scene, scene.mesh, draws, frame);
+    gl.enable(gl.BLEND);
+    gl.blendEquation(gl.FUNC_ADD);
+    gl.blendFunc(gl.ONE, gl.ONE);
+    for (const { draw, program, row, level } of prepared) this.draw(scene, frame, draw, program, row, level);
+    gl.disable(gl.BLEND);
+    gl.disable(gl.DEPTH_TEST);
+    gl.bindVertexArray(null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    this.samples += 1;
+    this.frames += 1;
+  }
+
+  /** Front to back, since a sum cannot take back what a nearer ball hides. */
+  private draws(scene: Scene, frame: Frame): Draw[] {
+    const sorted = [...scene.balls].sort((a, b) => length(sub(a.center, frame.eye)) - length(sub(b.center, frame.eye)));
+    const plain = (ball: DrawnBall): Draw => ({ ...ball, gain: 1, cover: 1, nearer: 0 });
+    if (scene.state.view.term !== "rows") return sorted.map(plain);
+    const first = Math.min(...sorted.map((b) => b.slot));
+    return sorted.flatMap((ball) => {
+      const above = scene.balls.find((b) => b.slot === first && b.ball === ball.ball);
+      if (ball.slot === first || !above) return [plain(ball)];
+      // The second draw of one ball must not lose the depth test to the first by a rounding.
+      return [plain({ ...above, center: ball.center }), { ...ball, gain: -1, cover: 0, nearer: 1e-5 }];
+    });
+  }
+
+  environmentUse(scene: Scene, shader: Shader): EnvironmentUse {
+    const { state } = scene;
+    const light = environmentOf(actingLights(state));
+    if (!light) return "none";
+    // Where the albedo depends on the angle to the normal alone, the sum over directions need not be done per pixel.
+    const whole: Term[] = ["full", "compensated", "rows"];
+    const curve = shader.manifest.isotropic && !shader.manifest.stochastic && whole.includes(state.view.term);
+    if (!curve) return "sampled";
+    if (!light.image || !scene.environment) return "albedo";
+    return state.environment === "split-sum" ? "split-sum" : "sampled";
+  }
+
+  private prepare(scene: Scene, draw: Draw, hurry: boolean): { program: Program; row: number; level: { texture: WebGLTexture; level: number } | null } {
+    const { gl } = this;
+    const lights = actingLights(scene.state);
+    const use = isFactor(scene.state.view.term) ? "none" : this.environmentUse(scene, draw.shader);
+    const key: ShadingKey = {
+      geometry: scene.mesh ? "mesh" : "sphere",
+      lights: localLights(lights).length > 0,
+      environment: use,
+      term: scene.state.view.term,
+    };
+    let row = 0;
+    let level = null;
+    if (use === "albedo" || use === "split-sum") {
+      gl.bindVertexArray(this.empty);
+      const made = this.albedo.row(draw.shader, draw.values, hurry ? 1 : 4);
+      row = made.row;
+      if (made.finished) this.restart = true;
+    }
+    if (use === "split-sum" && scene.environment) {
+      const made = this.prefiltered.of(draw.shader, draw.values, scene.environment);
+      level = made;
+      if (made.finished) this.restart = true;
+    }
+    const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${use} ${key.term}`;
+    return { program: this.shaders.program(name, vertexText(draw.shader, key.geometry), fragmentText(draw.shader, key)), row, level };
+  }
+
+  private camera(program: Program, frame: Frame): void {
+    const { gl } = this;
+    const target = this.target as Target;
+    gl.uniform3fv(program.uniform("eye"), frame.eye);
+    gl.uniform3fv(program.uniform("right"), frame.right);
+    gl.uniform3fv(program.uniform("up"), frame.up);
+    gl.uniform3fv(program.uniform("back"), frame.back);
+    gl.uniform2f(program.uniform("half_size"), (frame.half * target.width) / target.height, frame.half);
+    const [x, y] = sequence(2, this.samples) as [number, number];
+    gl.uniform2f(program.uniform("jitter"), (2 * x - 1) / target.width, (2 * y - 1) / target.height);
+  }
+
+  private depthPass(scene: Scene, mesh: MeshBuffers, draws: Draw[], frame: Frame): void {
+    const { gl } = this;
+    const program = this.shaders.program("depth", DEPTH_VERTEX, DEPTH_FRAGMENT);
+    gl.useProgram(program.handle);
+    this.camera(program, frame);
+    gl.colorMask(false, false, false, false);
+    gl.bindVertexArray(mesh.array);
+    for (const draw of draws) {
+      gl.uniform3fv(program.uniform("ball_center"), draw.center);
+      gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
+    }
+    gl.colorMask(true, true, true, true);
+    void scene;
+  }
+
+  private draw(scene: Scene, frame: Frame, draw: Draw, program: Program, row: number, level: { texture: WebGLTexture; level: number } | null): void {
+    const { gl } = this;
+    const target = this.target as Target;
+    const bounds = scene.mesh ? null : sphereBounds(frame, draw.center, 1, target.width / target.height);
+    if (!scene.mesh && !bounds) return;
+    gl.useProgram(program.handle);
+    this.camera(program, frame);
+    let unit = this.shaders.bind(program, draw.shader, draw.values, 0);
+    const texture = (name: string, value: WebGLTexture | null) => {
+      const location = program.uniform(name);
+      if (!location) return;
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, value ?? this.black);
+      gl.uniform1i(location, unit);
+      unit += 1;
+    };
+    const lights = actingLights(scene.state);
+    bindLights(gl, program, localLights(lights));
+    const environment = environmentOf(lights);
+    if (environment) this.environmentUniforms(program, scene, texture);
+    texture("albedo_table", this.albedo.texture);
+    gl.uniform1f(program.uniform("albedo_row"), row);
+    texture("prefiltered", level?.texture ?? null);
+    gl.uniform1f(program.uniform("prefiltered_level"), level?.level ?? 0);
+    gl.uniform3fv(program.uniform("random_point"), sequence(3, this.samples));
+    gl.uniform2fv(program.uniform("area_point"), areaSequence(this.samples));
+    gl.uniform3fv(program.uniform("ball_center"), draw.center);
+    gl.uniform1f(program.uniform("draw_gain"), draw.gain);
+    gl.uniform1f(program.uniform("draw_cover"), draw.cover);
+    gl.uniform1f(program.uniform("nearer"), draw.nearer);
+    if (scene.mesh) {
+      gl.bindVertexArray(scene.mesh.array);
+      gl.drawElements(gl.TRIANGLES, scene.mesh.count, gl.UNSIGNED_INT, 0);
+      return;
+    }
+    // A pixel more on each side: its centre may lie outside where a jittered ray still hits.
+    const [x0, y0, x1, y1] = bounds as [number, number, number, number];
+    const [dx, dy] = [2 / target.width, 2 / target.height];
+    gl.uniform4f(program.uniform("bounds"), x0 - dx, y0 - dy, x1 + dx, y1 + dy);
+    gl.bindVertexArray(this.empty);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+
+  private environmentUniforms(program: Program, scene: Scene, texture: (name: string, value: WebGLTexture | null) => void): void {
+    const { gl } = this;
+    const light = environmentOf(actingLights(scene.state));
+    const mapped = Boolean(light?.image && scene.environment);
+    texture("environment_map", mapped ? (scene.environment?.texture ?? null) : null);
+    gl.uniform1f(program.uniform("has_map"), mapped ? 1 : 0);
+    gl.uniform3fv(program.uniform("environment_constant"), light?.constant ?? [0, 0, 0]);
+    gl.uniform1f(program.uniform("environment_scale"), light?.scale ?? 0);
+    gl.uniform1f(program.uniform("environment_rotation"), light?.rotation ?? 0);
+  }
+
+  /** Draws the sum to the canvas, or lets a panel draw it its own way. */
+  present(scene: Scene, presenter: Presenter | null, width: number, height: number): void {
+    const { gl, target } = this;
+    if (!target || this.samples === 0) return;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.BLEND);
+    gl.disable(gl.DEPTH_TEST);
+    gl.bindVertexArray(this.empty);
+    if (presenter?.present(gl, target.texture, this.samples, width, height)) {
+      gl.bindVertexArray(null);
+      return;
+    }
+    const { state } = scene;
+    const program = displayProgram(gl);
+    gl.useProgram(program.handle);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, target.texture);
+    gl.uniform1i(program.uniform("picture"), 0);
+    gl.uniform1f(program.uniform("samples"), this.samples);
+    gl.uniform1f(program.uniform("exposure"), 2 ** state.display.exposure);
+    gl.uniform1i(program.uniform("curve"), TONES[state.display.tone].index);
+    gl.uniform1i(program.uniform("has_sign"), state.view.term === "rows" || state.view.term === "difference" ? 1 : 0);
+    gl.uniform3fv(program.uniform("theme"), scene.paper);
+    const shown = environmentOf(actingLights(state)) !== null && (state.furnace || state.view.background === "environment");
+    gl.uniform1i(program.uniform("in_environment"), shown && !isFactor(state.view.term) ? 1 : 0);
+    let unit = 1;
+    this.environmentUniforms(program, scene, (name, value) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, value ?? this.black);
+      gl.uniform1i(program.uniform(name), unit++);
+    });
+    const frame = cameraFrame(state.camera);
+    gl.uniform3fv(program.uniform("right"), frame.right);
+    gl.uniform3fv(program.uniform("up"), frame.up);
+    gl.uniform3fv(program.uniform("back"), frame.back);
+    gl.uniform2f(program.uniform("half_size"), (frame.half * width) / height, frame.half);
+    gl.uniform2f(program.uniform("size"), width, height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindVertexArray(null);
+  }
+
+  /** Mean radiance over the samples so far. */
+  read(scene: Scene): Picture {
+    const target = this.target as Target;
+    const data = readTarget(this.gl, target);
+    const n = Math.max(this.samples, 1);
+    for (let i = 0; i < data.length; i++) data[i] = (data[i] as number) / n;
+    return { width: target.width, height: target.height, data, samples: this.samples, done: this.done(scene) };
+  }
+}
