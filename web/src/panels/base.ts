@@ -104,16 +104,18 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-function labelled(host: HTMLElement, label: string, control: HTMLElement, doc: string): void {
+function labelled(host: HTMLElement, label: string, control: HTMLElement, doc: string): HTMLElement {
   const wrap = element("label", "p-control");
   wrap.title = doc;
   wrap.append(element("span", "", label), control);
   host.append(wrap);
+  return wrap;
 }
 
 export interface Control<T> {
   show(value: T): void;
   enable(on: boolean): void;
+  hide(on: boolean): void;
 }
 
 export function select<T extends string>(
@@ -131,10 +133,11 @@ export function select<T extends string>(
   };
   fill(options);
   input.addEventListener("change", () => change(input.value as T));
-  labelled(host, label, input, doc);
+  const wrap = labelled(host, label, input, doc);
   return {
     show: (value) => (input.value = value),
     enable: (on) => (input.disabled = !on),
+    hide: (on) => (wrap.hidden = on),
     options: fill,
   };
 }
@@ -147,7 +150,7 @@ export function check(host: HTMLElement, label: string, doc: string, change: (on
   wrap.title = doc;
   wrap.append(input, element("span", "", label));
   host.append(wrap);
-  return { show: (on) => (input.checked = on), enable: (on) => (input.disabled = !on) };
+  return { show: (on) => (input.checked = on), enable: (on) => (input.disabled = !on), hide: (on) => (wrap.hidden = on) };
 }
 
 /** A slider with its number beside it; `unit` follows the number. */
@@ -177,6 +180,7 @@ export function range(
       write();
     },
     enable: (on) => (input.disabled = !on),
+    hide: (on) => (wrap.hidden = on),
     limits: (a, b) => {
       input.min = String(a);
       input.max = String(b);

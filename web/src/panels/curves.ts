@@ -88,6 +88,7 @@ export class Curves {
           width: s.width ?? 2,
           dash: s.dashed ? [6, 4] : [],
           points: { show: false },
+          pxAlign: 0, // snapped to pixels, a smooth curve gets steps
           class: s.edge ? "p-edge" : "p-series",
           value: (_: uPlot, v: number | null) => (v === null ? "" : exact(Number(v.toPrecision(6)))),
         })),
@@ -104,7 +105,7 @@ export class Curves {
     if (!Number.isFinite(high) || high <= 0) return chart.log ? [1e-3, 1] : [0, 1];
     // Six decades are what a look at a lobe can use; below lie float32's crumbs.
     if (chart.log) return [Math.max(low > 0 ? low : high * 1e-6, high * 1e-6) * 0.8, high * 1.5];
-    return [Math.min(0, low), high * 1.06];
+    return [Math.min(0, low), high * (chart.marks?.length ? 1.18 : 1.06)]; // room for the marks' words
   }
 
   private marks(plot: uPlot): void {

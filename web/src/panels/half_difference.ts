@@ -5,7 +5,7 @@
  */
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { type Channel, CHANNELS, channelOf, check, element, evaluatorOf, exact, latest, legend, type Model, overlaid, range, select, short, Sketch } from "./base";
+import { type Channel, CHANNELS, channelOf, check, type Control, element, evaluatorOf, exact, latest, legend, type Model, overlaid, range, select, short, Sketch } from "./base";
 import { Curves } from "./curves";
 import { fromHalf, RADIANS } from "./directions";
 import { paint } from "./colormaps";
@@ -27,11 +27,11 @@ class HalfDifferencePanel implements Panel {
   readonly title = "θh θd";
   readonly doc = "Half and difference angles: curves and the image slice";
   private app!: App;
-  private controls!: Record<"thetaH" | "thetaD" | "phiD" | "exposure", { show(v: number): void }>;
-  private show!: { show(v: Show): void };
-  private log!: { show(v: boolean): void };
-  private falseColor!: { show(v: boolean): void };
-  private channel!: { show(v: Channel): void };
+  private controls!: Record<"thetaH" | "thetaD" | "phiD" | "exposure", Control<number>>;
+  private show!: Control<Show>;
+  private log!: Control<boolean>;
+  private falseColor!: Control<boolean>;
+  private channel!: Control<Channel>;
   private curvesHost!: HTMLElement;
   private curves!: Curves;
   private imagesHost!: HTMLElement;
@@ -83,17 +83,13 @@ class HalfDifferencePanel implements Panel {
     this.log.show(settings.log);
     this.falseColor.show(settings.falseColor);
     this.channel.show(channelIn(app));
-    const visible: Record<string, boolean> = {
-      thetaH: settings.show === "difference",
-      thetaD: settings.show === "half",
-      exposure: settings.show === "image" && !settings.falseColor,
-    };
-    const bar = this.curvesHost.parentElement?.previousElementSibling as HTMLElement;
-    const labels: Record<string, string> = { θh: "thetaH", θd: "thetaD", exposure: "exposure" };
-    for (const control of bar.querySelectorAll<HTMLElement>(".p-range")) {
-      const name = labels[control.firstChild?.textContent ?? ""];
-      control.hidden = name !== undefined && !visible[name];
-    }
+    const image = settings.show === "image";
+    this.controls.thetaH.hide(settings.show !== "difference");
+    this.controls.thetaD.hide(settings.show !== "half");
+    this.controls.exposure.hide(!image || settings.falseColor);
+    this.falseColor.hide(!image);
+    this.log.hide(image);
+    this.channel.hide(image && !settings.falseColor);
     this.curvesHost.hidden = settings.show === "image";
     this.imagesHost.hidden = settings.show !== "image";
     if (settings.show === "image") await this.images(settings);
@@ -156,7 +152,7 @@ class HalfDifferencePanel implements Panel {
     legend(this.key, models);
     const scale = settings.falseColor
       ? `${channel}, viridis from ${short(this.peak / 10 ** DECADES)} to ${short(this.peak)} 1/sr (log)`
-      : `f · 2^${short(settings.exposure)} shown as sRGB, cut off at 1`;
+      : `f · 2^${short(settings.exposure)} shown as sRGB; 1 and more is white`;
     this.note.textContent = `f(θh, θd) at φd ${settings.phiD}°; ${scale}. Hatched: ωo or ωi below the surface.`;
   }
 

@@ -6,6 +6,7 @@ import { channelOf, check, element, evaluatorOf, latest, legend, overlaid, selec
 import { colorTable } from "./colormaps";
 import { type Lobe, lobeIndices, lobeOf, radius } from "./lobe_mesh";
 import { type Arrow, LobeView, type Surface } from "./lobe_view";
+import { rgb } from "./theme";
 import { channelIn, viewingTouched, ViewingControls, woOf } from "./viewing";
 
 const DECADES = 4;
@@ -78,29 +79,23 @@ class LobePanel implements Panel {
           vertices[6 * i + 3 + c] = byValue ? (table[at + c] as number) / 255 : (tint[c] as number);
         }
       }
-      return { vertices, alpha: lobes.length === 1 ? 1 : 0.6, size };
+      return { vertices, alpha: 1, size };
     });
     const ink = rgb(app.cssColor("--text"));
+    // The smallest is solid, those round it are glass: colours that blend evenly would be no model's colour.
+    const smallest = Math.min(...surfaces.map((s) => s.size));
+    for (const surface of surfaces) if (surface.size > smallest) surface.alpha = 0.35;
     const arrows: Arrow[] = [
       { direction: [0, 0, 1], color: ink, label: "n" },
       { direction: [1, 0, 0], color: ink, label: "t" },
       { direction: wo, color: rgb(app.cssColor("--accent")), label: "ωo" },
     ];
-    this.view.show(surfaces, arrows, ink.map((v, i) => 0.5 * v + 0.25 * (i >= 0 ? 1 : 0)) as Vec3);
+    this.view.show(surfaces, arrows, ink.map((v) => 0.5 * v + 0.25) as Vec3);
     legend(this.key, models, (m) => `: largest ${short(lobes.find((l) => l.model === m)?.peak ?? 0)} 1/sr`);
     const length = log ? `outer ring ${short(peak)} 1/sr, centre ${short(peak / 10 ** DECADES)} 1/sr and less (log)` : `outer ring ${short(peak)} 1/sr, centre 0`;
     const delta = models.some((m) => m.shader.manifest.delta !== "never") ? " A delta lobe (mirror, smooth glass) has no finite length and is not drawn." : "";
     this.note.textContent = peak > 0 ? `Length: f |cos θi|, ${channel}; ${length}.${delta}` : `No model scatters light from this ωo.${delta}`;
   }
-}
-
-/** Any CSS colour as numbers 0 to 1, by asking the browser. */
-export function rgb(color: string): Vec3 {
-  const context = document.createElement("canvas").getContext("2d", { willReadFrequently: true }) as CanvasRenderingContext2D;
-  context.fillStyle = color || "#888";
-  context.fillRect(0, 0, 1, 1);
-  const [r, g, b] = context.getImageData(0, 0, 1, 1).data;
-  return [(r as number) / 255, (g as number) / 255, (b as number) / 255];
 }
 
 export const lobePanel = new LobePanel();

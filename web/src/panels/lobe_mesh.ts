@@ -1,6 +1,7 @@
 /** The lobe as a surface: radius = eval over wi, on rings that crowd round the largest value. */
 import type { Vec3 } from "../data";
 import type { Evaluator } from "../evaluator";
+import { sequence } from "../targets";
 import { type Channel, channelOf, type Model } from "./base";
 import { frameAround, polar } from "./directions";
 
@@ -54,8 +55,7 @@ async function peakDirection(evaluator: Evaluator, model: Model, wo: Vec3, chann
   const candidates: number[] = [];
   for (let k = 0; k < 45; k++) for (let s = 0; s < 60; s++) candidates.push(...polar(((k + 0.5) / 45) * Math.PI, (2 * Math.PI * s) / 60));
   if (model.shader.manifest.functions.sample) {
-    // Points of a lattice with the golden and the plastic number's fractions: even, and always the same.
-    const u = Float32Array.from({ length: 3 * 512 }, (_, i) => (0.5 + Math.floor(i / 3) * ([0.8191725, 0.6710436, 0.5497005][i % 3] as number)) % 1);
+    const u = Array.from({ length: 512 }, (_, i) => sequence(3, i)).flat();
     const drawn = await evaluator.sample(model.shader, model.values, wo, u);
     for (let i = 0; i < drawn.pdf.length; i++)
       if ((drawn.pdf[i] as number) > 0 && !drawn.delta[i]) for (let c = 0; c < 3; c++) candidates.push(drawn.wi[3 * i + c] as number);

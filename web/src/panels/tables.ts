@@ -24,7 +24,6 @@ class TablesPanel implements Panel {
   private which!: ReturnType<typeof select<string>>;
   private channel!: ReturnType<typeof select<string>>;
   private layer!: ReturnType<typeof range>;
-  private layerHost!: HTMLElement;
   private fixed!: ReturnType<typeof check>;
   private sketch!: Sketch;
   private read!: HTMLElement;
@@ -43,7 +42,6 @@ class TablesPanel implements Panel {
     this.which = select<string>(bar, "table", "Every texture that a shader of the page reads", {}, (table) => set({ table, channel: 0, layer: 0 }));
     this.channel = select<string>(bar, "component", "Tables may hold several numbers a texel", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
     this.layer = range(bar, "layer", "Slice of a three-dimensional table", [0, 0, 1], "", (layer) => set({ layer }));
-    this.layerHost = bar.lastElementChild as HTMLElement;
     this.fixed = check(bar, "0 to 1", "Colours from 0 to 1 instead of from the smallest to the largest value", (fixed) => set({ fixed }));
     const body = element("div", "p-body");
     const cell = element("div", "p-cell p-wide");
@@ -80,7 +78,7 @@ class TablesPanel implements Panel {
         if (data === undefined) continue;
         const axes = (texture as TableTexture & { axes?: string[] }).axes ?? [];
         wanted.set(`${key}/${texture.uniform}`, () => ({
-          label: `${material.title}: ${texture.uniform}`,
+          label: `${material.title}: ${texture.uniform.replace(/^table_/, "")}`,
           size: texture.size,
           channels: texture.channels,
           axes,
@@ -105,7 +103,7 @@ class TablesPanel implements Panel {
       this.current = null;
       this.read.textContent = "";
       this.note.textContent = "The shown models read no table: all their values are computed where they are needed.";
-      this.layerHost.hidden = true;
+      this.layer.hide(true);
       this.sketch.redraw();
       return;
     }
@@ -115,7 +113,7 @@ class TablesPanel implements Panel {
     this.channel.options(Object.fromEntries(Array.from({ length: table.channels }, (_, i) => [String(i), String(i)])));
     this.channel.show(String(channel));
     this.channel.enable(table.channels > 1);
-    this.layerHost.hidden = depth === 1;
+    this.layer.hide(depth === 1);
     this.layer.limits(0, depth - 1);
     this.layer.show(layer);
     const plane = Float32Array.from({ length: width * height }, (_, i) => table.floats[(layer * width * height + i) * table.channels + channel] as number);
@@ -135,9 +133,9 @@ class TablesPanel implements Panel {
   private box(width: number, height: number): { x: number; y: number; w: number; h: number } {
     const [columns, lines = 1] = (this.current as NonNullable<typeof this.current>).table.size as [number, number?];
     const room = { w: Math.max(20, width - 150), h: Math.max(16, height - 46) };
-    // Texels are square where that leaves a picture worth looking at; a table of one row is drawn as a thick bar.
+    // Texels are square where that leaves a picture worth looking at; the rows of a table of few are drawn as bars.
     const scale = Math.min(room.w / columns, room.h / lines);
-    const [w, h] = [Math.max(columns * scale, Math.min(room.w, 120)), Math.max(lines * scale, Math.min(room.h, 40))];
+    const [w, h] = [Math.max(columns * scale, Math.min(room.w, 120)), Math.max(lines * scale, Math.min(room.h, 45 * lines, 0.5 * room.w))];
     return { x: 56 + (room.w - w) / 2, y: 8, w, h };
   }
 

@@ -1,0 +1,86 @@
+/** Compare with the path-traced reference: how it is shown, and by how much the two differ. */
+import type { App, Panel } from "../panel";
+import type { Change, CompareMode } from "../state";
+import { type Control, element, select } from "./base";
+import { COMPARISON, type Comparison, comparisonOf, type Kind, KINDS } from "./comparison";
+import { type Pixels, PIXELS } from "./metrics";
+
+const MODES: Record<CompareMode, string> = { off: "raster only", side: "side by side", wipe: "wipe", difference: "difference" };
+const RANGES = { auto: "fits the picture", "1": "0 to 1", "0.1": "0 to 0.1", "0.01": "0 to 0.01", "0.001": "0 to 0.001" };
+
+class ComparePanel implements Panel {
+  readonly id = COMPARISON;
+  readonly title = "Compare";
+  readonly doc = "The raster picture beside the path-traced reference";
+  private app!: App;
+  private comparison!: Comparison;
+  private mode!: Control<CompareMode>;
+  private kind!: Control<Kind>;
+  private range!: Control<string>;
+  private pixels!: Control<Pixels>;
+  private table!: HTMLTableElement;
+  private note!: HTMLElement;
+
+  mount(host: HTMLElement, app: App): void {
+    this.app = app;
+    this.comparison = comparisonOf(app);
+    host.classList.add("p-panel");
+    const set = (values: Record<string, unknown>) => app.store.setPanel(COMPARISON, values);
+    const bar = element("div", "p-bar");
+    this.mode = select(bar, "show", "How the two pictures are laid out", MODES, (mode) => app.store.set("compare.mode", mode));
+    this.kind = select(bar, "difference", "What the false colours mean", KINDS, (kind) => set({ kind }));
+    this.range = select<string>(bar, "colours", "Range of the colour scale", RANGES, (range) => set({ range }));
+    this.pixels = select(bar, "pixels", "Which pixels count in the figures and the difference", PIXELS, (pixels) => set({ pixels }));
+    this.table = element("table", "p-numbers");
+    const body = element("div", "p-body");
+    body.append(this.table);
+    this.note = element("div", "p-note");
+    host.append(bar, body, this.note);
+    this.comparison.subscribe(() => this.write());
+    this.show();
+  }
+
+  update(change: Change): void {
+    if (change.touches("compare", `panels.${COMPARISON}`)) this.show();
+  }
+
+  refresh(): void {
+    this.write();
+  }
+
+  private show(): void {
+    const { kind, range, pixels } = this.comparison.settings();
+    this.mode.show(this.app.state.compare.mode);
+    this.kind.show(kind);
+    this.range.show(range);
+    this.range.enable(kind !== "flip");
+    this.pixels.show(pixels);
+    this.write();
+  }
+
+  private write(): void {
+    const { figures, lack } = this.comparison;
+    const rows: [string, string, string][] = figures
+      ? [
+          ["RMSE", figures.rmse.toExponential(3), "root of the mean squared difference of linear radiance"],
+          ["relMSE", figures.relmse.toExponential(3), "mean of (x − r)² / (r² + 0.01), linear radiance"],
+          ["mean x / mean r", figures.meanRatio.toFixed(5), "1 where no energy is lost or made"],
+          ["FLIP", figures.flip === null ? "…" : figures.flip.toFixed(5), "0 same, 1 far: what is seen when flipping between the two as shown on this screen"],
+          ["pixels", figures.pixels.toLocaleString("en"), PIXELS[this.comparison.settings().pixels]],
+          ["samples", `${figures.samples[0]} and ${figures.samples[1]}`, "a pixel of the raster picture (x) and of the reference (r)"],
+        ]
+      : [];
+    this.table.replaceChildren(
+      ...rows.map(([name, value, doc]) => {
+        const row = element("tr");
+        const explained = element("td", "", doc);
+        explained.style.textAlign = "left";
+        row.append(element("th", "", name), element("td", "", value), explained);
+        return row;
+      }),
+    );
+    this.note.textContent = figures ? "Without silhouettes: every pixel that is only partly covered, and its neighbours, is left out, since pixel filters differ there." : lack || "Waiting for the first pictures.";
+  }
+}
+
+export const comparePanel = new ComparePanel();

@@ -1,0 +1,192 @@
+/**
+ * The raster picture against the path-traced one, in the place of the page's own display pass: side by side, wiped,
+ * or their difference in false colour. Both go through the same exposure and tone curve (display.ts).
+ */
+import type { App, Picture, Presenter } from "../panel";
+import { FULLSCREEN_VERTEX, TONE_GLSL, TONES } from "../display";
+import { HEADER, link, type Program } from "../shaders";
+import type { CompareMode } from "../state";
+import { createTarget, deleteTarget, readTarget } from "../targets";
+import { colorTable } from "./colormaps";
+import type { Pair } from "./metrics";
+import { rgb } from "./theme";
+
+const MODES: Record<CompareMode | "raster" | "reference", number> = { off: 0, raster: 0, reference: 1, wipe: 2, side: 3, difference: 4 };
+
+const FRAGMENT = `${HEADER}${TONE_GLSL}
+uniform sampler2D raster;      // sums, bottom row first
+uniform sampler2D reference;   // means, top row first
+uniform sampler2D differences; // top row first; negative: does not count
+uniform sampler2D colors;
+uniform float samples, exposure, wipe, high;
+uniform int curve, mode;
+uniform bool stacked;
+uniform vec3 theme;            // colour behind the balls, sRGB
+uniform vec2 size;
+out vec4 color;
+
+vec4 picture(bool second, vec2 at) {
+  return second ? texture(reference, vec2(at.x, 1.0 - at.y)) : texture(raster, at) / samples;
+}
+
+vec3 shown(vec4 light) {
+  vec3 ball = tone_mapped(light.rgb / max(light.a, 1e-6) * exposure, curve);
+  return mix(theme, ball, min(light.a, 1.0));
+}
+
+void main() {
+  vec2 at = gl_FragCoord.xy / size;
+  if (mode <= 1) color = vec4(shown(picture(mode == 1, at)), 1.0);
+  else if (mode == 2) color = vec4(shown(picture(at.x > wipe, at)), 1.0);
+  else if (mode == 3) {
+    // Each picture at half its size; the mean of four pixels, since one in four would sparkle.
+    bool second = stacked ? at.y < 0.5 : at.x > 0.5;
+    vec2 half_at = stacked ? vec2(2.0 * at.x - 0.5, fract(2.0 * at.y)) : vec2(fract(2.0 * at.x), 2.0 * at.y - 0.5);
+    color = vec4(theme, 1.0);
+    if (any(lessThan(half_at, vec2(0.0))) || any(greaterThan(half_at, vec2(1.0)))) return;
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < 4; i++) sum += picture(second, half_at + (vec2(i & 1, i >> 1) - 0.5) / size);
+    color = vec4(shown(0.25 * sum), 1.0);
+  } else {
+    float value = texture(differences, vec2(at.x, 1.0 - at.y)).r;
+    color = vec4(value < 0.0 ? theme : texture(colors, vec2(clamp(value / high, 0.0, 1.0), 0.5)).rgb, 1.0);
+  }
+}
+`;
+
+/** Where in the picture a point of the canvas lies, both 0 to 1 from the top left; null in the margins. */
+export function pictureAt(mode: CompareMode, width: number, height: number, x: number, y: number): [number, number] | null {
+  if (mode !== "side") return [x, y];
+  const at: [number, number] = height > width ? [2 * x - 0.5, (2 * y) % 1] : [(2 * x) % 1, 2 * y - 0.5];
+  return at.every((v) => v >= 0 && v < 1) ? at : null;
+}
+
+export class CompareView implements Presenter {
+  private program: Program | null = null;
+  private reference: { picture: Picture; samples: number; texture: WebGLTexture } | null = null;
+  private differences: WebGLTexture | null = null;
+  private colors: WebGLTexture | null = null;
+  private last: { raster: WebGLTexture; samples: number; width: number; height: number } | null = null;
+  /** End of the difference's colour scale. */
+  high = 1;
+  /** Whether a map has been given since the sizes last changed. */
+  private mapped: [number, number] | null = null;
+
+  constructor(
+    private readonly app: App,
+    private readonly presented: () => void,
+  ) {}
+
+  present(gl: WebGL2RenderingContext, raster: WebGLTexture, samples: number, width: number, height: number): boolean {
+    this.last = { raster, samples, width, height };
+    this.presented();
+    const { mode } = this.app.state.compare;
+    if (mode === "off" || !this.upload(gl)) return false;
+    if (mode === "difference" && !this.mapped) return false;
+    this.draw(gl, mode);
+    return true;
+  }
+
+  /** Values a pixel, top row first; NaN: does not count. */
+  setMap(map: Float32Array, width: number, height: number): void {
+    const { gl } = this.app;
+    this.differences ??= gl.createTexture();
+    image(gl, this.differences, gl.R32F, width, height, gl.RED, gl.FLOAT, map.map((v) => (Number.isNaN(v) ? -1 : v)));
+    this.mapped = [width, height];
+  }
+
+  /** Both pictures as the screen shows them, as linear RGB in [0, 1], top row first; null without a reference. */
+  screens(): { test: Float32Array; reference: Float32Array } | null {
+    const { gl } = this.app;
+    if (!this.last || !this.upload(gl)) return null;
+    const { width, height } = this.last;
+    const target = createTarget(gl, width, height, true, false);
+    const read = (mode: "raster" | "reference") => {
+      gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+      gl.viewport(0, 0, width, height);
+      this.draw(gl, mode);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      return linear(readTarget(gl, target));
+    };
+    const both = { test: read("raster"), reference: read("reference") };
+    deleteTarget(gl, target);
+    return both;
+  }
+
+  /** Both pictures' linear radiance, when they are of one size. */
+  pair(): Pair | null {
+    const reference = this.app.referencePicture();
+    const raster = this.app.picture();
+    if (!reference || reference.width !== raster.width || reference.height !== raster.height) return null;
+    return { width: raster.width, height: raster.height, test: raster.data, reference: reference.data };
+  }
+
+  private upload(gl: WebGL2RenderingContext): boolean {
+    const picture = this.app.referencePicture();
+    if (!picture || picture.samples === 0) return false;
+    const known = this.reference;
+    if (known && known.picture === picture && known.samples === picture.samples) return true;
+    const texture = known?.texture ?? gl.createTexture();
+    image(gl, texture, gl.RGBA32F, picture.width, picture.height, gl.RGBA, gl.FLOAT, picture.data);
+    this.reference = { picture, samples: picture.samples, texture };
+    return true;
+  }
+
+  private draw(gl: WebGL2RenderingContext, mode: CompareMode | "raster" | "reference"): void {
+    const { raster, samples, width, height } = this.last as NonNullable<typeof this.last>;
+    const { display, compare } = this.app.state;
+    this.program ??= link(gl, "compare", FULLSCREEN_VERTEX, FRAGMENT);
+    const { program } = this;
+    if (!this.colors) {
+      this.colors = gl.createTexture();
+      image(gl, this.colors, gl.RGBA8, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(colorTable("magma")));
+    }
+    for (const state of [gl.BLEND, gl.DEPTH_TEST, gl.SCISSOR_TEST, gl.CULL_FACE]) gl.disable(state);
+    gl.useProgram(program.handle);
+    const textures = { raster, reference: this.reference?.texture ?? raster, differences: this.differences ?? raster, colors: this.colors };
+    Object.entries(textures).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(program.uniform(name), unit);
+    });
+    const numbers = { samples, exposure: 2 ** display.exposure, wipe: compare.wipe, high: this.high };
+    for (const [name, value] of Object.entries(numbers)) gl.uniform1f(program.uniform(name), value);
+    gl.uniform1i(program.uniform("curve"), TONES[display.tone].index);
+    gl.uniform1i(program.uniform("mode"), MODES[mode]);
+    gl.uniform1i(program.uniform("stacked"), height > width ? 1 : 0);
+    gl.uniform3fv(program.uniform("theme"), rgb(this.app.cssColor("--stage") || this.app.cssColor("--panel")));
+    gl.uniform2f(program.uniform("size"), width, height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.activeTexture(gl.TEXTURE0);
+  }
+}
+
+function image(
+  gl: WebGL2RenderingContext,
+  texture: WebGLTexture,
+  internal: number,
+  width: number,
+  height: number,
+  format: number,
+  type: number,
+  data: ArrayBufferView,
+): void {
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
+  gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, format, type, data);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+  for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
+}
+
+/** Undoes the display's sRGB curve; RGBA in, RGB out. */
+function linear(shown: Float32Array): Float32Array {
+  const out = new Float32Array((shown.length / 4) * 3);
+  for (let i = 0; i < out.length / 3; i++)
+    for (let c = 0; c < 3; c++) {
+      const v = shown[4 * i + c] as number;
+      out[3 * i + c] = v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    }
+  return out;
+}
