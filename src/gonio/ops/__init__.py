@@ -189,7 +189,7 @@ def clamp(x: Any, low: Any, high: Any) -> Any:
 
 def rsqrt(x: Any) -> Any:
     """1 / sqrt(x); in float32 by the processor's estimate and a step of Newton's method, within 2 units."""
-    return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
+    return drjit().rsqrt(x) if is_drjit(x) and is_single(x) else 1.0 / sqrt(x)
 
 
 def _guarded(mask: Any, x: Any) -> Any:
