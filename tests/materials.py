@@ -1,7 +1,8 @@
 """The materials that the laws are tested on: every model, every choice of its parts.
 
 `SMALL` has each kind once, `ALL` every distribution with every masking, both Fresnel forms, every way of sampling,
-widths from .01 to 1, two widths with a rotation, and glass thin and dense.
+widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED` has every way to give lost
+light back that can be recorded: energy's own tests judge them, recording looks at them too.
 """
 
 from __future__ import annotations
@@ -60,6 +61,23 @@ def _rough() -> dict[str, go.BSDF]:
 ROUGH = _rough()
 ALL = {**DIFFUSE, **IDEAL, **NESTED, **ROUGH}
 FINITE = {**DIFFUSE, **NESTED, **ROUGH}  # those that have a density somewhere
+COMPENSATED = {
+    "kulla-conty-metal": go.KullaConty(go.Conductor.preset("Au", alpha=0.4)),
+    "kulla-conty-sheet": go.KullaConty(go.Conductor.preset("Cu", alpha=0.7), color="sheet", average="imageworks"),
+    "kulla-conty-beckmann": go.KullaConty(
+        go.Conductor.preset("Ag", alpha=0.3, ndf="beckmann", masking="smith-separable")
+    ),
+    "kulla-conty-schlick": go.KullaConty(go.Conductor(alpha=0.5, masking="schlick-direct", fresnel="schlick")),
+    "kulla-conty-turned": go.KullaConty(go.Conductor.preset("Fe", alpha=(0.2, 0.6), rotation=0.4)),
+    "kulla-conty-glass": go.KullaConty(go.Dielectric(1.5, 0.3, albedo=(0.9, 0.8, 0.7))),
+    "kulla-conty-bubble": go.KullaConty(go.Dielectric(0.7, (0.2, 0.5), rotation=-0.3)),
+    "kulla-conty-coat": go.KullaConty(go.Dielectric(1.5, 0.5, transmission=False)),
+    "kulla-conty-inside": go.mix(go.Lambert(0.5), go.KullaConty(go.Conductor.preset("Au", alpha=0.6)), 0.3),
+    "turquin": go.Turquin(go.Conductor.preset("Au", alpha=0.5)),
+    "turquin-turned": go.Turquin(go.Conductor.preset("Au", alpha=(0.7, 0.2))),
+    "fdez-aguera": go.FdezAguera(go.Conductor.preset("Cu", alpha=0.5)),
+    "fdez-aguera-coat": go.FdezAguera(go.Dielectric(1.5, 0.4, transmission=False)),
+}
 SMALL = {
     **DIFFUSE,
     **IDEAL,
