@@ -16,7 +16,7 @@ from ..render import engine, scene
 from ..render.scene import schema, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
 from ..render.scene.values import ImageTexture, rgb
-from .stage import SUN, Ball, Material, Row, Stage, value_at, walk
+from .stage import SUN, Ball, Material, Row, Stage, replaced, value_at, walk
 
 LARGEST_IMAGE = 1024  # pixels across of an environment in a page; a wider one is averaged down
 BALLS = 5  # a row
@@ -37,12 +37,13 @@ def stage(path: Path, allow_outside: bool = False) -> Stage:
     if not parts:
         raise InputError("the scene has no shapes", str(path), "add one, or name a model")
     notes = [f"{part.type}: its {what} is not shown" for part in parts for what in _textured(part)]
-    materials, rows = _rows([part.instance() for part in parts])
+    materials, rows = _rows([_bsdf(part) for part in parts])
     lights, more = _lights(description)
     name = path.stem if path.stem != "scene" else path.resolve().parent.name
     if path.is_dir():
         name = path.resolve().name
-    return Stage(f"Materials of {name}", materials, rows, lights, notes=(*description.warnings, *notes, *more))
+    camera = {"elevation": round(_axes(description.camera.transform)[1], 4)}
+    return Stage(f"Materials of {name}", materials, rows, lights, camera, (*description.warnings, *notes, *more))
 
 
 def _materials(description: Any) -> list[MaterialPart]:
@@ -53,6 +54,23 @@ def _materials(description: Any) -> list[MaterialPart]:
         if part not in found:
             found.append(part)
     return found
+
+
+def _bsdf(part: MaterialPart) -> BSDF:
+    """The material with its numbers, those of named presets too; a textured one has its default."""
+    return replaced(part.instance(), dict(_indices(part)))
+
+
+def _indices(part: MaterialPart, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """The values that presets stand for, by path."""
+    if part.preset is not None:
+        named = part.model.preset(part.preset)  # type: ignore[attr-defined]
+        for name in ("eta", "k"):
+            if name in named.parameters():
+                yield prefix + name, getattr(named, name)
+    for name, (value, _, _) in part.arguments().items():
+        if isinstance(value, MaterialPart):
+            yield from _indices(value, f"{prefix}{name}.")
 
 
 def _textured(part: MaterialPart) -> Iterator[str]:
@@ -115,12 +133,11 @@ def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
     """The scene's lights as the page has them, and notes on what became of them."""
     placed = description.camera.transform
     target = np.array(placed.look_at, float)
-    right, up, back = _camera_axes(placed)
+    axes, _ = _axes(placed)
     found, notes = [], []
     for light in description.lights:
         if isinstance(light, schema.EnvironmentLight):
-            found.append(_environment(description, light))
-            notes.append("the environment is seen as from the world's axes, not from the scene's camera")
+            found.append(_environment(description, light, axes))
             continue
         if isinstance(light, schema.SpotLight):
             away = np.array(light.position, float) - target
@@ -131,8 +148,7 @@ def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
         if distance == 0.0:
             notes.append("a lamp stands where the camera looks at; it is left out")
             continue
-        # in the camera's frame, since the page's camera looks along -z
-        direction = [float(axis @ away) / distance for axis in (right, up, back)]
+        direction = [float(axis @ away) / distance for axis in axes]
         found.append({"type": "directional", "direction": direction, "irradiance": [float(x) for x in irradiance]})
     if not found:
         notes.append("the scene has no light; the page's own is on")
@@ -140,12 +156,20 @@ def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
     return tuple(found), notes
 
 
-def _camera_axes(placed: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _axes(placed: Any) -> tuple[np.ndarray, float]:
+    """(the page's x, y, z in the scene, elevation of the camera): the scene turned so that its camera looks along -z.
+
+    Where up is the scene's +y, it stays so and the camera keeps its elevation; else the camera's own axes are taken.
+    """
     back = np.array(placed.position, float) - np.array(placed.look_at, float)
     back /= np.linalg.norm(back)
-    right = np.cross(np.array(placed.up, float), back)
+    up = np.array(placed.up, float) / np.linalg.norm(placed.up)
+    if up[1] > 0.9 and abs(back[1]) < 0.999:
+        z = np.array([back[0], 0.0, back[2]]) / math.hypot(back[0], back[2])
+        return np.array([[z[2], 0.0, -z[0]], [0.0, 1.0, 0.0], z]), math.asin(float(back[1]))
+    right = np.cross(up, back)
     right /= np.linalg.norm(right)
-    return right, np.cross(back, right), back
+    return np.array([right, np.cross(back, right), back]), 0.0
 
 
 def _area(light: Any, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -167,9 +191,10 @@ def _area(light: Any, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return away, radiance * seen / max(float(away @ away), 1e-12)
 
 
-def _environment(description: Any, light: Any) -> dict[str, Any]:
+def _environment(description: Any, light: Any, axes: np.ndarray) -> dict[str, Any]:
     source = light.texture if light.texture is not None else light.radiance
     found: dict[str, Any] = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
+    found["rotation"] = -math.atan2(axes[2][0], axes[2][2])
     if not isinstance(source, ImageTexture):
         return {**found, "constant": [float(x) for x in rgb(source)]}
     where = description.where("/scene/lights")
