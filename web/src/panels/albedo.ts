@@ -48,8 +48,10 @@ class AlbedoPanel implements Panel {
     this.ask();
   }
 
-  refresh(what: "picture" | "reference" | "picked" | "theme"): void {
-    if (what === "picked" || what === "theme") this.update({ touches: () => true } as unknown as Change);
+  refresh(what: string): void {
+    if (what !== "theme") return;
+    this.generation += 1;
+    this.ask();
   }
 
   private async compute(): Promise<void> {

@@ -11,7 +11,7 @@ import { colorTable } from "./colormaps";
 import type { Pair } from "./metrics";
 import { rgb } from "./theme";
 
-const MODES: Record<CompareMode | "raster" | "reference", number> = { off: 0, raster: 0, reference: 1, wipe: 2, side: 3, difference: 4 };
+const MODES: Record<CompareMode | "reference", number> = { off: 0, reference: 1, wipe: 2, side: 3, difference: 4 };
 
 const FRAGMENT = `${HEADER}${TONE_GLSL}
 uniform sampler2D raster;      // sums, bottom row first
@@ -20,7 +20,7 @@ uniform sampler2D differences; // top row first; negative: does not count
 uniform sampler2D colors;
 uniform float samples, exposure, wipe, high;
 uniform int curve, mode;
-uniform bool stacked;
+uniform bool stacked, furnace;
 uniform vec3 theme;            // colour behind the balls, sRGB
 uniform vec2 size;
 out vec4 color;
@@ -30,6 +30,8 @@ vec4 picture(bool second, vec2 at) {
 }
 
 vec3 shown(vec4 light) {
+  // In the furnace the light is all round, behind the balls too; else the theme's colour is, as paper.
+  if (furnace) return tone_mapped((light.rgb + max(1.0 - light.a, 0.0)) * exposure, curve);
   vec3 ball = tone_mapped(light.rgb / max(light.a, 1e-6) * exposure, curve);
   return mix(theme, ball, min(light.a, 1.0));
 }
@@ -61,12 +63,20 @@ export function pictureAt(mode: CompareMode, width: number, height: number, x: n
   return at.every((v) => v >= 0 && v < 1) ? at : null;
 }
 
+interface Drawn {
+  raster: WebGLTexture;
+  samples: number;
+  reference: WebGLTexture;
+  width: number;
+  height: number;
+}
+
 export class CompareView implements Presenter {
   private program: Program | null = null;
   private reference: { picture: Picture; samples: number; texture: WebGLTexture } | null = null;
   private differences: WebGLTexture | null = null;
   private colors: WebGLTexture | null = null;
-  private last: { raster: WebGLTexture; samples: number; width: number; height: number } | null = null;
+  private vao: WebGLVertexArrayObject | null = null;
   /** End of the difference's colour scale. */
   high = 1;
   /** Whether a map has been given since the sizes last changed. */
@@ -78,12 +88,11 @@ export class CompareView implements Presenter {
   ) {}
 
   present(gl: WebGL2RenderingContext, raster: WebGLTexture, samples: number, width: number, height: number): boolean {
-    this.last = { raster, samples, width, height };
     this.presented();
     const { mode } = this.app.state.compare;
     if (mode === "off" || !this.upload(gl)) return false;
     if (mode === "difference" && !this.mapped) return false;
-    this.draw(gl, mode);
+    this.draw(mode, { raster, reference: (this.reference as NonNullable<typeof this.reference>).texture, samples, width, height });
     return true;
   }
 
@@ -95,30 +104,37 @@ export class CompareView implements Presenter {
     this.mapped = [width, height];
   }
 
-  /** Both pictures as the screen shows them, as linear RGB in [0, 1], top row first; null without a reference. */
-  screens(): { test: Float32Array; reference: Float32Array } | null {
+  /** The pair as the screen shows it, as linear RGB in [0, 1], top row first. */
+  screens({ width, height, test, reference }: Pair): { test: Float32Array; reference: Float32Array } {
     const { gl } = this.app;
-    if (!this.last || !this.upload(gl)) return null;
-    const { width, height } = this.last;
     const target = createTarget(gl, width, height, true, false);
-    const read = (mode: "raster" | "reference") => {
+    const texture = gl.createTexture();
+    const read = (data: Float32Array) => {
+      image(gl, texture, gl.RGBA32F, width, height, gl.RGBA, gl.FLOAT, data);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
       gl.viewport(0, 0, width, height);
-      this.draw(gl, mode);
+      this.draw("reference", { reference: texture, raster: texture, samples: 1, width, height });
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
       return linear(readTarget(gl, target));
     };
-    const both = { test: read("raster"), reference: read("reference") };
+    const both = { test: read(test), reference: read(reference) };
     deleteTarget(gl, target);
+    gl.deleteTexture(texture);
     return both;
   }
 
-  /** Both pictures' linear radiance, when they are of one size. */
+  /**
+   * Both pictures' linear radiance, at the reference's size: where the raster picture is a whole number of times larger,
+   * its pixels are averaged, which is what its own pixel filter, a box, would have done. Null for any other sizes.
+   */
   pair(): Pair | null {
     const reference = this.app.referencePicture();
+    if (!reference) return null;
     const raster = this.app.picture();
-    if (!reference || reference.width !== raster.width || reference.height !== raster.height) return null;
-    return { width: raster.width, height: raster.height, test: raster.data, reference: reference.data };
+    const { width, height } = reference;
+    const factor = raster.width / width;
+    if (!Number.isInteger(factor) || raster.height !== factor * height) return null;
+    return { width, height, test: shrunk(raster, factor), reference: reference.data };
   }
 
   private upload(gl: WebGL2RenderingContext): boolean {
@@ -132,9 +148,9 @@ export class CompareView implements Presenter {
     return true;
   }
 
-  private draw(gl: WebGL2RenderingContext, mode: CompareMode | "raster" | "reference"): void {
-    const { raster, samples, width, height } = this.last as NonNullable<typeof this.last>;
-    const { display, compare } = this.app.state;
+  private draw(mode: CompareMode | "reference", { raster, reference, samples, width, height }: Drawn): void {
+    const { gl } = this.app;
+    const { display, compare, furnace } = this.app.state;
     this.program ??= link(gl, "compare", FULLSCREEN_VERTEX, FRAGMENT);
     const { program } = this;
     if (!this.colors) {
@@ -143,7 +159,7 @@ export class CompareView implements Presenter {
     }
     for (const state of [gl.BLEND, gl.DEPTH_TEST, gl.SCISSOR_TEST, gl.CULL_FACE]) gl.disable(state);
     gl.useProgram(program.handle);
-    const textures = { raster, reference: this.reference?.texture ?? raster, differences: this.differences ?? raster, colors: this.colors };
+    const textures = { raster, reference, differences: this.differences ?? raster, colors: this.colors };
     Object.entries(textures).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -154,9 +170,13 @@ export class CompareView implements Presenter {
     gl.uniform1i(program.uniform("curve"), TONES[display.tone].index);
     gl.uniform1i(program.uniform("mode"), MODES[mode]);
     gl.uniform1i(program.uniform("stacked"), height > width ? 1 : 0);
-    gl.uniform3fv(program.uniform("theme"), rgb(this.app.cssColor("--stage") || this.app.cssColor("--panel")));
+    gl.uniform1i(program.uniform("furnace"), furnace ? 1 : 0);
+    gl.uniform3fv(program.uniform("theme"), rgb(this.app.cssColor("--paper")));
     gl.uniform2f(program.uniform("size"), width, height);
+    this.vao ??= gl.createVertexArray();
+    gl.bindVertexArray(this.vao);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE0);
   }
 }
@@ -178,6 +198,18 @@ function image(
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
   for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
   for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
+}
+
+function shrunk({ width, height, data }: Picture, factor: number): Float32Array {
+  if (factor === 1) return data;
+  const [w, h] = [width / factor, height / factor];
+  const out = new Float32Array(4 * w * h);
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < width; x++) {
+      const to = 4 * (Math.floor(y / factor) * w + Math.floor(x / factor));
+      for (let c = 0; c < 4; c++) out[to + c] = (out[to + c] as number) + (data[4 * (y * width + x) + c] as number) / (factor * factor);
+    }
+  return out;
 }
 
 /** Undoes the display's sRGB curve; RGBA in, RGB out. */

@@ -100,7 +100,7 @@ export class Comparison {
     const pair = this.view.pair();
     if (!pair) {
       this.figures = this.pair = null;
-      this.lack = `The reference is ${reference.width} × ${reference.height} pixels, the raster picture is not (yet).`;
+      this.lack = `The reference has ${reference.width} × ${reference.height} pixels, which does not divide the raster picture's.`;
       for (const listener of this.listeners) listener();
       return;
     }
@@ -119,8 +119,7 @@ export class Comparison {
     for (const listener of this.listeners) listener();
     const screen = [samples, exposure, tone, theme, pair.width, pair.height].join();
     if (screen !== this.flipOf) {
-      const screens = this.view.screens();
-      if (!screens) return;
+      const screens = this.view.screens(pair);
       const map = await flipMap(screens.test, screens.reference, pair.width, pair.height);
       this.flip = { map, mean: Number.NaN };
       this.flipOf = screen;

@@ -81,7 +81,7 @@ export class Curves {
         { ...axis, label: chart.yTitle, size: 48, values: (_, ticks) => ticks.map((v) => (v === null || v === undefined ? "" : short(v))) },
       ],
       series: [
-        { label: chart.xTitle, value: (_, v) => (v === null ? "" : short(v)) },
+        { label: chart.xTitle.split(" ")[0] ?? "", value: (_, v) => (v === null ? "" : short(v)) },
         ...chart.series.map((s) => ({
           label: s.label,
           stroke: s.color,

@@ -71,8 +71,8 @@ class HalfDifferencePanel implements Panel {
     if (change.touches("slots", "solo", "selection", `panels.${this.id}`, "panels.viewing", "display.theme")) this.ask();
   }
 
-  refresh(): void {
-    this.ask();
+  refresh(what: string): void {
+    if (what === "theme") this.ask();
   }
 
   private async compute(): Promise<void> {

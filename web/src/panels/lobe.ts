@@ -47,8 +47,8 @@ class LobePanel implements Panel {
     if (viewingTouched(change) || change.touches(`panels.${this.id}`, "display.theme")) this.ask();
   }
 
-  refresh(): void {
-    this.ask();
+  refresh(what: string): void {
+    if (what === "picked" || what === "theme") this.ask();
   }
 
   private async compute(): Promise<void> {
@@ -79,12 +79,12 @@ class LobePanel implements Panel {
           vertices[6 * i + 3 + c] = byValue ? (table[at + c] as number) / 255 : (tint[c] as number);
         }
       }
-      return { vertices, alpha: 1, size };
+      return { vertices, glass: false, size };
     });
     const ink = rgb(app.cssColor("--text"));
     // The smallest is solid, those round it are glass: colours that blend evenly would be no model's colour.
     const smallest = Math.min(...surfaces.map((s) => s.size));
-    for (const surface of surfaces) if (surface.size > smallest) surface.alpha = 0.35;
+    for (const surface of surfaces) if (surface.size > smallest) surface.glass = true;
     const arrows: Arrow[] = [
       { direction: [0, 0, 1], color: ink, label: "n" },
       { direction: [1, 0, 0], color: ink, label: "t" },

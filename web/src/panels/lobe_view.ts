@@ -5,7 +5,8 @@ import { HEADER, link, type Program } from "../shaders";
 export interface Surface {
   /** xyz and RGB (0 to 1), interleaved. */
   vertices: Float32Array;
-  alpha: number;
+  /** See-through, because it holds another. */
+  glass: boolean;
   /** Sorts nested surfaces. */
   size: number;
 }
@@ -28,12 +29,15 @@ void main() { at = position; tint = color; gl_Position = projection * vec4(posit
 const FRAGMENT = `${HEADER}
 in vec3 at;
 in vec3 tint;
-uniform float alpha, lit;
+uniform float lit, glass;
 uniform vec3 eye;
 out vec4 result;
 void main() {
   vec3 normal = normalize(cross(dFdx(at), dFdy(at)) + vec3(0.0, 0.0, 1e-12));
-  float shade = mix(1.0, 0.45 + 0.55 * abs(dot(normal, normalize(eye - at))), lit);
+  float facing = abs(dot(normal, normalize(eye - at)));
+  float shade = mix(1.0, 0.45 + 0.55 * facing, lit);
+  // Glass shows at its rim, where it is looked through lengthwise, and leaves what it holds its own colour.
+  float alpha = mix(1.0, mix(0.75, 0.07, facing), glass);
   result = vec4(tint * shade * alpha, alpha);
 }`;
 
@@ -157,9 +161,9 @@ export class LobeView {
     for (const surface of this.surfaces) passes.unshift([surface, gl.FRONT]);
     for (const [surface, culled] of passes) {
       gl.cullFace(culled);
-      gl.depthMask(surface.alpha >= 1);
+      gl.depthMask(!surface.glass);
       this.upload(surface.vertices);
-      gl.uniform1f(program.uniform("alpha"), surface.alpha);
+      gl.uniform1f(program.uniform("glass"), surface.glass ? 1 : 0);
       gl.uniform1f(program.uniform("lit"), 1);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.elements);
       gl.drawElements(gl.TRIANGLES, this.indices.length, gl.UNSIGNED_INT, 0);
@@ -182,7 +186,7 @@ export class LobeView {
   private lines(vertices: number[]): void {
     const { gl, program } = this;
     this.upload(Float32Array.from(vertices));
-    gl.uniform1f(program.uniform("alpha"), 1);
+    gl.uniform1f(program.uniform("glass"), 0);
     gl.uniform1f(program.uniform("lit"), 0);
     gl.drawArrays(gl.LINES, 0, vertices.length / 6);
   }

@@ -59,8 +59,8 @@ class SlicesPanel implements Panel {
     if (viewingTouched(change) || change.touches(`panels.${this.id}`, "display.theme")) this.ask();
   }
 
-  refresh(): void {
-    this.ask();
+  refresh(what: string): void {
+    if (what === "picked" || what === "theme") this.ask();
   }
 
   private async compute(): Promise<void> {
