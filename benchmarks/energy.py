@@ -1,27 +1,51 @@
-"""The figures of docs/energy.md: tables, furnaces, the walk, and the cost of compensation.
+"""The figures of docs/energy.md: tables, furnaces, the walk, the cost of compensation, the ten balls.
 
-    python benchmarks/energy.py [--pairs 16] [--walks 10]
+    python benchmarks/energy.py [--pairs 16] [--walks 10] [--spp 64] [--only tables,furnaces]
 
-Prints one line a bar with what was measured. Times are the best of several.
+Prints one line a figure, with the bar that it is held to. Times are the best of several, ratios of runs in turn.
 """
 
 from __future__ import annotations
 
 import argparse
+import copy
+import json
 import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.energy import bake, monte_carlo, quadrature, walk
+from gonio.energy import bake, comparison, monte_carlo, quadrature, walk
 from gonio.ops import backend
 
+ROOT = Path(__file__).resolve().parents[1]
+REFERENCE = ROOT.parent / "shared" / "reference" / "kulla-conty"
 CENTRES = (np.arange(128) + 0.5) / 128
 MU, ROUGHNESS = np.meshgrid(CENTRES, CENTRES)
+NDFS = ("ggx", "beckmann", "student-t")
 MASKINGS = ("smith-correlated", "smith-separable", "schlick-direct", "schlick-ibl")
+STEEP = np.array([0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0])
+
+
+def figure(what: str, value: float, bar: float | None = None, form: str = ".1e", at_least: bool = False) -> None:
+    """Print one figure, and whether its bar is met."""
+    text = f"  {what:72} {value:{form}}"
+    if bar is not None:
+        met = value >= bar if at_least else value <= bar
+        text += f"   bar {'>=' if at_least else '<='} {bar:g}: {'met' if met else 'MISSED'}"
+    print(text, flush=True)
+
+
+def within(what: str, values: object, low: float | None = None, high: float = 0.0) -> None:
+    """Print the range of figures, and whether it lies inside its bar."""
+    a, b = float(np.min(values)), float(np.max(values))  # type: ignore[arg-type]
+    met = "" if low is None else f"   bar {low:g} .. {high:g}: {'met' if low <= a and b <= high else 'MISSED'}"
+    print(f"  {what:60} {a:.5f} .. {b:.5f}{met}", flush=True)
 
 
 def best(job, rounds: int = 5) -> float:
@@ -36,37 +60,50 @@ def best(job, rounds: int = 5) -> float:
 
 
 def tables() -> None:
-    print("E, 128 x 128, roughness >= .05: error against (110, 90) nodes; E_avg; time with its own error estimate")
+    """E and E_avg of every distribution and masking, against (110, 90) nodes; the manifest's own figure."""
     rough = ROUGHNESS >= 0.05
-    for ndf in ("ggx", "beckmann", "student-t"):
+    for ndf in NDFS:
         for masking in MASKINGS:
+            name = f"{ndf}, {masking}:"
             fine = quadrature.moments(ndf, masking, MU, ROUGHNESS**2, nodes=(110, 90)).whole
-            baked = bake.bake(ndf, ["E"], masking=masking)
-            error = np.abs(baked.arrays["E"] - fine)[rough].max()
-            seconds = best(lambda ndf=ndf, masking=masking: bake.bake(ndf, ["E"], masking=masking), 3)
+            found = bake.bake(ndf, ["E"], masking=masking)
+            own = found.manifest["error"]["E"]
+            figure(f"{name} E at the nodes, roughness >= .05", np.abs(found.arrays["E"] - fine)[rough].max(), 2e-5)
+            truth = np.abs(found.arrays["E"] - fine).max()
+            if truth > 1e-10:  # below, both are rounding
+                factor = max(own["max"] / truth, truth / own["max"])
+                figure(f"{name} the manifest's error, factor to the truth", factor, 3, ".2f")
             exact = quadrature.average(ndf, masking, CENTRES**2, nodes=(90, 70), count=96)
-            average = np.abs(quadrature.average(ndf, masking, CENTRES**2) - exact).max()
-            figures = baked.manifest["error"]["E"]
+            error = np.abs(quadrature.average(ndf, masking, CENTRES**2) - exact).max()
+            figure(f"{name} E_avg", error, 1e-5)
+            figure(f"{name} between nodes, linear layout", own["interpolation"])
             stretched = bake.bake(ndf, ["E"], masking=masking, layout="stretched").manifest["error"]["E"]
-            print(
-                f"  {ndf:10} {masking:17} max {error:.1e} (manifest {figures['max']:.1e})  E_avg {average:.1e}  "
-                f"{seconds:.2f} s  between nodes {figures['interpolation']:.1e} linear, "
-                f"{stretched['interpolation']:.1e} stretched"
-            )
-
-
-def fresh_process() -> None:
-    code = "from gonio.energy.bake import bake; bake('ggx', ['E'])"
+            figure(f"{name} between nodes, stretched layout", stretched["interpolation"], 2e-3)
+            seconds = best(lambda ndf=ndf, masking=masking: bake.bake(ndf, ["E"], masking=masking), 3)
+            figure(f"{name} seconds, warm, with its own error estimate", seconds, 1.0, ".2f")
     start = time.perf_counter()
-    subprocess.run([sys.executable, "-c", code], check=True)
-    print(f"the first table in a fresh process, imports included: {time.perf_counter() - start:.2f} s")
+    subprocess.run([sys.executable, "-c", "from gonio.energy.bake import bake; bake('ggx', ['E'])"], check=True)
+    figure("seconds of the first table in a fresh process, imports included", time.perf_counter() - start, 4.0, ".2f")
 
 
-def against_sampling() -> None:
+def two_widths() -> None:
+    """E[phi, roughness, mu], 24 x 128 x 128, against (200, 120) nodes at a part of its nodes."""
+    for ndf, masking, aspect in (("ggx", "smith-correlated", 0.25), ("ggx", "smith-separable", 0.1)):
+        found = bake.bake(ndf, ["E", "Eavg"], masking=masking, aspect=aspect, layout="stretched")
+        axes = bake.Axes("stretched", ndf, masking, 128, aspect, 24)
+        part = np.ix_(np.arange(0, 24, 5), np.arange(29, 128, 14), np.arange(0, 128, 9))  # roughness >= .2
+        fine = quadrature.moments(ndf, masking, *axes.at(*part), nodes=(200, 120)).whole
+        name = f"{ndf}, {masking}, alpha_y / alpha_x = {aspect}:"
+        figure(f"{name} E", np.abs(found.arrays["E"][part] - fine).max(), 2e-5)
+        figure(f"{name} between nodes", found.manifest["error"]["E"]["interpolation"])
+
+
+def sampling() -> None:
+    """Quadrature against sampling, GGX, smith-correlated; then the homework's layout, before 8 bits."""
     exact = quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2, nodes=(110, 90)).whole
     ways = {
         "quadrature": lambda: quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2).whole,
-        "ggx, 1024 independent": lambda: (
+        "normals, 1024 independent samples": lambda: (
             monte_carlo.estimate("ggx", "smith-correlated", MU, ROUGHNESS**2, "ggx", 1024, "independent").value
         ),
     }
@@ -75,49 +112,100 @@ def against_sampling() -> None:
         rms = np.sqrt(np.mean((way() - exact)[ROUGHNESS >= 0.05] ** 2))
         seconds = best(way)
         product[name] = rms**2 * seconds
-        print(f"  {name:22} rms {rms:.1e}, {seconds:.3f} s, rms^2 x time {product[name]:.1e}")
+        print(f"  {name:40} rms {rms:.1e}, {seconds:.3f} s, rms^2 x time {product[name]:.1e}")
     first, second = product.values()
-    print(f"  ratio {second / first:.1e}")
+    figure("rms^2 x time, sampling over quadrature", second / first, 1e4, at_least=True)
+    part = ROUGHNESS >= 0.1
     for masking in MASKINGS:
-        found = monte_carlo.estimate("ggx", masking, MU, ROUGHNESS**2, "ggx", 1024).value
         truth = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).whole
-        rms = np.sqrt(np.mean((found - truth)[ROUGHNESS >= 0.1] ** 2))
-        print(f"  Hammersley, 1024 samples, {masking:17} rms {rms:.4f} (roughness >= .1)")
+        for points in ("hammersley", "independent"):
+            found = monte_carlo.estimate("ggx", masking, MU, ROUGHNESS**2, "ggx", 1024, points)
+            rms = np.sqrt(np.mean((found.value - truth)[part] ** 2))
+            if points == "hammersley":
+                figure(
+                    f"{masking}: Hammersley, 1024 samples, rms", rms, 0.005 if "schlick" in masking else 0.006, ".4f"
+                )
+            else:
+                ratio = rms / np.sqrt(np.mean(found.standard_error[part] ** 2))
+                figure(f"{masking}: independent points, rms over the predicted error", ratio, 1.2, ".2f")
+    if REFERENCE.is_dir():
+        import mitsuba as mi
+        from gonio.render import engine
+
+        engine.load("cpu")
+        truth = quadrature.moments("ggx", "schlick-ibl", MU, ROUGHNESS**2).whole[::-1]
+        picture = np.array(mi.Bitmap(str(REFERENCE / "homework_E_importance_sampled.png")))[..., 0] / 255.0
+        rms = np.sqrt(np.mean((picture - truth)[ROUGHNESS[::-1] >= 0.3] ** 2))
+        figure("a public solution's E against schlick-ibl, roughness >= .3, rms", rms, 0.004, ".4f")
+        average = np.array(mi.Bitmap(str(REFERENCE / "homework_Eavg.png")))[:, 0, 0] / 255.0
+        off = np.abs(average - quadrature.average("ggx", "schlick-ibl", CENTRES**2)[::-1])
+        figure("its E_avg, roughness >= .3", off[CENTRES[::-1] >= 0.3].max(), 0.0065, ".4f")
 
 
 def furnaces() -> None:
-    mu = np.array([0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0])
+    """White furnaces, mu .05 to 1: metal of roughness .05 to 1, glass of alpha .05 to 1 from both sides, others."""
     for masking in ("smith-correlated", "smith-separable"):
-        for ndf in ("ggx", "beckmann"):
+        for ndf in NDFS:
             values = [
-                go.albedo(go.KullaConty(go.Conductor(alpha=r * r, ndf=ndf, masking=masking, fresnel="one")), mu).value
+                go.albedo(
+                    go.KullaConty(go.Conductor(alpha=r * r, ndf=ndf, masking=masking, fresnel="one")), STEEP
+                ).value
                 for r in np.linspace(0.05, 1.0, 20)
             ]
-            print(f"  metal {ndf:9} {masking:17} {np.min(values):.5f} .. {np.max(values):.5f}")
-    for eta in (1.5, 1.33, 2.4, 1.1):
+            within(f"metal, {ndf}, {masking}", values, 0.999, 1.001)
+    for eta in (1.5, 1 / 1.5, 1.33, 2.4, 1.1, 1.02):
         for masking in ("smith-correlated", "smith-separable"):
             values = [
-                go.albedo(go.KullaConty(go.Dielectric(eta, a, masking=masking)), np.concatenate([mu, -mu])).value
+                go.albedo(go.KullaConty(go.Dielectric(eta, a, masking=masking)), np.concatenate([STEEP, -STEEP])).value
                 for a in np.linspace(0.05, 1.0, 12)
             ]
-            print(f"  glass eta {eta:4} {masking:17} {np.min(values):.5f} .. {np.max(values):.5f}")
+            bar = (0.995, 1.002) if eta in (1.5, 1 / 1.5) else ()
+            within(f"glass, eta {eta:.4g}, {masking}", values, *bar)
+    bases = {
+        "Oren-Nayar, sigma .5": go.OrenNayar(1.0, 0.5),
+        "Phong, p = 30": go.Phong(0.1, 0.4, 30.0),
+        "Blinn-Phong, p = 60": go.BlinnPhong(0.1, 0.2, 60.0),
+        "mix of two metals": go.mix(
+            go.Conductor(alpha=0.1, fresnel="one"), go.Conductor(alpha=0.6, fresnel="one"), 0.3
+        ),
+        "mix of Lambert and metal": go.mix(go.Lambert(1.0), go.Conductor(alpha=0.3, fresnel="one"), 0.6),
+    }
+    for name, base in bases.items():
+        within(f"measured base, {name}", go.albedo(go.KullaConty(base), STEEP).value, 0.999, 1.001)
+    figure(
+        "reciprocity of Kulla-Conty, gold, largest relative breach", comparison.breach("kulla-conty bounce", 0), 1e-6
+    )
 
 
 def random_walk(millions: float) -> None:
+    """Gold of alpha .8 against the walk, over mu and in the mean; the walk's own furnace."""
     gold = go.Conductor.preset("Au", alpha=0.8)
     count = int(millions * 1e6)
-    for mu in (0.2, 0.6, 1.0):
-        mean, error = walk.albedo(gold, mu, count // 3)
-        ways = {c: go.albedo(go.KullaConty(gold, color=c), mu).value[0] for c in ("sheet", "bounce")}
-        text = ", ".join(f"{name} {np.round(value, 4)}" for name, value in ways.items())
-        print(f"  gold alpha .8, mu {mu}: walk {np.round(mean, 4)} +- {error.max():.0e}, {text}")
+    x, w = quadrature.gauss(10)
+    weight = 4.0 * w * x**3
+    found = [walk.albedo(gold, float(mu), count // 10, seed) for seed, mu in enumerate(x**2)]
+    referee, noise = weight @ [v for v, _ in found], np.sqrt(weight**2 @ [e**2 for _, e in found]).max()
+    print(f"  mean albedo, gold, alpha .8: walk {np.round(referee, 4)} +- {noise:.0e}")
+    away = {}
+    for color in ("sheet", "bounce"):
+        ours = weight @ go.albedo(go.KullaConty(gold, color=color), x**2).value
+        away[color] = np.abs(ours - referee).mean()
+        print(f"    Kulla-Conty, {color:6} {np.round(ours, 4)}, off by {away[color]:.4f} in the mean")
+    print(f"    plain               {np.round(weight @ go.albedo(gold, x**2).value, 4)}")
+    nearer = min(away, key=away.__getitem__)
+    default = go.KullaConty(gold).color
+    print(f"    nearer: {nearer}; default: {default}: {'met' if nearer == default else 'MISSED'}")
     for base in (go.Conductor(alpha=0.8, fresnel="one"), go.Dielectric(1.5, 0.5)):
         drawn = go.albedo(go.RandomWalk(base), 0.6, method="sampling", samples=count)
-        away = abs(drawn.value[0, 0] - 1.0) / drawn.error[0, 0]
-        print(f"  furnace of {base.name}, {count:.0e} walks by eval: {drawn.value[0, 0]:.5f}, {away:.1f} sigma from 1")
+        sigma = abs(drawn.value[0, 0] - 1.0) / drawn.error[0, 0]
+        print(
+            f"  furnace of {base.name}, {count:.0e} walks by eval: {drawn.value[0, 0]:.5f} +- {drawn.error[0, 0]:.0e}"
+        )
+        figure(f"its distance from 1, {base.name}, in sigma", sigma, 3.0, ".1f")
 
 
 def costs(millions: float) -> None:
+    """Time of eval over that of the plain metal, in turns."""
     dr = backend.drjit()
     kind = backend.types("float32")
     count = int(millions * (1 << 20))
@@ -132,7 +220,7 @@ def costs(millions: float) -> None:
 
     wo, wi = directions(), directions()
     plain = go.Conductor.preset("Au", alpha=0.3)
-    ways = {"plain": plain, "kulla-conty": go.KullaConty(plain), "turquin": go.Turquin(plain)}
+    ways = {"plain": plain, "Kulla-Conty": go.KullaConty(plain), "Turquin": go.Turquin(plain)}
     times: dict[str, list[float]] = {name: [] for name in ways}
     for turn in range(25):
         for name, model in ways.items():
@@ -142,30 +230,67 @@ def costs(millions: float) -> None:
             dr.sync_thread()
             if turn > 1:
                 times[name].append(time.perf_counter() - start)
-    for name, found in times.items():
-        ratios = np.array(found) / np.array(times["plain"])
-        print(
-            f"  {name:12} {count / min(found) / 1e6:6.1f} M/s, time over plain: "
-            f"best {min(found) / min(times['plain']):.2f}, median of pairs {np.median(ratios):.2f}"
+    print(f"  plain metal: {count / min(times['plain']) / 1e6:.0f} M/s")
+    for name in ("Kulla-Conty", "Turquin"):
+        median = float(np.median(np.array(times[name]) / np.array(times["plain"])))
+        figure(
+            f"{name}, {millions:g} M pairs, time over plain, best", min(times[name]) / min(times["plain"]), 1.5, ".2f"
         )
+        figure(f"{name}, {millions:g} M pairs, time over plain, median of pairs", median, 1.5, ".2f")
+
+
+def ten_balls(spp: int) -> None:
+    """The shading balls, 1024 x 512, path: all ten compensated over all ten plain, in turns."""
+    from gonio.render import engine, integrators, scene
+
+    mi = engine.load("cpu")
+    base = json.loads((ROOT / "examples" / "shading-balls" / "scene.json").read_text())
+    base["camera"]["film"]["size"] = [1024, 512]
+    scenes = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("plain", "compensated"):
+            description = copy.deepcopy(base)
+            for shape in description["scene"]["shapes"]:
+                metal = shape["material"].get("base", shape["material"])
+                shape["material"] = metal if name == "plain" else {"type": "kulla-conty", "base": metal}
+            Path(folder, "scene.json").write_text(json.dumps(description))
+            scenes[name] = scene.build(scene.read(folder), mi)
+    times: dict[str, list[float]] = {name: [] for name in scenes}
+    for turn in range(6):
+        for name, built in scenes.items():
+            job = integrators.Render(built, integrators.Settings("path", max_depth=5, seed=turn))
+            start = time.perf_counter()
+            job.advance(spp)
+            times[name].append(time.perf_counter() - start)
+    ratio = np.median(np.array(times["compensated"][1:]) / np.array(times["plain"][1:]))
+    print("  " + ", ".join(f"{name} {min(t[1:]):.2f} s" for name, t in times.items()))
+    figure(f"ten balls, {spp} spp, compensated over plain", float(ratio), 1.3, ".2f")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pairs", type=float, default=16, help="millions of direction pairs")
     parser.add_argument("--walks", type=float, default=10, help="millions of random walks")
+    parser.add_argument("--spp", type=int, default=64, help="samples per pixel of the ten balls")
+    parser.add_argument("--only", default="", help="parts, by name, with commas between")
     options = parser.parse_args()
+    parts = {
+        "tables": tables,
+        "two-widths": two_widths,
+        "sampling": sampling,
+        "furnaces": furnaces,
+        "walk": lambda: random_walk(options.walks),
+        "costs": lambda: costs(options.pairs),
+        "balls": lambda: ten_balls(options.spp),
+    }
+    chosen = options.only.split(",") if options.only else list(parts)
+    if unknown := set(chosen) - set(parts):
+        parser.error(f"unknown part {', '.join(unknown)}; known: {', '.join(parts)}")
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores")
-    fresh_process()
-    tables()
-    print("Quadrature against sampling, GGX, smith-correlated")
-    against_sampling()
-    print("White furnace, roughness .05 to 1 (glass: alpha .05 to 1, both sides), mu .05 to 1")
-    furnaces()
-    print("The random walk")
-    random_walk(options.walks)
-    print(f"eval of {options.pairs:g} M pairs")
-    costs(options.pairs)
+    for name in chosen:
+        about = {"walk": random_walk, "costs": costs, "balls": ten_balls}.get(name, parts[name]).__doc__
+        print(f"\n{name}: {about}")
+        parts[name]()
 
 
 if __name__ == "__main__":

@@ -46,6 +46,13 @@ def test_white_furnace_of_glass_is_closed_on_both_sides(eta):
             assert 0.995 <= whole_albedo(glass, mu)[0] <= 1.002
 
 
+@pytest.mark.parametrize(("eta", "loss"), [(1.02, 0.015), (1.1, 0.004), (2.4, 0.002)])
+def test_glass_keeps_nearly_all_its_energy_near_and_far_from_eta_1(eta, loss):
+    for alpha in (0.1, 0.4, 1.0):
+        value = go.albedo(go.KullaConty(go.Dielectric(eta, alpha)), np.concatenate([MU, -MU])).value
+        np.testing.assert_allclose(value, 1.0, atol=loss)
+
+
 def test_a_metal_with_two_widths_keeps_its_energy():
     metal = go.KullaConty(go.Conductor(alpha=(0.1, 0.4), fresnel="one", rotation=0.3))
     phi = (np.arange(48) + 0.5) / 48 * 2 * np.pi

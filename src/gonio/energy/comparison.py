@@ -97,12 +97,12 @@ def compare(
         "albedo": {n: {m: v.tolist() for m, v in by.items()} for n, by in found.items()},
         "rms": rms,
         "furnace": furnace,
-        "reciprocity": {m: _breach(m, seed) for m in METHODS if m != "random walk"},
+        "reciprocity": {m: breach(m, seed) for m in METHODS if m != "random walk"},
         "cost": _costs(pairs),
     }
 
 
-def _breach(method: str, seed: int) -> float:
+def breach(method: str, seed: int) -> float:
     """Largest |f(o, i) - f(i, o)| over the larger of the two, gold of roughness .7, 2000 pairs."""
     model = compensated(method, material("gold", 0.49))
     rng = np.random.default_rng(seed)

@@ -208,7 +208,7 @@ def _azimuth(y: float, big: np.ndarray, small: np.ndarray) -> tuple[np.ndarray, 
     return cos2, 1.0 - cos2, np.sqrt(big**2 * cos2 + small**2 * (1.0 - cos2))
 
 
-GLASS_ETAS = 21  # at equal steps of sqrt(F0) = (eta - 1) / (eta + 1)
+GLASS_ETAS = 21  # at equal steps of the root of sqrt(F0) = (eta - 1) / (eta + 1): M changes fastest near eta = 1
 GLASS_ROWS = 33
 GLASS_LOBE_NODES = 96
 LARGEST_ROOT = 2.0 / 3.0  # eta = 5
@@ -217,11 +217,11 @@ SIDES = ("thin", "dense")
 
 @lru_cache
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """Coefficients over (sqrt(F0), roughness) of rough glass, for light from its thin and from its dense side."""
+    """Coefficients of rough glass over (the root of sqrt(F0), roughness), for light from its thin and its dense side."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
-        roots = np.linspace(0.0, LARGEST_ROOT, GLASS_ETAS)
+        roots = np.linspace(0.0, 1.0, GLASS_ETAS) ** 2 * LARGEST_ROOT
         eta = np.maximum((1.0 + roots) / (1.0 - roots), 1.0 + 1e-4)
         alphas, etas = np.tile(alpha, GLASS_ETAS), np.repeat(eta, GLASS_ROWS)
         sides = []
@@ -243,7 +243,7 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
 
 @lru_cache
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """As `lobe`, over (sqrt(F0), roughness, u), for either side."""
+    """As `lobe`, over (the root of sqrt(F0), roughness, u), for either side."""
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
     tables = {}
     for side, table in glass(ndf, masking, fresnel).items():

@@ -237,7 +237,7 @@ class Glass:
         width = sqrt(alpha.x * alpha.y)
         eta = maximum(base.eta, 1.0 / base.eta)
         place = (
-            inset((eta - 1.0) / (eta + 1.0) * (1.0 / curves.LARGEST_ROOT), curves.GLASS_ETAS),
+            inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.LARGEST_ROOT)), curves.GLASS_ETAS),
             inset(sqrt(width), curves.GLASS_ROWS),
         )
         tables = curves.glass(base.ndf, base.masking, base.fresnel)

@@ -49,5 +49,5 @@ class KullaConty(_Added):
     def lossless(self) -> float:  # type: ignore[override]
         """What a white furnace may miss: the error of polynomials or of the measurement, see docs/energy.md."""
         if self.base.transmits:
-            return 0.015  # near eta = 1.1; 2e-3 from eta 1.33 on
+            return 0.015  # near eta = 1.02; 4e-3 from 1.1 on, 2e-3 from 1.3 on
         return 0.01 if self.turned else 1e-3
