@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all lint bench install clean docs
+.PHONY: demo test test-all lint bench install clean docs browser
 
 install: .venv/installed
 
@@ -31,10 +31,18 @@ lint: .venv/installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: .venv/installed lint
+# Shaders and the page are tested in a real browser: the one that is here, else Debian's, else Playwright's.
+browser: .venv/installed
+	@command -v chromium || command -v chromium-browser || command -v google-chrome \
+	|| { test "$$(id -u)" = 0 && command -v apt-get >/dev/null \
+	     && { apt-get install -y -qq chromium || { apt-get update -qq && apt-get install -y -qq chromium; }; }; } \
+	|| $(BIN)/playwright install chromium \
+	|| echo "NO BROWSER could be found or installed: tests in WebGL and WebGPU will be skipped, nothing is tried there" >&2
+
+test: .venv/installed browser lint
 	$(BIN)/python -m pytest -m 'not slow'
 
-test-all: .venv/installed lint
+test-all: .venv/installed browser lint
 	$(BIN)/python -m pytest
 
 bench: .venv/installed

@@ -27,7 +27,7 @@ from rich.table import Table
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.render.integrators import Render, Settings, _Transport  # noqa: E402
+from gonio.render.integrators import Render, Settings, Transport  # noqa: E402
 
 WIDTH, HEIGHT, SPP = 1000, 300, 64
 ETA, K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]
@@ -211,7 +211,7 @@ def verdict(what: str, ratio: float, bar: float, at_most: bool = False) -> None:
     console.print(f"{'met ' if met else 'MISSED'} {what}: {ratio:.2f} x (bar: {'<=' if at_most else '>='} {bar} x)")
 
 
-class _Stage(_Transport):
+class _Stage(Transport):
     """directSampleLight cut short, to see where its time goes. The stages keep the rays and add work."""
 
     stage = "rays"
