@@ -121,6 +121,37 @@ def test_two_widths_agree_with_one_where_equal_and_with_sampling_where_not():
     assert abs(found.value - drawn.value).max() < 5 * drawn.error.max()
 
 
+@pytest.mark.parametrize(
+    ("ndf", "masking"), [("ggx", "smith-correlated"), ("ggx", "smith-separable"), ("beckmann", "smith-correlated")]
+)
+def test_two_widths_are_met_to_2e_5_down_to_grazing(ndf, masking):
+    mu = np.concatenate([[0.5 / 128, 1.5 / 128, 0.05], np.linspace(0.1, 1.0, 6)])
+    roughness = np.array([0.05, 0.2, 0.5, 1.0])[:, None]
+    phi = np.linspace(0.0, 0.5 * np.pi, 7)[:, None, None]
+    for aspect in (0.5, 0.25, 0.1):
+        at = (mu, roughness**2, aspect * roughness**2, phi)
+        fine = quadrature.moments(ndf, masking, *at, nodes=(160, 96)).whole
+        assert np.abs(quadrature.moments(ndf, masking, *at).whole - fine).max() < 2e-5
+
+
+def test_two_widths_agree_with_adaptive_integration():
+    mu, phi, ax, ay = 0.4, 0.9, 0.5, 0.2
+    o = np.array([np.sqrt(1 - mu * mu) * np.cos(phi), np.sqrt(1 - mu * mu) * np.sin(phi), mu])
+
+    def smith(w):
+        return 0.5 * (np.sqrt(1.0 + ((ax * w[0]) ** 2 + (ay * w[1]) ** 2) / w[2] ** 2) - 1.0)
+
+    def integrand(azimuth, theta):
+        i = np.array([np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth), np.cos(theta)])
+        h = (o + i) / np.linalg.norm(o + i)
+        d = 1.0 / (np.pi * ax * ay * ((h[0] / ax) ** 2 + (h[1] / ay) ** 2 + h[2] ** 2) ** 2)
+        return d / (1.0 + smith(o) + smith(i)) / (4.0 * mu) * np.sin(theta)
+
+    exact, _ = integrate.dblquad(integrand, 0.0, 0.5 * np.pi, 0.0, 2.0 * np.pi, epsabs=1e-6, epsrel=1e-6)
+    found = quadrature.moments("ggx", "smith-correlated", mu, ax, ay, phi).whole
+    assert float(found) == pytest.approx(exact, abs=5e-6)
+
+
 def test_split_sum_gives_the_albedo_of_schlicks_fresnel():
     metal = go.Conductor(eta=0.2, k=3.0, alpha=0.3, fresnel="schlick")
     r0 = (0.8**2 + 9.0) / (1.2**2 + 9.0)

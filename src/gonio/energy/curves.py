@@ -217,7 +217,7 @@ SIDES = ("thin", "dense")
 
 @lru_cache
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
-    """Coefficients of rough glass over (root of sqrt(F0), roughness), for light from its thin and from its dense side."""
+    """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from its thin and its dense side."""
 
     def build() -> np.ndarray:
         alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)
