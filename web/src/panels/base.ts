@@ -93,11 +93,8 @@ export const exact = (value: number) => (Number.isFinite(value) ? String(Number(
 
 // ------------------------------------------------------------------ elements
 
-export function element<K extends keyof HTMLElementTagNameMap>(
-  tag: K,
-  className = "",
-  text = "",
-): HTMLElementTagNameMap[K] {
+/** An element by its class and text, which is nearly all that panels need. */
+export function element<K extends keyof HTMLElementTagNameMap>(tag: K, className = "", text = ""): HTMLElementTagNameMap[K] {
   const made = document.createElement(tag);
   if (className) made.className = className;
   if (text) made.textContent = text;

@@ -53,7 +53,6 @@ class ComparePanel implements Panel {
     this.mode.show(this.app.state.compare.mode);
     this.kind.show(kind);
     this.range.show(range);
-    this.range.enable(kind !== "flip");
     this.pixels.show(pixels);
     this.write();
   }

@@ -135,7 +135,7 @@ export class Comparison {
   private paint(map: Float32Array, { width, height }: Pair): void {
     const { kind, range } = this.settings();
     const fixed = Number(range);
-    this.view.high = kind === "flip" ? 1 : range !== "auto" && fixed > 0 ? fixed : roundUp(quantile(map, 0.995));
+    this.view.high = range !== "auto" && fixed > 0 ? fixed : kind === "flip" ? 1 : roundUp(quantile(map, 0.995));
     this.view.setMap(map, width, height);
     this.decorate();
     this.app.redraw();
@@ -168,7 +168,7 @@ export class Comparison {
     const bar = element("i");
     bar.style.background = `linear-gradient(to right, ${Array.from({ length: 17 }, (_, i) => css(table, i / 16)).join(", ")})`;
     const ends = element("span");
-    ends.append(element("b", "", "0"), element("b", "", `${short(this.view.high)}${kind === "flip" ? "" : " and more"}`));
+    ends.append(element("b", "", "0"), element("b", "", `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " and more"}`));
     const how = kind !== "flip" && range === "auto" ? "; 99.5 % of the pixels lie inside" : "";
     this.scale.replaceChildren(element("div", "", `${KINDS[kind]}, ${PIXELS[pixels]}${how}`), bar, ends);
   }

@@ -1,5 +1,6 @@
 /** Directions on the sphere, local frame (+z the normal), and the half and difference angles. Radians. */
 import type { Vec3 } from "../data";
+import { cross, dot, normalize } from "../vectors";
 
 export const RADIANS = Math.PI / 180;
 
@@ -8,19 +9,9 @@ export function polar(theta: number, phi: number): Vec3 {
   return [s * Math.cos(phi), s * Math.sin(phi), Math.cos(theta)];
 }
 
-export const dot = (a: Vec3, b: Vec3) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const thetaOf = (w: Vec3) => Math.atan2(Math.hypot(w[0], w[1]), w[2]);
 /** Azimuth; 0 for the normal, whose azimuth is any. */
 export const phiOf = (w: Vec3) => (w[0] === 0 && w[1] === 0 ? 0 : Math.atan2(w[1], w[0]));
-
-function cross(a: Vec3, b: Vec3): Vec3 {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-}
-
-function normalize(a: Vec3): Vec3 {
-  const length = Math.hypot(...a);
-  return [a[0] / length, a[1] / length, a[2] / length];
-}
 
 /** Two unit vectors that complete `axis` to a right-handed frame. */
 export function frameAround(axis: Vec3): [Vec3, Vec3] {

@@ -6,6 +6,7 @@ import { comparePanel } from "./compare";
 import { comparisonOf } from "./comparison";
 import { halfDifferencePanel } from "./half_difference";
 import { lobePanel } from "./lobe";
+import { installMarker } from "./marker";
 import { probePanel } from "./probe";
 import { slicesPanel } from "./slices";
 import { tablesPanel } from "./tables";
@@ -15,6 +16,7 @@ export const panels: Panel[] = [lobePanel, slicesPanel, halfDifferencePanel, alb
 /** The page calls it once, when the app stands: a link may open a page that already compares. */
 export function install(app: App): void {
   comparisonOf(app);
+  installMarker(app);
 }
 
 export { testHooks } from "./hooks";

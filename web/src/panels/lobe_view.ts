@@ -1,5 +1,7 @@
 /** Draws lobes in a small WebGL view of its own: z up, orbit by dragging, the surface as a disc. */
 import type { Vec3 } from "../data";
+import { add, cross, dot, normalize, scale, sub } from "../vectors";
+import { frameAround } from "./directions";
 import { HEADER, link, type Program } from "../shaders";
 
 export interface Surface {
@@ -137,9 +139,9 @@ export class LobeView {
     const { gl, canvas, program } = this;
     const { clientWidth, clientHeight } = canvas;
     if (!clientWidth || !clientHeight) return;
-    const scale = window.devicePixelRatio || 1;
-    canvas.width = Math.round(clientWidth * scale);
-    canvas.height = Math.round(clientHeight * scale);
+    const ratio = window.devicePixelRatio || 1;
+    canvas.width = Math.round(clientWidth * ratio);
+    canvas.height = Math.round(clientHeight * ratio);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -203,15 +205,12 @@ export class LobeView {
     segment([-1, 0, 0], [1, 0, 0], this.ring);
     segment([0, -1, 0], [0, 1, 0], this.ring);
     for (const { direction, color } of this.arrows) {
-      const tip = direction.map((v) => ARROW * v) as Vec3;
+      const tip = scale(direction, ARROW);
       segment([0, 0, 0], tip, color);
       // Four barbs, across two directions at right angles to the arrow.
-      const other: Vec3 = Math.abs(direction[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
-      const d = direction;
-      const x = [other[1] * d[2] - other[2] * d[1], other[2] * d[0] - other[0] * d[2], other[0] * d[1] - other[1] * d[0]] as Vec3;
-      const y = [d[1] * x[2] - d[2] * x[1], d[2] * x[0] - d[0] * x[2], d[0] * x[1] - d[1] * x[0]] as Vec3;
+      const [x, y] = frameAround(direction);
       for (const [across, sign] of [[x, 1], [x, -1], [y, 1], [y, -1]] as const)
-        segment(tip, tip.map((v, i) => v - 0.08 * (d[i] as number) + sign * 0.03 * (across[i] as number)) as Vec3, color);
+        segment(tip, add(tip, add(scale(direction, -0.08), scale(across, 0.03 * sign))), color);
     }
     return vertices;
   }
@@ -236,12 +235,8 @@ const HOME = { azimuth: -1.15, elevation: 0.42, distance: 3.1 };
 
 /** Column-major, z up, a vertical field of view of 40 degrees that grows where the view is taller than wide. */
 function viewProjection(eye: Vec3, target: Vec3, aspect: number): Float32Array {
-  const sub = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  const unit = (a: Vec3): Vec3 => a.map((v) => v / Math.hypot(...a)) as Vec3;
-  const cross = (a: Vec3, b: Vec3): Vec3 => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-  const dot = (a: Vec3, b: Vec3) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const back = unit(sub(eye, target));
-  const right = unit(cross([0, 0, 1], back));
+  const back = normalize(sub(eye, target));
+  const right = normalize(cross([0, 0, 1], back));
   const up = cross(back, right);
   const f = Math.min(1, aspect) / Math.tan((20 * Math.PI) / 180);
   const [near, far] = [0.1, 40];
