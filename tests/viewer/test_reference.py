@@ -40,8 +40,10 @@ def one_ball(bsdf: go.BSDF) -> stage.Stage:
     return stage.Stage("one", {"m0": stage.Material("one", bsdf)}, (stage.Row("one", "m0", (stage.Ball("one"),)),))
 
 
-def normals(size: tuple[int, int], camera: dict[str, Any], supersampling: int = 24) -> np.ndarray:
-    """Normals of a ball at the origin that the rays of a supersampled pixel grid meet, (h s, w s, 3); NaN beside it.
+def normals(
+    size: tuple[int, int], camera: dict[str, Any], supersampling: int = 24, centre: Any = (0.0, 0.0, 0.0)
+) -> np.ndarray:
+    """Normals of a ball that the rays of a supersampled pixel grid meet, (h s, w s, 3); NaN beside it.
 
     Camera on +z; |o + t d| = 1.
     """
@@ -51,7 +53,7 @@ def normals(size: tuple[int, int], camera: dict[str, Any], supersampling: int = 
     y = (1 - (np.arange(height) + 0.5) / height * 2) * half
     d = np.stack([*np.broadcast_arrays(x[None, :], y[:, None]), -np.ones((height, width))], -1)
     d /= np.linalg.norm(d, axis=-1, keepdims=True)
-    o = np.array([0.0, 0.0, camera["distance"]])
+    o = np.array([0.0, 0.0, camera["distance"]]) - centre
     b = d @ o
     with np.errstate(invalid="ignore"):
         return o + (-b - np.sqrt(b**2 - o @ o + 1.0))[..., None] * d
@@ -74,6 +76,34 @@ def test_a_lambert_ball_under_a_directional_light_is_the_closed_form() -> None:
     # 576 regular and 256 stratified points a pixel: the terminator and the edge of the ball are all that differs
     assert np.abs(found[..., :3] - expected).max() < 0.01
     assert found[..., :3].sum() == pytest.approx(expected.sum(), rel=1e-3)
+
+
+def test_the_homeworks_balls_are_their_models_eval() -> None:
+    """What a shader has to draw: eval at every point of every ball, averaged over the pixel."""
+    what, size, fine = stage.homework(), (96, 54), 12
+    camera, light = what.framed(), what.lights[0]
+    reference = picture(Reference(what), scene(what, [light], size=size, spp=1024))
+    expected, whole = np.zeros((size[1], size[0], 3)), np.zeros((size[1], size[0]), bool)
+    for i, row in enumerate(what.rows):
+        for j, ball in enumerate(row.balls):
+            centre = np.array([(j - 2) * stage.SPACING, (0.5 - i) * stage.SPACING, 0.0])
+            n = normals(size, camera, fine, centre)
+            on_ball = np.isfinite(n[..., 0])
+            n = n[on_ball]
+            tangent = np.stack([n[:, 2], 0.0 * n[:, 0], -n[:, 0]], 1)
+            tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+            frame = np.stack([tangent, np.cross(n, tangent), n], 1)
+            wo = np.array([0.0, 0.0, camera["distance"]]) - centre - n
+            wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+            bsdf = stage.replaced(what.materials[row.material].bsdf, ball.values)
+            value = np.zeros((*on_ball.shape, 3))
+            value[on_ball] = bsdf.eval(np.einsum("nij,nj->ni", frame, wo), frame @ np.array(light["direction"]))
+            expected += boxes(value, fine) * light["irradiance"]
+            whole |= boxes(on_ball * 1.0, fine)[..., 0] == 1.0
+    counted = whole & (reference[..., 3] == 1.0)
+    assert counted.sum() > 1000
+    test, truth = expected[counted], reference[counted][:, :3]
+    assert np.mean((test - truth) ** 2 / (truth**2 + 0.01)) < 1e-6
 
 
 def test_two_balls_neither_shadow_nor_light_each_other() -> None:
