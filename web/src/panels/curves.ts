@@ -58,8 +58,16 @@ export class Curves {
       this.shape = shape;
       this.plot = new uPlot(this.options(chart, width), data, this.host);
     } else this.plot.setData(data);
-    const legend = this.host.querySelector(".u-legend") as HTMLElement | null;
-    this.plot.setSize({ width, height: Math.max(90, height - (legend?.offsetHeight ?? 0)) });
+    this.fit();
+    // Once more when it is laid out: a legend just made does not know its width yet, so nor its height.
+    requestAnimationFrame(() => this.fit());
+  }
+
+  private fit(): void {
+    const { clientWidth: width, clientHeight } = this.host;
+    const legend = this.host.querySelector<HTMLElement>(".u-legend")?.offsetHeight ?? 0;
+    const height = Math.max(90, clientHeight - legend);
+    if (this.plot && width && (this.plot.width !== width || this.plot.height !== height)) this.plot.setSize({ width, height });
   }
 
   private options(chart: Chart, width: number): uPlot.Options {
@@ -78,7 +86,7 @@ export class Curves {
       },
       axes: [
         { ...axis, label: chart.xTitle, size: 26, space: width < 480 ? 40 : 50 },
-        { ...axis, label: chart.yTitle, size: 48, values: (_, ticks) => ticks.map((v) => (v === null || v === undefined ? "" : short(v))) },
+        { ...axis, label: chart.yTitle, size: 48, ...(chart.log ? { splits: (_: uPlot, __: number, low: number, high: number) => decades(low, high) } : {}), values: (_, ticks) => ticks.map((v) => (v === null || v === undefined ? "" : short(v))) },
       ],
       series: [
         { label: chart.xTitle.split(" ")[0] ?? "", value: (_, v) => (v === null ? "" : short(v)) },
@@ -129,4 +137,12 @@ export class Curves {
     });
     ctx.restore();
   }
+}
+
+/** Powers of ten, and their halves and fifths where there are few. */
+function decades(low: number, high: number): number[] {
+  const [from, to] = [Math.floor(Math.log10(low)), Math.ceil(Math.log10(high))];
+  const steps = to - from <= 3 ? [1, 2, 5] : [1];
+  const all = Array.from({ length: to - from + 1 }, (_, i) => steps.map((s) => s * 10 ** (from + i))).flat();
+  return all.filter((v) => v >= low && v <= high);
 }

@@ -9,12 +9,14 @@ import { type Channel, CHANNELS, channelOf, check, type Control, element, evalua
 import { Curves } from "./curves";
 import { fromHalf, RADIANS } from "./directions";
 import { paint } from "./colormaps";
+import { quantile } from "./metrics";
 import { channelIn } from "./viewing";
 
 const DEFAULTS = { show: "image" as Show, thetaH: 0, thetaD: 0, phiD: 90, log: false, exposure: 0, falseColor: false, model: 0 };
 type Show = "image" | "half" | "difference";
 const SHOW: Record<Show, string> = { image: "image slice", half: "curve over θh", difference: "curve over θd" };
 const SIDE = 180;
+/** The scale's span at most. */
 const DECADES = 5;
 
 interface Image {
@@ -38,7 +40,7 @@ class HalfDifferencePanel implements Panel {
   private key!: HTMLElement;
   private note!: HTMLElement;
   private ask!: () => void;
-  private peak = 0;
+  private span: [number, number] = [0, 1];
 
   mount(host: HTMLElement, app: App): void {
     this.app = app;
@@ -53,7 +55,7 @@ class HalfDifferencePanel implements Panel {
       exposure: range(bar, "exposure", "Brightness of the image slice, in stops", [-10, 10, 0.1], "", (exposure) => set({ exposure })),
     };
     this.log = check(bar, "log", "Logarithmic values of the curves", (log) => set({ log }));
-    this.falseColor = check(bar, "false colour", `The chosen channel in viridis, logarithmic over ${DECADES} decades`, (falseColor) => set({ falseColor }));
+    this.falseColor = check(bar, "false colour", `The chosen channel in viridis, logarithmic`, (falseColor) => set({ falseColor }));
     this.channel = select(bar, "channel", "Which number of the RGB value is drawn", CHANNELS, (channel) => app.store.setPanel("viewing", { channel }));
     const body = element("div", "p-body");
     this.curvesHost = element("div", "p-cell p-wide");
@@ -100,8 +102,9 @@ class HalfDifferencePanel implements Panel {
     const { app } = this;
     const models = overlaid(app);
     const overHalf = settings.show === "half";
-    const angles = Array.from({ length: 481 }, (_, i) => 0.01 * 9000 ** (i / 480)).filter((a) => a < 90); // crowded at 0, where lobes are narrow
-    const pairs = [0, ...angles].map((a) => ({ a, ...fromHalf((overHalf ? a : settings.thetaH) * RADIANS, (overHalf ? settings.thetaD : a) * RADIANS, settings.phiD * RADIANS) }));
+    // Even, and crowded at 0, where lobes are narrow.
+    const angles = [...Array.from({ length: 360 }, (_, i) => 0.25 * i), ...Array.from({ length: 240 }, (_, i) => 0.005 * 2000 ** (i / 239))].sort((a, b) => a - b);
+    const pairs = angles.map((a) => ({ a, ...fromHalf((overHalf ? a : settings.thetaH) * RADIANS, (overHalf ? settings.thetaD : a) * RADIANS, settings.phiD * RADIANS) }));
     const above = pairs.filter(({ wo, wi }) => wo[2] > 0 && wi[2] > 0);
     const channel = channelIn(app);
     const series = [];
@@ -147,11 +150,14 @@ class HalfDifferencePanel implements Panel {
       images.push({ model, rgb: value });
     }
     const channel = channelIn(app);
-    this.peak = Math.max(...images.map(({ rgb }) => Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)).reduce((a, b) => (b > a ? b : a), 0)));
+    // At grazing angles f grows without bound: the scale ends where one pixel in a hundred is brighter.
+    const all = Float32Array.from(images.flatMap(({ rgb }) => Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)))).filter((v) => v > 0);
+    const high = quantile(all, 0.99) || 1;
+    this.span = [Math.min(Math.max(quantile(all, 0.01), high / 10 ** DECADES), high / 10), high];
     this.imagesHost.replaceChildren(...images.map((image) => this.picture(image, settings)));
     legend(this.key, models);
     const scale = settings.falseColor
-      ? `${channel}, viridis from ${short(this.peak / 10 ** DECADES)} to ${short(this.peak)} 1/sr (log)`
+      ? `${channel}, viridis from ${short(this.span[0])} or less to ${short(this.span[1])} 1/sr or more (log)`
       : `f · 2^${short(settings.exposure)} shown as sRGB; 1 and more is white`;
     this.note.textContent = `f(θh, θd) at φd ${settings.phiD}°; ${scale}. Hatched: ωo or ωi below the surface.`;
   }
@@ -164,7 +170,7 @@ class HalfDifferencePanel implements Panel {
     bitmap.width = bitmap.height = SIDE;
     const channel = channelIn(app);
     const image = settings.falseColor
-      ? paint(Float32Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)), SIDE, SIDE, "viridis", this.peak / 10 ** DECADES, this.peak, true)
+      ? paint(Float32Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)), SIDE, SIDE, "viridis", ...this.span, true)
       : srgbImage(rgb, 2 ** settings.exposure);
     (bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(image, 0, 0);
     const sketch = new Sketch(figure, (context, width, height) => {
