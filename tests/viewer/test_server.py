@@ -391,6 +391,21 @@ def test_a_page_that_takes_no_frames_is_ended(monkeypatch: pytest.MonkeyPatch) -
         assert get(one)[0] == 200
 
 
+def test_a_page_that_sends_and_never_reads_is_let_go(one: server.Server) -> None:
+    key = "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+    host = f"127.0.0.1:{one.port}"
+    rubbish = b"\x81\x81\x00\x00\x00\x00x" * 4096  # masked text frames of one letter
+    with socket.create_connection(("127.0.0.1", one.port), 10) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        head = f"GET /ws?token={one.application.door.token} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+        client.sendall(f"{head}Connection: Upgrade\r\nUpgrade: websocket\r\n{key}\r\n".encode())
+        with pytest.raises(OSError, match=r"reset|[Bb]roken pipe"):
+            for _ in range(2000):
+                client.sendall(rubbish)
+    wait_for(lambda: not one.application.sessions)
+    assert get(one)[0] == 200
+
+
 def test_when_all_places_are_taken_a_newcomer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "MOST_SESSIONS", 1)
     with running() as one, speak(one) as first:

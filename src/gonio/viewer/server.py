@@ -33,6 +33,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from ..errors import InputError, MachineError
 from . import messages, page
@@ -44,6 +45,7 @@ MOST_SESSIONS = 8  # each holds a scene and a picture in memory
 MOST_CONNECTIONS = 200  # that have not asked for anything yet
 REQUEST_SECONDS = 10.0  # for a request's headers to arrive, and for a session's first message
 STALL_SECONDS = 30.0  # for a frame to be taken
+CLOSE_SECONDS = 2.0  # for the last words to go out
 FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
 
 HEADERS = {
@@ -188,6 +190,16 @@ class _Guarded(H11Protocol):
         self.transport.abort()
 
 
+class _Socket(WebSocketsSansIOProtocol):
+    """A WebSocket whose connection does not outlive its session, though the other side takes nothing any more."""
+
+    async def run_asgi(self) -> None:
+        try:
+            await super().run_asgi()
+        finally:
+            self.loop.call_later(CLOSE_SECONDS, self.transport.abort)
+
+
 class Server(uvicorn.Server):
     """uvicorn with the guards above, which says where it is reached and opens the browser once it is."""
 
@@ -198,7 +210,7 @@ class Server(uvicorn.Server):
         config = uvicorn.Config(
             application.asgi,
             http=guarded,
-            ws="websockets-sansio",
+            ws=_Socket,
             ws_max_size=messages.UPLOAD_BYTES,
             ws_per_message_deflate=False,
             ws_ping_interval=20.0,

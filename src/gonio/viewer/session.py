@@ -19,6 +19,7 @@ from .reference import Reference
 from .stage import Stage
 
 PICTURES = 4  # environments kept a session
+MOST_WAITING = 64  # messages to a page that does not take them: answers to what it sends, and one frame
 
 
 class Session:
@@ -30,7 +31,8 @@ class Session:
         self.asked = False  # whether a message ever came that made sense
         self.sent = self.acknowledged = 0  # numbers of frames
         self.stalled_since: float | None = None
-        self._outbox: asyncio.Queue[str | bytes | None] = asyncio.Queue()
+        self._outbox: asyncio.Queue[str | bytes] = asyncio.Queue()
+        self._ended = asyncio.Event()
         self._upload: messages.Upload | None = None
         self._reason = (1000, "")
         # the renderer's, under its lock
@@ -52,6 +54,7 @@ class Session:
             asyncio.create_task(self._read()),
             asyncio.create_task(self._write()),
             asyncio.create_task(self._watch(first_seconds, stall_seconds)),
+            asyncio.create_task(self._ended.wait()),
         ]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -65,7 +68,7 @@ class Session:
     def end(self, code: int, reason: str) -> None:
         """Close the connection, from the server's side."""
         self._reason = (code, reason)
-        self._outbox.put_nowait(None)
+        self._ended.set()
 
     async def _read(self) -> None:
         while True:
@@ -80,6 +83,7 @@ class Session:
                 self.asked = True
             except GonioError as error:
                 self.send(messages.failure(error))
+            await asyncio.sleep(0)  # messages that came together must not keep others waiting
 
     def _take(self, message: Any) -> None:
         match message:
@@ -103,11 +107,15 @@ class Session:
         self.renderer.keep_picture(self, upload.key, pixels)
 
     def send(self, message: str | bytes) -> None:
-        """Queue a message. What can queue up is bounded: one frame, and answers to messages that were read."""
-        self._outbox.put_nowait(message)
+        """Queue a message; where too many wait, the page takes none and is let go."""
+        if self._outbox.qsize() >= MOST_WAITING:
+            self.end(1008, "answers are not taken")
+        else:
+            self._outbox.put_nowait(message)
 
     async def _write(self) -> None:
-        while (message := await self._outbox.get()) is not None:
+        while True:
+            message = await self._outbox.get()
             if isinstance(message, bytes):
                 await self.websocket.send_bytes(message)
             else:
