@@ -29,7 +29,8 @@ export function createEnvironment(gl: WebGL2RenderingContext, width: number, hei
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.REPEAT);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
   made += 1;
-  return { key: `environment${made}`, width, height, texture, half };
+  // Unlike any other page's: a server may know several.
+  return { key: `environment${made}-${Math.random().toString(36).slice(2)}`, width, height, texture, half };
 }
 
 export function environmentFromData(gl: WebGL2RenderingContext, width: number, height: number, data: string): EnvironmentPicture {

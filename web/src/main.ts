@@ -1,1 +1,53 @@
+/** Builds the page from the data that stands in the document. */
 import "./app.css";
+import { PageApp } from "./app";
+import { readPageData } from "./data";
+import { Live } from "./live";
+import { install, panels, testHooks } from "./panels";
+import { Change, type State } from "./state";
+import { element } from "./ui/dom";
+import { Layout, frame } from "./ui/layout";
+import { useFile } from "./ui/files";
+
+function start(host: HTMLElement): void {
+  const data = readPageData();
+  const parts = frame(host);
+  const app = new PageApp(data, parts.canvas, parts.overlay);
+  const layout = new Layout(app, parts, panels);
+  app.onRefresh = (what) => layout.refresh(what);
+  app.store.subscribe((change) => layout.update(change));
+  install(app);
+  layout.update(new Change(new Set([""])));
+  if (data.socket) {
+    layout.live = new Live(app, data.socket);
+    layout.live.onStatus = () => layout.showStatus();
+  }
+  // What tests, and people at the console, drive the page by.
+  Object.assign(window, {
+    gonio: {
+      app,
+      data,
+      ready: app.ready,
+      live: layout.live,
+      get state() {
+        return app.state;
+      },
+      get frames() {
+        return app.frames;
+      },
+      readPixels: () => app.picture(),
+      converge: (samples?: number) => app.converge(samples),
+      setState: (write: (state: State) => void) => app.store.update("", write),
+      useFile: (file: File) => useFile(app, file),
+      ...testHooks(app),
+    },
+  });
+}
+
+const host = document.getElementById("app") ?? document.body.appendChild(element("div"));
+try {
+  start(host);
+} catch (error) {
+  host.replaceChildren(element("p", { class: "fatal" }, error instanceof Error ? error.message : String(error)));
+  throw error;
+}

@@ -1,0 +1,365 @@
+/** The page at work: resolves the state into what is drawn, draws while anything is left to refine, answers panels. */
+import { attachCamera } from "./camera";
+import type { PageData, Values, Vec3 } from "./data";
+import { type EnvironmentPicture, environmentFromData } from "./environment";
+import { type MeshBuffers, type Mesh, shaderBall, torus, upload } from "./meshes";
+import type { App, Panel, Picked, Picture, Presenter } from "./panel";
+import { type Hit, hitBalls, hitSphere } from "./pick";
+import { type DrawnBall, Renderer, type Scene } from "./renderer";
+import { type Shader, ShaderLibrary } from "./shaders";
+import { Change, type State, Store } from "./state";
+import { decodeState, encodeState } from "./url";
+import { cameraFrame, cross, dot, normalize, pixelRay, sub } from "./vectors";
+
+/** The Okabe-Ito colours that stand out on light and dark alike, told apart by most eyes. */
+const SLOT_COLORS = ["#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#0072b2"];
+/** A change counts as motion for so long: coarser pictures are drawn meanwhile where the machine is slow. */
+const MOTION = 160;
+const MOST_PIXELS = 2_400_000;
+
+export type Refresh = Parameters<NonNullable<Panel["refresh"]>>[0];
+
+export class PageApp implements App {
+  readonly store: Store;
+  readonly gl: WebGL2RenderingContext;
+  readonly shaders: ShaderLibrary;
+  readonly renderer: Renderer;
+  environment: EnvironmentPicture | null = null;
+  presenter: Presenter | null = null;
+  /** Resolves with the first picture on the canvas. */
+  readonly ready: Promise<void>;
+  /** After a new picture, reference or picked point. */
+  onRefresh: (what: Refresh) => void = () => {};
+  onSay: (text: string, kind: "info" | "error") => void = () => {};
+  /** A live page asks its server for a variant that is not here. */
+  onMissingVariant: (slot: number) => void = () => {};
+  reference: Picture | null = null;
+  private meshes: Partial<Record<State["view"]["mesh"], MeshBuffers>> = {};
+  private pickedAt: Picked | null = null;
+  private lastHit: Hit | null = null;
+  private lastShader = new Map<number, Shader>();
+  private changed = -Infinity;
+  private steps = 1;
+  private slow = false;
+  private lastFrame = 0;
+  private scheduled = false;
+  private dirty = false;
+  private resolveReady: () => void = () => {};
+
+  constructor(
+    readonly data: PageData,
+    readonly canvas: HTMLCanvasElement,
+    readonly overlay: HTMLElement,
+  ) {
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
+    if (!gl) throw new Error("This browser has no WebGL 2, which the page draws with.");
+    this.gl = gl;
+    this.store = new Store(data);
+    this.store.state = decodeState(location.hash, this.store.initial);
+    this.shaders = new ShaderLibrary(gl, data);
+    this.renderer = new Renderer(gl, this.shaders);
+    this.ready = new Promise((resolve) => {
+      this.resolveReady = resolve;
+    });
+    const pictured = data.scene.lights.find((l) => l.type === "environment" && l.image?.data);
+    if (pictured?.type === "environment" && pictured.image?.data)
+      this.environment = environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
+    attachCamera(canvas, this.store, (x, y) => this.pick(x, y));
+    this.store.subscribe((change) => this.respond(change));
+    new ResizeObserver(() => this.resized()).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.themeChanged());
+    addEventListener("hashchange", () => {
+      if (location.hash.replace(/^#/, "") !== encodeState(this.state, this.store.initial)) this.store.replace(decodeState(location.hash, this.store.initial));
+    });
+    this.themeChanged();
+    this.resized();
+  }
+
+  get state(): State {
+    return this.store.state;
+  }
+
+  get frames(): number {
+    return this.renderer.frames;
+  }
+
+  // ---------------------------------------------------------------- the state, resolved
+
+  shaderOf(slot: number): Shader {
+    const { material, choices } = this.slot(slot);
+    const found = this.shaders.find(material, choices);
+    if (found) {
+      this.lastShader.set(slot, found);
+      return found;
+    }
+    // Until the server has written it, the last one that fitted.
+    const last = this.lastShader.get(slot);
+    return last?.material.id === material ? last : this.shaders.at(this.shaders.material(material), 0);
+  }
+
+  valuesOf(slot: number, ball: number): Values {
+    const values: Values = {};
+    for (const parameter of this.shaderOf(slot).manifest.parameters) if (parameter.field !== null) values[parameter.path] = parameter.value;
+    const { values: own, balls } = this.slot(slot);
+    return { ...values, ...own, ...balls[ball]?.set };
+  }
+
+  visibleSlots(): number[] {
+    const { slots, solo } = this.state;
+    if (solo !== null && slots[solo]) return [solo];
+    return slots.flatMap((slot, index) => (slot.visible ? [index] : []));
+  }
+
+  private slot(index: number): State["slots"][number] {
+    const slot = this.state.slots[index];
+    if (!slot) throw new Error(`There is no row ${index}.`);
+    return slot;
+  }
+
+  balls(): DrawnBall[] {
+    const visible = this.visibleSlots();
+    const { spacing } = this.state.view;
+    return visible.flatMap((slot, row) => {
+      const shader = this.shaderOf(slot);
+      const { balls } = this.slot(slot);
+      return balls.map((_, ball): DrawnBall => {
+        const center: Vec3 = [(ball - (balls.length - 1) / 2) * spacing, ((visible.length - 1) / 2 - row) * spacing, 0];
+        return { slot, ball, shader, values: this.valuesOf(slot, ball), center };
+      });
+    });
+  }
+
+  scene(): Scene {
+    return { state: this.state, balls: this.balls(), environment: this.environment, mesh: this.meshBuffers(), paper: this.paper() };
+  }
+
+  private meshBuffers(): MeshBuffers | null {
+    const { mesh } = this.state.view;
+    if (mesh === "torus") this.meshes.torus ??= upload(this.gl, torus());
+    if (mesh === "shaderball") this.meshes.shaderball ??= upload(this.gl, shaderBall());
+    return this.meshes[mesh] ?? null; // a link to a dropped file shows spheres: the file is not in it
+  }
+
+  useMesh(mesh: Mesh): void {
+    this.meshes.file = upload(this.gl, mesh);
+    this.store.set("view.mesh", "file");
+    this.invalidate();
+  }
+
+  hasMeshFile(): boolean {
+    return this.meshes.file !== undefined;
+  }
+
+  // ---------------------------------------------------------------- drawing
+
+  private respond(change: Change): void {
+    if (change.touches("slots", "solo", "lights", "furnace", "environment", "camera", "view.mesh", "view.term", "view.spacing")) this.invalidate();
+    else if (change.touches("display", "view", "compare")) this.redraw();
+    if (change.touches("display.theme")) this.themeChanged();
+    if (change.touches("slots"))
+      this.state.slots.forEach((slot, index) => {
+        if (!this.shaders.find(slot.material, slot.choices)) this.onMissingVariant(index);
+      });
+    if (change.touches("slots", "selection", "camera", "view.mesh", "view.spacing", "solo")) this.repick();
+    this.saveLink();
+  }
+
+  invalidate(): void {
+    this.changed = performance.now();
+    this.dirty = true;
+    this.schedule();
+  }
+
+  redraw(): void {
+    this.schedule();
+  }
+
+  private schedule(): void {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame((now) => {
+      this.scheduled = false;
+      this.frame(now);
+    });
+  }
+
+  private resized(): void {
+    this.invalidate();
+  }
+
+  /** Backing size of the canvas: multiples of 4, so that a reference at half or a quarter has whole pixels. */
+  size(): [number, number] {
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const [w, h] = [this.canvas.clientWidth * ratio, this.canvas.clientHeight * ratio];
+    const fit = Math.min(1, Math.sqrt(MOST_PIXELS / Math.max(w * h, 1)));
+    return [Math.max(4, Math.floor((w * fit) / 4) * 4), Math.max(4, Math.floor((h * fit) / 4) * 4)];
+  }
+
+  private frame(now: number): void {
+    const moving = now - this.changed < MOTION;
+    // How long the last picture took shows in when this one may begin.
+    const took = now - this.lastFrame;
+    this.lastFrame = now;
+    if (took < 400) {
+      if (moving) this.slow = this.slow ? took > 22 : took > 60;
+      if (!moving) this.steps = took < 20 ? Math.min(this.steps + 1, 8) : took > 34 ? Math.max(1, this.steps >> 1) : this.steps;
+    }
+    const [width, height] = this.size();
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+    }
+    const coarse = moving && this.slow ? 2 : 1;
+    this.renderer.resize(width / coarse, height / coarse);
+    if (this.dirty) this.renderer.invalidate();
+    this.dirty = false;
+    try {
+      const scene = this.scene();
+      const steps = moving ? 1 : this.steps;
+      for (let i = 0; i < steps && !this.renderer.done(scene); i++) this.renderer.step(scene, moving);
+      this.renderer.present(scene, this.presenter, width, height);
+      this.resolveReady();
+      this.onRefresh("picture");
+      if (moving || !this.renderer.done(scene)) this.schedule();
+    } catch (error) {
+      this.say(error instanceof Error ? error.message : String(error), "error");
+    }
+  }
+
+  /** Draws until the picture is done or has so many samples: for a screenshot, a comparison, a test. */
+  async converge(samples = Infinity): Promise<Picture> {
+    this.changed = -Infinity;
+    if (this.dirty) this.renderer.invalidate();
+    this.dirty = false;
+    const scene = this.scene();
+    const [width, height] = this.size();
+    this.renderer.resize(width, height);
+    while (!this.renderer.done(scene) && this.renderer.samples < samples) {
+      for (let i = 0; i < 8 && !this.renderer.done(scene); i++) this.renderer.step(scene, false);
+      await new Promise((resolve) => setTimeout(resolve));
+    }
+    this.renderer.present(scene, this.presenter, this.canvas.width, this.canvas.height);
+    return this.picture();
+  }
+
+  picture(): Picture {
+    return this.renderer.read(this.scene());
+  }
+
+  referencePicture(): Picture | null {
+    return this.reference;
+  }
+
+  setReference(picture: Picture | null): void {
+    this.reference = picture;
+    this.onRefresh("reference");
+    if (this.presenter) this.redraw();
+  }
+
+  /** PNG of what is on the canvas; drawn anew, since a canvas is empty after it was shown. */
+  screenshot(): Promise<Blob> {
+    this.renderer.present(this.scene(), this.presenter, this.canvas.width, this.canvas.height);
+    return new Promise((resolve, reject) =>
+      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("The browser made no picture."))), "image/png"),
+    );
+  }
+
+  // ---------------------------------------------------------------- picking
+
+  get picked(): Picked {
+    if (!this.pickedAt) this.repick();
+    return this.pickedAt as Picked;
+  }
+
+  private pick(x: number, y: number): void {
+    const frame = cameraFrame(this.state.camera);
+    const ray = pixelRay(frame, x, y, this.canvas.clientWidth, this.canvas.clientHeight);
+    const hit = hitBalls(this.balls(), this.meshBuffers()?.mesh ?? null, frame.eye, ray);
+    if (!hit) return;
+    this.lastHit = hit;
+    this.store.update("selection", (state) => {
+      state.selection = { slot: hit.ball.slot, ball: hit.ball.ball };
+    });
+    this.repick();
+  }
+
+  /** The same point of the selected ball, under the state of now; the ball's middle where nothing was clicked. */
+  private repick(): void {
+    const { selection } = this.state;
+    const balls = this.balls();
+    const ball = balls.find((b) => b.slot === selection.slot && b.ball === selection.ball) ?? balls.find((b) => b.slot === selection.slot) ?? balls[0];
+    if (!ball) return;
+    const { eye } = cameraFrame(this.state.camera);
+    let hit = this.lastHit;
+    if (!hit || hit.ball.slot !== ball.slot || hit.ball.ball !== ball.ball) {
+      // Halfway to the rim, where wo is oblique: seen straight on every lobe looks alike.
+      const toward = normalize(sub(eye, ball.center));
+      const aside = normalize(cross([0, 1, 0], toward));
+      const [c, s] = [Math.cos(Math.PI / 4), Math.sin(Math.PI / 4)];
+      const normal = normalize([0, 1, 2].map((k) => (toward[k] as number) * c + (aside[k] as number) * s) as Vec3);
+      hit = { ball, ...hitSphere([0, 0, 0], normal, 1), position: [0, 1, 2].map((k) => (ball.center[k] as number) + (normal[k] as number)) as Vec3 };
+    }
+    const outward = normalize(sub(eye, hit.position));
+    const bitangent = cross(hit.normal, hit.tangent);
+    this.pickedAt = {
+      slot: ball.slot,
+      ball: ball.ball,
+      shader: ball.shader,
+      values: ball.values,
+      wo: [dot(outward, hit.tangent), dot(outward, bitangent), dot(outward, hit.normal)],
+      position: hit.position,
+      normal: hit.normal,
+      tangent: hit.tangent,
+      uv: hit.uv,
+    };
+    this.onRefresh("picked");
+  }
+
+  // ---------------------------------------------------------------- theme, link, messages
+
+  theme(): "light" | "dark" {
+    const { theme } = this.state.display;
+    return theme === "auto" ? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light") : theme;
+  }
+
+  private themeChanged(): void {
+    document.documentElement.dataset["theme"] = this.theme();
+    this.redraw();
+    this.onRefresh("theme");
+  }
+
+  cssColor(name: string): string {
+    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  }
+
+  slotColor(slot: number): string {
+    return SLOT_COLORS[slot % SLOT_COLORS.length] as string;
+  }
+
+  private paper(): Vec3 {
+    const match = /^#([0-9a-f]{6})$/i.exec(this.cssColor("--paper"));
+    const bits = match ? Number.parseInt(match[1] as string, 16) : 0x808080;
+    return [(bits >> 16) / 255, ((bits >> 8) & 255) / 255, (bits & 255) / 255];
+  }
+
+  link(): string {
+    const code = encodeState(this.state, this.store.initial);
+    return location.href.replace(/#.*$/, "") + (code ? `#${code}` : "");
+  }
+
+  private linkTimer = 0;
+  private saveLink(): void {
+    clearTimeout(this.linkTimer);
+    this.linkTimer = window.setTimeout(() => {
+      try {
+        history.replaceState(null, "", this.link());
+      } catch {
+        // A page inside another (a notebook) may not write its address; "copy link" still gives it.
+      }
+    }, 300);
+  }
+
+  say(text: string, kind: "info" | "error" = "info"): void {
+    this.onSay(text, kind);
+  }
+}

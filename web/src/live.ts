@@ -1,0 +1,190 @@
+/**
+ * The live reference: tells the server what is shown, takes its frames, asks for shaders that the page lacks.
+ *
+ * One frame is in flight: the next comes after the ack of the last. A newer scene ends the older one; frames of older
+ * scenes that still arrive are dropped. The connection comes back by itself, later and later.
+ */
+import type { PageApp } from "./app";
+import type { Variant } from "./data";
+import { actingLights } from "./lights";
+import { isFactor } from "./glsl";
+import { halfToFloat } from "./targets";
+
+export interface LiveState {
+  connected: boolean;
+  device: string;
+  samples: number;
+  target: number;
+  done: boolean;
+  seconds: number;
+  message: string;
+}
+
+interface FrameHeader {
+  id: number;
+  frame: number;
+  spp: number;
+  width: number;
+  height: number;
+  seconds: number;
+  format: string;
+  done: boolean;
+}
+
+const QUIET = 40; // ms without a change before the scene is sent: a slider sends sixty changes a second
+const TARGET = 1024;
+const MOST_PIXELS = 400_000;
+
+export class Live {
+  readonly status: LiveState = { connected: false, device: "", samples: 0, target: TARGET, done: false, seconds: 0, message: "connecting" };
+  onStatus: () => void = () => {};
+  private socket: WebSocket | null = null;
+  private id = 0;
+  private wishes = 0;
+  private sent = "";
+  private timer = 0;
+  private wait = 500;
+  private uploaded = new Set<string>();
+  private asked = new Map<number, string>();
+  private waiting = new Set<string>();
+
+  constructor(
+    private readonly app: PageApp,
+    private readonly address: string,
+  ) {
+    app.store.subscribe((change) => {
+      if (change.touches("slots", "solo", "lights", "furnace", "camera", "view")) this.later();
+    });
+    new ResizeObserver(() => this.later()).observe(app.canvas);
+    app.onMissingVariant = (slot) => this.ask(slot);
+    this.connect();
+  }
+
+  private connect(): void {
+    const url = new URL(this.address, location.href);
+    url.protocol = url.protocol.replace("http", "ws");
+    const socket = new WebSocket(url);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.addEventListener("open", () => {
+      this.wait = 500;
+      this.sent = "";
+      this.uploaded.clear();
+      this.waiting.clear();
+      Object.assign(this.status, { connected: true, message: "" });
+      this.onStatus();
+      this.send();
+      this.app.state.slots.forEach((slot, index) => {
+        if (!this.app.shaders.find(slot.material, slot.choices)) this.ask(index);
+      });
+    });
+    socket.addEventListener("message", (event) => {
+      if (typeof event.data === "string") this.read(event.data);
+      else this.frame(event.data as ArrayBuffer);
+    });
+    socket.addEventListener("close", () => {
+      if (this.socket !== socket) return;
+      Object.assign(this.status, { connected: false, message: "the server is gone; trying again" });
+      this.onStatus();
+      setTimeout(() => this.connect(), this.wait);
+      this.wait = Math.min(this.wait * 2, 15_000);
+    });
+  }
+
+  private text(message: object): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  private later(): void {
+    clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => this.send(), QUIET);
+  }
+
+  /** The canvas's size over a whole number, so that a pixel of the reference is a block of the raster's. */
+  private size(): [number, number] {
+    const [width, height] = this.app.size();
+    const factor = [1, 2, 4].find((k) => (width / k) * (height / k) <= MOST_PIXELS) ?? 4;
+    return [width / factor, height / factor];
+  }
+
+  private send(): void {
+    const { app } = this;
+    if (this.socket?.readyState !== WebSocket.OPEN) return;
+    const { state } = app;
+    if (isFactor(state.view.term)) return; // D, G and F are no light: there is nothing to trace
+    const rows = app.visibleSlots().flatMap((slot) => {
+      const row = state.slots[slot];
+      if (!row) return [];
+      const balls = row.balls.map((_, ball) => ({ ...row.values, ...row.balls[ball]?.set }));
+      return [{ material: row.material, choices: row.choices, balls }];
+    });
+    const lights = actingLights(state).map(({ on: _on, name: _name, ...light }) => {
+      if (light.type !== "environment") return light;
+      const key = light.image ? this.upload() : null;
+      return { ...light, image: key ? { key } : null };
+    });
+    const [width, height] = this.size();
+    const scene = { state: { rows, lights, camera: state.camera, spacing: state.view.spacing }, width, height, spp: TARGET };
+    const text = JSON.stringify(scene);
+    if (text === this.sent) return;
+    this.sent = text;
+    this.id += 1;
+    Object.assign(this.status, { samples: 0, done: false, target: TARGET, message: "" });
+    this.text({ type: "scene", id: this.id, ...scene });
+    this.onStatus();
+  }
+
+  /** Sends the picture of the environment once; lights name it by its key. */
+  private upload(): string | null {
+    const picture = this.app.environment;
+    if (!picture) return null;
+    if (!this.uploaded.has(picture.key)) {
+      this.uploaded.add(picture.key);
+      this.text({ type: "environment", key: picture.key, width: picture.width, height: picture.height });
+      this.socket?.send(picture.half as Uint16Array<ArrayBuffer>);
+    }
+    return picture.key;
+  }
+
+  private ask(slot: number): void {
+    const row = this.app.state.slots[slot];
+    if (!row) return;
+    const wish = JSON.stringify([row.material, row.choices]);
+    if (this.waiting.has(wish)) return;
+    this.waiting.add(wish);
+    this.wishes += 1;
+    this.asked.set(this.wishes, wish);
+    this.text({ type: "choice", id: this.wishes, material: row.material, choices: row.choices });
+  }
+
+  private read(text: string): void {
+    const message = JSON.parse(text) as { type: string; [key: string]: unknown };
+    if (message.type === "ready") {
+      this.status.device = String(message["device"] ?? "");
+    } else if (message.type === "error") {
+      this.status.message = String(message["what"]);
+      this.app.say([message["what"], message["where"], message["hint"]].filter(Boolean).join(" — "), "error");
+    } else if (message.type === "variant") {
+      const material = this.app.shaders.material(String(message["material"]));
+      material.variants.push(message["variant"] as Variant);
+      const wish = this.asked.get(Number(message["id"]));
+      if (wish) this.waiting.delete(wish);
+      this.asked.delete(Number(message["id"]));
+      this.app.store.update("slots", () => {});
+    }
+    this.onStatus();
+  }
+
+  private frame(buffer: ArrayBuffer): void {
+    const length = new DataView(buffer).getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length))) as FrameHeader;
+    if (header.id === this.id) {
+      const data = halfToFloat(new Uint16Array(buffer, 4 + length, 4 * header.width * header.height));
+      Object.assign(this.status, { samples: header.spp, done: header.done, seconds: header.seconds });
+      this.app.setReference({ width: header.width, height: header.height, data, samples: header.spp, done: header.done });
+      this.onStatus();
+    }
+    // After the next picture, not before: a page that cannot keep up is not sent more.
+    requestAnimationFrame(() => this.text({ type: "ack", frame: header.frame }));
+  }
+}

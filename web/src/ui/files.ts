@@ -1,0 +1,71 @@
+/** Files that are dropped on the page or opened: pictures become the environment, meshes the shape. */
+import type { PageApp } from "../app";
+import { environmentFromFloats } from "../environment";
+import { newLight } from "../lights";
+import { readMesh } from "../meshes";
+import { readRadiance } from "../radiance";
+import type { Light } from "../state";
+import { element } from "./dom";
+
+const ENVIRONMENT = ".hdr,.pic";
+const MESH = ".glb,.gltf,.obj";
+
+export function openFile(app: PageApp, kind: "environment" | "mesh"): void {
+  const input = element("input", { type: "file", accept: kind === "environment" ? ENVIRONMENT : MESH });
+  input.addEventListener("change", () => {
+    if (input.files?.[0]) void useFile(app, input.files[0]);
+  });
+  input.click();
+}
+
+export async function useFile(app: PageApp, file: File): Promise<void> {
+  try {
+    const name = file.name.toLowerCase();
+    if (/\.(hdr|pic)$/.test(name)) {
+      const picture = readRadiance(new Uint8Array(await file.arrayBuffer()), file.name);
+      useEnvironment(app, picture.width, picture.height, picture.data);
+    } else if (/\.(glb|gltf|obj)$/.test(name)) app.useMesh(await readMesh(file));
+    else throw new Error(`${file.name}: drop a Radiance picture (.hdr) or a mesh (.glb, .gltf, .obj).`);
+    app.say(`${file.name} is in use.`);
+  } catch (error) {
+    app.say(error instanceof Error ? error.message : String(error), "error");
+  }
+}
+
+export function useEnvironment(app: PageApp, width: number, height: number, floats: Float32Array): void {
+  app.environment = environmentFromFloats(app.gl, width, height, floats, 3);
+  const { width: w, height: h } = app.environment;
+  app.store.update(["lights", "view"], (state) => {
+    let light = state.lights.find((l) => l.type === "environment");
+    if (!light) {
+      light = newLight("environment") as Extract<Light, { type: "environment" }>;
+      state.lights.push(light);
+    }
+    light.image = { width: w, height: h, data: null };
+    light.on = true;
+    state.furnace = false;
+    state.view.background = "environment";
+  });
+}
+
+export function attachDrop(app: PageApp, host: HTMLElement): void {
+  let depth = 0;
+  const mark = (on: boolean) => host.toggleAttribute("data-dropping", on);
+  addEventListener("dragenter", (event) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    depth += 1;
+    mark(true);
+  });
+  addEventListener("dragleave", () => {
+    depth = Math.max(0, depth - 1);
+    if (depth === 0) mark(false);
+  });
+  addEventListener("dragover", (event) => event.preventDefault());
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    depth = 0;
+    mark(false);
+    const file = event.dataTransfer?.files[0];
+    if (file) void useFile(app, file);
+  });
+}

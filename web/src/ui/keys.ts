@@ -1,0 +1,87 @@
+/** Keys, and the card that lists them. */
+import type { PageApp } from "../app";
+import { orbit, resetCamera, zoom } from "../camera";
+import type { MeshName } from "../state";
+import { button, element } from "./dom";
+
+export interface Actions {
+  copyLink(): void;
+  screenshot(): void;
+  theme(): void;
+}
+
+interface Key {
+  keys: string[];
+  name: string;
+  doc: string;
+  act(app: PageApp, actions: Actions): void;
+}
+
+const STEP = Math.PI / 36;
+const MESHES: MeshName[] = ["sphere", "shaderball", "torus"];
+
+const KEYS: Key[] = [
+  { keys: ["ArrowLeft"], name: "← →", doc: "turn the camera about the vertical", act: (app) => orbit(app.store, STEP, 0) },
+  { keys: ["ArrowRight"], name: "", doc: "", act: (app) => orbit(app.store, -STEP, 0) },
+  { keys: ["ArrowUp"], name: "↑ ↓", doc: "raise and lower the camera", act: (app) => orbit(app.store, 0, STEP) },
+  { keys: ["ArrowDown"], name: "", doc: "", act: (app) => orbit(app.store, 0, -STEP) },
+  { keys: ["+", "="], name: "+ −", doc: "nearer, farther", act: (app) => zoom(app.store, 0.9) },
+  { keys: ["-", "_"], name: "", doc: "", act: (app) => zoom(app.store, 1 / 0.9) },
+  { keys: ["0", "Home"], name: "0", doc: "first view", act: (app) => resetCamera(app.store) },
+  { keys: ["f"], name: "F", doc: "white furnace on and off", act: (app) => app.store.set("furnace", !app.state.furnace) },
+  {
+    keys: ["m"],
+    name: "M",
+    doc: "next shape",
+    act: (app) => app.store.set("view.mesh", MESHES[(MESHES.indexOf(app.state.view.mesh) + 1) % MESHES.length] as MeshName),
+  },
+  { keys: ["l"], name: "L", doc: "labels on and off", act: (app) => app.store.set("view.labels", !app.state.view.labels) },
+  { keys: ["["], name: "[ ]", doc: "exposure down and up half a stop", act: (app) => app.store.set("display.exposure", app.state.display.exposure - 0.5) },
+  { keys: ["]"], name: "", doc: "", act: (app) => app.store.set("display.exposure", app.state.display.exposure + 0.5) },
+  { keys: ["t"], name: "T", doc: "light or dark theme", act: (_, actions) => actions.theme() },
+  { keys: ["c"], name: "C", doc: "copy a link with the whole state", act: (_, actions) => actions.copyLink() },
+  { keys: ["s"], name: "S", doc: "save the picture as PNG", act: (_, actions) => actions.screenshot() },
+  { keys: ["Escape"], name: "Esc", doc: "all rows again", act: (app) => app.store.set("solo", null) },
+];
+
+export function attachKeys(app: PageApp, actions: Actions, help: HTMLDialogElement): void {
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || help.open) return;
+    const target = event.target as HTMLElement;
+    if (target.matches("input, select, textarea, [contenteditable]")) return;
+    // In a row of tabs or a panel's own canvas the arrows belong to it.
+    if (event.key.startsWith("Arrow") && target.closest(".dock, [role=radiogroup]")) return;
+    if (event.key === "?" || event.key === "h") {
+      help.showModal();
+      return;
+    }
+    const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const key = KEYS.find((k) => k.keys.includes(name));
+    if (!key) return;
+    event.preventDefault();
+    key.act(app, actions);
+  });
+}
+
+export function helpCard(notes: readonly string[]): HTMLDialogElement {
+  const dialog = element("dialog", { class: "help" });
+  const rows = KEYS.filter((k) => k.name).map((k) => element("tr", {}, element("td", {}, element("kbd", {}, k.name)), element("td", {}, k.doc)));
+  dialog.append(
+    element("h2", {}, "Keys and gestures"),
+    element("table", {}, ...rows),
+    element(
+      "ul",
+      {},
+      element("li", {}, "Drag turns, shift or right drag moves, the wheel or two fingers zoom."),
+      element("li", {}, "Click on a ball: its parameters are edited, and the panels below show its lobe at that point."),
+      element("li", {}, "Double click on a control: back to its default."),
+      element("li", {}, "Drop an .hdr picture as environment, a .glb, .gltf or .obj as shape."),
+      ...notes.map((note) => element("li", {}, note)),
+    ),
+    button("Close", "Close (Esc)", () => dialog.close()),
+  );
+  dialog.addEventListener("click", (event) => {
+    if (event.target === dialog) dialog.close();
+  });
+  return dialog;
+}

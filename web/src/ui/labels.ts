@@ -1,0 +1,59 @@
+/** Names over the picture: what each row is, and under every ball what sets it apart. */
+import type { PageApp } from "../app";
+import { cameraFrame, toPixel } from "../vectors";
+import { element } from "./dom";
+
+export class Labels {
+  private readonly host = element("div", { class: "labels" });
+  private spans: HTMLElement[] = [];
+
+  constructor(private readonly app: PageApp) {
+    app.overlay.append(this.host);
+  }
+
+  update(): void {
+    const { app } = this;
+    const { state } = app;
+    const side = state.compare.mode === "side";
+    this.host.hidden = !state.view.labels || side;
+    if (this.host.hidden) return;
+    const frame = cameraFrame(state.camera);
+    const [width, height] = [app.canvas.clientWidth, app.canvas.clientHeight];
+    const balls = app.balls();
+    const wanted: { text: string; x: number; y: number; kind: string; color?: string; pressed?: boolean }[] = [];
+    let gap = Infinity;
+    let last: [number, number] | null = null;
+    for (const { slot, ball, center } of balls) {
+      const row = state.slots[slot];
+      if (!row) continue;
+      const below = toPixel(frame, [center[0], center[1] - 1.04, center[2]], width, height);
+      if (below) {
+        if (ball > 0 && last) gap = Math.min(gap, Math.abs(below[0] - last[0]));
+        last = below;
+        const pressed = state.selection.slot === slot && state.selection.ball === ball && balls.length > 1;
+        wanted.push({ text: row.balls[ball]?.label ?? "", x: below[0], y: below[1], kind: "ball", pressed });
+      }
+      if (ball === 0) {
+        const above = toPixel(frame, [center[0] - 1, center[1] + 1, center[2]], width, height);
+        if (above) wanted.push({ text: `${String.fromCharCode(65 + slot)}  ${row.label}`, x: Math.max(10, above[0]), y: Math.max(50, above[1] - 4), kind: "rowname", color: app.slotColor(slot) });
+      }
+    }
+    while (this.spans.length < wanted.length) {
+      const span = element("span");
+      this.spans.push(span);
+      this.host.append(span);
+    }
+    this.spans.forEach((span, index) => {
+      const label = wanted[index];
+      span.hidden = !label;
+      if (!label) return;
+      // Where balls stand close, the word that all of them share would make the labels run into one another.
+      const text = label.kind === "ball" && gap < 88 ? label.text.replace(/^roughness /, "r ") : label.text;
+      if (span.textContent !== text) span.textContent = text;
+      span.className = label.kind;
+      span.toggleAttribute("data-selected", label.pressed ?? false);
+      span.style.transform = `translate(${Math.round(label.x)}px, ${Math.round(label.y)}px)`;
+      span.style.setProperty("--slot", label.color ?? "");
+    });
+  }
+}

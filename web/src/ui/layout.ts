@@ -1,0 +1,151 @@
+/** The page's frame: bar on top, picture with its labels, panel at the side, dock below. */
+import { GUI } from "lil-gui";
+import type { PageApp } from "../app";
+import type { Live } from "../live";
+import type { Panel } from "../panel";
+import type { Change } from "../state";
+import { Dock } from "./dock";
+import { button, element } from "./dom";
+import { attachDrop, openFile } from "./files";
+import { type Actions, attachKeys, helpCard } from "./keys";
+import { Labels } from "./labels";
+import { LightSection } from "./light_section";
+import { ModelsSection } from "./models";
+import { ViewSection, termBar } from "./view_section";
+
+export interface Frame {
+  root: HTMLElement;
+  stage: HTMLElement;
+  canvas: HTMLCanvasElement;
+  overlay: HTMLElement;
+}
+
+/** What must stand before the app: a canvas of a size, and a place for labels. */
+export function frame(host: HTMLElement): Frame {
+  const canvas = element("canvas", { class: "picture", tabIndex: 0 });
+  canvas.setAttribute("aria-label", "Shading balls. Drag to turn, click a ball to edit it, ? for keys.");
+  const overlay = element("div", { class: "overlay" });
+  const stage = element("main", { class: "stage" }, canvas, overlay);
+  const root = element("div", { class: "page" }, stage);
+  host.replaceChildren(root);
+  return { root, stage, canvas, overlay };
+}
+
+export class Layout {
+  private readonly models: ModelsSection;
+  private readonly lights: LightSection;
+  private readonly view: ViewSection;
+  private readonly terms: ReturnType<typeof termBar>;
+  private readonly labels: Labels;
+  private readonly dock: Dock;
+  private readonly status = element("div", { class: "status" });
+  private readonly furnace: HTMLButtonElement;
+  private readonly solo: HTMLButtonElement;
+  live: Live | null = null;
+
+  constructor(
+    private readonly app: PageApp,
+    private readonly parts: Frame,
+    panels: readonly Panel[],
+  ) {
+    const actions: Actions = { copyLink: () => void this.copyLink(), screenshot: () => void this.screenshot(), theme: () => this.theme() };
+    const help = helpCard((app.data as { notes?: string[] }).notes ?? []);
+    this.furnace = button("Furnace", "White furnace: radiance 1 from everywhere (F)", () => app.store.set("furnace", !app.state.furnace));
+    this.furnace.dataset["act"] = "furnace";
+    this.solo = button("All rows", "Show all rows again (Esc)", () => app.store.set("solo", null), "solo-note");
+    const bar = element(
+      "header",
+      { class: "bar" },
+      element("h1", {}, "Gonio"),
+      element("span", { class: "title", title: app.data.title }, app.data.title),
+      element("span", { class: "spacer" }),
+      this.furnace,
+      button("Link", "Copy a link that holds everything you see (C)", actions.copyLink),
+      button("PNG", "Save the picture (S)", actions.screenshot),
+      button("Reset", "Everything back to how the page was made", () => app.store.reset()),
+      button("◐", "Light or dark theme (T)", actions.theme, "icon"),
+      button("?", "Keys and gestures (?)", () => help.showModal(), "icon"),
+    );
+    const side = element("aside", { class: "side" });
+    const gui = new GUI({ container: side, title: "", injectStyles: false, autoPlace: false, width: 0 } as ConstructorParameters<typeof GUI>[0]);
+    gui.domElement.style.removeProperty("--width");
+    this.models = new ModelsSection(app, gui.addFolder("Material"));
+    const lights = gui.addFolder("Lights");
+    this.lights = new LightSection(app, lights, (kind) => openFile(app, kind));
+    this.view = new ViewSection(app, gui.addFolder("View"), (kind) => openFile(app, kind));
+    this.terms = termBar(app);
+    parts.stage.append(element("div", { class: "over-top" }, this.terms.host, this.solo), this.status);
+    this.dock = new Dock(app, panels);
+    const center = element("div", { class: "center" }, parts.stage, this.dock.host);
+    parts.root.replaceChildren(bar, center, side, help);
+    this.labels = new Labels(app);
+    attachKeys(app, actions, help);
+    attachDrop(app, parts.stage);
+    app.onSay = (text, kind) => this.say(text, kind);
+  }
+
+  update(change: Change): void {
+    const { app } = this;
+    if (change.touches("slots", "solo", "selection", "linked")) this.models.update();
+    if (change.touches("lights", "furnace", "environment")) this.lights.update();
+    this.view.update();
+    this.terms.update();
+    this.furnace.setAttribute("aria-pressed", String(app.state.furnace));
+    this.solo.hidden = app.state.solo === null;
+    this.labels.update();
+    this.dock.update(change);
+  }
+
+  refresh(what: Parameters<Dock["refresh"]>[0]): void {
+    if (what === "picture") this.labels.update();
+    this.dock.refresh(what);
+    this.showStatus();
+  }
+
+  showStatus(): void {
+    const { renderer } = this.app;
+    const parts = [`raster ${renderer.samples} spp`];
+    const live = this.live?.status;
+    if (live) {
+      if (!live.connected) parts.push(`reference: ${live.message}`);
+      else parts.push(`reference ${live.samples} / ${live.target} spp${live.device ? ` · ${live.device}` : ""}${live.done ? " · done" : ""}`);
+    }
+    const text = parts.join("   ");
+    if (this.status.textContent !== text) this.status.textContent = text;
+  }
+
+  private async copyLink(): Promise<void> {
+    const link = this.app.link();
+    try {
+      await navigator.clipboard.writeText(link);
+      this.say("Link copied: it holds everything you see.");
+    } catch {
+      // Pages from disk and frames may not write to the clipboard: the old way asks for no permission.
+      const area = element("textarea", { value: link });
+      document.body.append(area);
+      area.select();
+      const copied = document.execCommand("copy");
+      area.remove();
+      this.say(copied ? "Link copied: it holds everything you see." : "The browser does not let this page copy; take the link from the address bar.", copied ? "info" : "error");
+    }
+  }
+
+  private async screenshot(): Promise<void> {
+    const blob = await this.app.screenshot();
+    const anchor = element("a", { href: URL.createObjectURL(blob), download: "gonio.png" });
+    anchor.click();
+    setTimeout(() => URL.revokeObjectURL(anchor.href), 10_000);
+  }
+
+  private theme(): void {
+    this.app.store.set("display.theme", this.app.theme() === "dark" ? "light" : "dark");
+  }
+
+  private say(text: string, kind: "info" | "error" = "info"): void {
+    const line = element("div", { class: `toast ${kind}` }, text);
+    line.setAttribute("role", kind === "error" ? "alert" : "status");
+    for (const old of this.parts.stage.querySelectorAll(".toast")) old.remove();
+    this.parts.stage.append(line);
+    setTimeout(() => line.remove(), kind === "error" ? 12_000 : 3000);
+  }
+}
