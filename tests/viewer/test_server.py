@@ -415,6 +415,20 @@ def test_when_all_places_are_taken_a_newcomer_is_told(monkeypatch: pytest.Monkey
             second.recv(10)
 
 
+def test_a_page_that_takes_nothing_gives_its_place_to_a_newcomer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MOST_SESSIONS", 1)
+    monkeypatch.setattr(server, "PATIENCE_SECONDS", 0.05)
+    with running() as one, speak(one) as stalled:
+        stalled.send(scene(1, spp=1))
+        next_frame(stalled)  # and no answer
+        time.sleep(0.1)
+        with speak(one) as newcomer:
+            newcomer.send(scene(2))
+            assert final_frame(newcomer, 2).any()
+        with pytest.raises(websockets.ConnectionClosed, match="made room"):
+            stalled.recv(10)
+
+
 # --------------------------------------------------------------------------- beginning and end
 
 

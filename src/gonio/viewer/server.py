@@ -44,7 +44,8 @@ LOOPBACK = "127.0.0.1"
 MOST_SESSIONS = 8  # each holds a scene and a picture in memory
 MOST_CONNECTIONS = 200  # that have not asked for anything yet
 REQUEST_SECONDS = 10.0  # for a request's headers to arrive, and for a session's first message
-STALL_SECONDS = 30.0  # for a frame to be taken
+STALL_SECONDS = 600.0  # for a frame to be taken: a page in a hidden tab draws nothing, and need not come back for it
+PATIENCE_SECONDS = 5.0  # the same where another page wants the place
 CLOSE_SECONDS = 2.0  # for the last words to go out
 FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
 
@@ -145,10 +146,10 @@ class Application:
             self.renderer.forget(session)
 
     def _make_room(self) -> bool:
-        """Whether one more session fits; those that never asked for anything give way, the oldest first."""
+        """Whether one more session fits; those that asked for nothing or take nothing give way, the oldest first."""
         if len(self.sessions) < MOST_SESSIONS:
             return True
-        idle = next((session for session in self.sessions if not session.asked), None)
+        idle = next((session for session in self.sessions if session.idle_for() > PATIENCE_SECONDS), None)
         if idle is None:
             return False
         self.sessions.remove(idle)

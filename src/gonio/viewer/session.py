@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -69,6 +70,11 @@ class Session:
         """Close the connection, from the server's side."""
         self._reason = (code, reason)
         self._ended.set()
+
+    def idle_for(self) -> float:
+        """Seconds for which a frame has waited to be taken; without end where nothing was ever asked for."""
+        since = self.stalled_since
+        return math.inf if not self.asked else 0.0 if since is None else time.monotonic() - since
 
     async def _read(self) -> None:
         while True:
