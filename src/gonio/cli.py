@@ -19,7 +19,8 @@ import typer
 from .errors import GonioError, GonioWarning, InputError, did_you_mean
 
 if TYPE_CHECKING:
-    from .render.run import Progress, Request, Result
+    from .render.passes import Progress
+    from .render.run import Request, Result
 
 app = typer.Typer(
     name="gonio",

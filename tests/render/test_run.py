@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from gonio.errors import InputError, MachineError
-from gonio.render import denoise, engine, images, run
+from gonio.render import denoise, engine, images, mitsuba_scene, passes, run
 
 PIXELS = 300_000
 
@@ -83,18 +83,18 @@ class FakeRender:
 
 def test_passes_settle_at_half_a_second_and_end_at_the_wanted_count() -> None:
     render = FakeRender()
-    assert run.run(render, 1000, PIXELS, clock=render.clock) == ""
+    assert passes.run(render, 1000, PIXELS, clock=render.clock) == ""
     assert render.done == 1000
     assert max(render.times[2:]) <= 0.6  # at most this long until Ctrl-C is answered
-    assert len(render.passes) < 1000 * PIXELS / render.rate / run.PASS_SECONDS + 8  # and start-up costs few passes
+    assert len(render.passes) < 1000 * PIXELS / render.rate / passes.PASS_SECONDS + 8  # and start-up costs few passes
 
 
 def test_progress_tells_samples_rate_and_time_left() -> None:
     render = FakeRender()
-    seen: list[run.Progress] = []
-    run.run(render, 200, PIXELS, report=seen.append, clock=render.clock)
+    seen: list[passes.Progress] = []
+    passes.run(render, 200, PIXELS, report=seen.append, clock=render.clock)
     assert [progress.done for progress in seen] == sorted({progress.done for progress in seen})
-    assert seen[-1] == run.Progress(200, 200, pytest.approx(5e6), 0.0)
+    assert seen[-1] == passes.Progress(200, 200, pytest.approx(5e6), 0.0)
     middle = seen[len(seen) // 2]  # the compiling of the first pass does not spoil the rate
     assert middle.rate == pytest.approx(5e6)
     assert middle.remaining == pytest.approx((200 - middle.done) * PIXELS / 5e6)
@@ -102,26 +102,26 @@ def test_progress_tells_samples_rate_and_time_left() -> None:
 
 def test_an_interrupt_ends_after_the_pass() -> None:
     render = FakeRender()
-    assert run.run(render, 1000, PIXELS, interrupted=lambda: len(render.passes) == 3, clock=render.clock) == "interrupt"
+    assert passes.run(render, 1000, PIXELS, interrupted=lambda: len(render.passes) == 3, clock=render.clock) == "interrupt"
     assert len(render.passes) == 3 and 0 < render.done < 1000
 
 
 def test_the_time_limit_is_kept_to_within_one_small_pass() -> None:
     render = FakeRender()
-    assert run.run(render, 10**6, PIXELS, timeout=5, clock=render.clock) == "timeout"
+    assert passes.run(render, 10**6, PIXELS, timeout=5, clock=render.clock) == "timeout"
     assert 5 <= render.now < 5.2
 
 
 def test_a_limit_that_is_too_short_still_gives_one_pass() -> None:
     render = FakeRender()
-    assert run.run(render, 100, PIXELS, timeout=1e-6, clock=render.clock) == "timeout"
+    assert passes.run(render, 100, PIXELS, timeout=1e-6, clock=render.clock) == "timeout"
     assert render.done >= 1
 
 
 def test_a_mitsuba_scene_has_passes_of_one_size() -> None:
     render = FakeRender()
     render.pass_size = 7  # type: ignore[attr-defined]
-    run.run(render, 30, PIXELS, clock=render.clock)
+    passes.run(render, 30, PIXELS, clock=render.clock)
     assert render.passes == [7, 7, 7, 7, 2]
 
 
@@ -193,12 +193,12 @@ def test_the_picture_goes_into_the_current_folder_by_the_scenes_name(
 def test_same_seed_same_bits_whatever_the_passes(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def rendered(seed: int) -> np.ndarray:
         prepared = run.prepare(run.Request(scene, spp=13, seed=seed))
-        run.run(prepared.render, prepared.spp, 24 * 16)
+        passes.run(prepared.render, prepared.spp, 24 * 16)
         return prepared.render.image()
 
     whole = rendered(1)
     monkeypatch.setattr(run, "FIRST_PASS", 1)
-    monkeypatch.setattr(run, "PASS_SECONDS", 1e-9)  # passes of one sample
+    monkeypatch.setattr(passes, "PASS_SECONDS", 1e-9)  # passes of one sample
     assert np.array_equal(rendered(1), whole)
     assert not np.array_equal(rendered(2), whole)
 
@@ -211,7 +211,7 @@ def test_another_value_compiles_no_kernel(scene: Path) -> None:
         prepared = run.prepare(run.Request(scene, overrides={"shapes.0.material.albedo": albedo}))
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
-            run.run(prepared.render, 4, 24 * 16)
+            passes.run(prepared.render, 4, 24 * 16)
             prepared.render.image()
             return sum(not kernel.get("cache_hit", True) for kernel in dr.kernel_history())
 
@@ -259,11 +259,11 @@ def test_a_mitsuba_scene_renders_with_gonio_materials(xml: Path, tmp_path: Path)
 
 
 def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
+    monkeypatch.setattr(mitsuba_scene, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
 
     def rendered(seed: int) -> np.ndarray:
         prepared = run.prepare(run.Request(xml, spp=6, seed=seed))
-        run.run(prepared.render, prepared.spp, 24 * 16)
+        passes.run(prepared.render, prepared.spp, 24 * 16)
         assert prepared.render.done == 6
         return prepared.render.image()
 
@@ -275,7 +275,7 @@ def test_both_ways_through_a_mitsuba_scene_agree(xml: Path) -> None:
     pictures = []
     for integrator in (None, "path"):
         prepared = run.prepare(run.Request(xml, spp=512, integrator=integrator, max_depth=3 if integrator else None))
-        run.run(prepared.render, prepared.spp, 24 * 16)
+        passes.run(prepared.render, prepared.spp, 24 * 16)
         pictures.append(prepared.render.image())
     # Mitsuba's default filter spreads samples over pixels, so means are compared, not pixels.
     assert pictures[0].mean() == pytest.approx(pictures[1].mean(), rel=0.01)
@@ -335,7 +335,7 @@ def test_pictures_of_one_channel_become_grey() -> None:
     sensor = SimpleNamespace(film=Film, sampler=lambda: SimpleNamespace(sample_count=lambda: 1))
     scene = SimpleNamespace(sensors=lambda: [sensor], integrator=lambda: None)
     mi = SimpleNamespace(render=lambda *a, **k: np.array([[[1.0], [2.0]]], np.float32))
-    render = run.MitsubaRender(mi, scene, spp=1)  # type: ignore[arg-type]
+    render = mitsuba_scene.MitsubaRender(mi, scene, spp=1)  # type: ignore[arg-type]
     render.advance(1)
     assert render.image().tolist() == [[[1, 1, 1], [2, 2, 2]]]
 
@@ -371,7 +371,7 @@ def test_ctrl_c_keeps_the_picture_so_far(endless: Path, tmp_path: Path) -> None:
         time.sleep(patience)
         process.send_signal(signal.SIGINT)
         told, warned = process.communicate(timeout=60)
-        assert process.returncode == run.INTERRUPTED, warned
+        assert process.returncode == passes.INTERRUPTED, warned
         if "nothing was written" not in warned:
             break
         assert not output.exists()
@@ -388,6 +388,6 @@ def test_a_second_ctrl_c_ends_at_once_and_leaves_no_file(endless: Path, tmp_path
     time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=5)
-    assert process.returncode == run.INTERRUPTED
+    assert process.returncode == passes.INTERRUPTED
     # Where the pass ended between the two, the picture is kept, and whole; never is a part left.
     assert [entry.name for entry in output.parent.iterdir()] in ([], ["a.exr"])

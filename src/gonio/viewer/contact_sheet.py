@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..render import images, run
+from ..render import images, passes, run
 from . import figures
 
 MOST_CELLS = 256  # a sheet of more is no longer looked at, and is a typing error more often than not
@@ -97,7 +97,7 @@ def study(
     cells = tuple(dict(zip(names, combination, strict=True)) for combination in combinations)
     pictures: list[np.ndarray] = []
     warnings: dict[str, None] = {}
-    with run.Interrupts() as interrupts:
+    with passes.Interrupts() as interrupts:
         for index, cell in enumerate(cells):
             state = f"{index + 1}/{len(cells)}  " + ", ".join(map(figures.show_value, cell.values()))
             report(index, len(cells), state)
@@ -105,7 +105,7 @@ def study(
             prepared = run.prepare(replace(request, overrides={**request.overrides, **cell}))
             warnings |= dict.fromkeys(prepared.warnings)
             width, height = prepared.size
-            run.run(prepared.render, prepared.spp, width * height, interrupted=lambda: interrupts.asked)
+            passes.run(prepared.render, prepared.spp, width * height, interrupted=lambda: interrupts.asked)
             interrupts.check()
             pictures.append(images.to_screen(run.finished(prepared.render, request.denoise), request.exposure))
     report(len(cells), len(cells), "drawing")

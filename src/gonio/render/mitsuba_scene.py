@@ -1,0 +1,138 @@
+"""A Mitsuba scene: its file, read with the same care as the lab's, and its passes under its own integrator."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..errors import InputError
+from .passes import power_of_two
+
+if TYPE_CHECKING:
+    from .run import Request
+
+# Samples in flight of Mitsuba's own integrators, which hold one in each lane: half a second or so on a CPU.
+WAVEFRONT = 1 << 21
+
+
+class MitsubaRender:
+    """A Mitsuba scene by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
+
+    The picture depends on the seed and the film, not on the clock. A sampler that needs a square number of
+    samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
+    """
+
+    def __init__(self, mi: ModuleType, scene: Any, spp: int, seed: int = 0, integrator: Any = None) -> None:
+        self._mi, self._scene, self._integrator, self._seed = mi, scene, integrator or scene.integrator(), seed
+        self._sensor = scene.sensors()[0]
+        width, height = self._sensor.film().crop_size()
+        self.pass_size = min(spp, power_of_two(max(1, WAVEFRONT // (int(width) * int(height)))))
+        self._sum: np.ndarray | None = None
+        self._passes = 0
+        self._done = 0
+
+    @property
+    def done(self) -> int:
+        return self._done
+
+    def advance(self, count: int) -> None:
+        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
+        picture = self._render(self._integrator, count, seed)
+        taken = int(self._sensor.sampler().sample_count())
+        # In float64: a sum of thousands of float32 passes would lose digits.
+        weighted = picture.astype(np.float64) * taken
+        self._sum = weighted if self._sum is None else self._sum + weighted
+        self._passes += 1
+        self._done += taken
+
+    def _render(self, integrator: Any, spp: int, seed: int) -> np.ndarray:
+        tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
+        return np.array(tensor, dtype=np.float32)
+
+    def image(self) -> np.ndarray:
+        assert self._sum is not None, "advance() comes first"
+        mean = (self._sum / self._done).astype(np.float32)
+        return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
+
+    def aov(self) -> dict[str, np.ndarray]:
+        """Guides for the denoiser: 16 samples see every surface of a pixel that matters to an edge."""
+        aovs = self._mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
+        channels = self._render(aovs, 16, self._seed)[..., -6:]
+        return {"albedo": channels[..., :3], "normal": channels[..., 3:]}
+
+
+def load(request: Request, mi: ModuleType) -> Any:
+    """The scene of a Mitsuba XML file; the request's overrides are its `$parameters`."""
+    where = str(request.scene)
+    if not request.allow_outside:
+        _check_inside(request.scene, request.overrides)
+    try:
+        scene = mi.load_file(where, **{key: _as_xml(value) for key, value in request.overrides.items()})
+        if not isinstance(scene, mi.Scene):
+            raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
+        if not scene.sensors():
+            raise InputError("the scene has no <sensor>", where, "add one: it holds the camera and the film")
+        if scene.integrator() is None and request.integrator is None:
+            raise InputError("the scene has no <integrator>", where, "add one, or give --integrator path")
+        if request.size is not None:
+            parameters = mi.traverse(scene.sensors()[0])
+            parameters["film.size"] = list(request.size)
+            parameters.update()
+    except InputError:
+        raise
+    except (RuntimeError, ValueError, TypeError, KeyError) as error:
+        raise InputError(_mitsuba_text(error), where, "mend it there; the texts are Mitsuba's") from error
+    return scene
+
+
+def _as_xml(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _mitsuba_text(error: Exception) -> str:
+    """Mitsuba's message without places in its C++ source and without a Python traceback of ours."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
+    text = lines[0] if lines else type(error).__name__
+    if ours:  # an error of a Gonio material, raised within Mitsuba's parser
+        text = re.sub(r"Traceback \(most recent call last\):$", ours[-1].split(": ", 1)[1], text)
+    elif len(lines) > 1:
+        text += " " + "; ".join(lines[1:4])
+    return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
+
+
+def _check_inside(file: Path, parameters: dict[str, Any]) -> None:
+    """Raise InputError where a Mitsuba scene, or a file it includes, names a file outside the scene's folder."""
+    folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
+    while waiting:
+        current = waiting.pop()
+        if current in seen:
+            continue
+        seen.add(current)
+        try:
+            root = ElementTree.parse(current).getroot()
+        except (ElementTree.ParseError, OSError, ValueError) as error:
+            raise InputError(f"not well-formed XML: {error}", str(current), "mend it there") from error
+        values = {x.get("name", ""): x.get("value", "") for x in root.iter("default")}
+        values |= {name: _as_xml(value) for name, value in parameters.items()}
+        for element in root.iter():
+            name = element.get("filename") or (element.get("value") if element.tag in ("string", "path") else None)
+            if not name:
+                continue
+            for key in sorted(values, key=len, reverse=True):
+                name = name.replace("$" + key, values[key])
+            try:
+                target = (folder / name).resolve()
+                exists = target.exists()
+            except (OSError, ValueError):  # no file's name, such as a long or odd string
+                continue
+            if exists and not target.is_relative_to(folder):
+                what = f"'{name}' lies outside the scene's folder {folder}"
+                raise InputError(what, str(current), "copy it there, or use --allow-outside")
+            if element.tag == "include" and exists:
+                waiting.append(target)

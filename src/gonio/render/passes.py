@@ -1,0 +1,156 @@
+"""The loop of a render: passes of about half a second, progress, Ctrl-C, time limit.
+
+The size of the passes follows the clock; the picture does not, to the bit: `integrators.Render` numbers its samples and
+sums them in order. A Mitsuba scene under its own integrator has no such numbering, so its passes are of one size,
+which follows from the film alone; there the passes also keep memory flat as samples grow.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+PASS_SECONDS = 0.5  # long enough that a pass's start-up (some 10 ms) is small, short enough for Ctrl-C
+
+FIRST_PASS = 1 << 18  # samples: some 50 ms of work, and a first picture soon after the kernel is compiled
+
+INTERRUPTED = 130  # the exit code of a shell for a program that Ctrl-C ended, 128 + SIGINT
+
+
+class Renders(Protocol):
+    """What `run` can drive: `gonio.render.integrators.Render`, `mitsuba_scene.MitsubaRender`."""
+
+    @property
+    def done(self) -> int: ...
+
+    def advance(self, count: int) -> None: ...
+
+    def image(self) -> np.ndarray: ...
+
+    def aov(self) -> dict[str, np.ndarray]: ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a render stands: samples per pixel done and wanted, samples per second, seconds left (by the rate)."""
+
+    done: int
+    wanted: int
+    rate: float
+    remaining: float
+
+
+def run(
+    render: Renders,
+    spp: int,
+    pixels: int,
+    *,
+    timeout: float | None = None,
+    report: Callable[[Progress], None] = lambda progress: None,
+    interrupted: Callable[[], bool] = lambda: False,
+    clock: Callable[[], float] = time.perf_counter,
+) -> str:
+    """Advance `render` to `spp` samples per pixel; why it ended: "" (done), "interrupt" or "timeout".
+
+    At least one pass is made, so that there is always a picture. Both wishes to stop are looked at between
+    passes; near the time limit the passes shrink to what still fits.
+    """
+    begin = clock()
+    fixed = getattr(render, "pass_size", None)  # a Mitsuba scene's passes are of one size
+    count = power_of_two(FIRST_PASS / pixels)
+    compiled, counted_samples, counted_seconds = False, 0, 0.0
+    while True:
+        if fixed:
+            count = fixed
+        before, started = render.done, clock()
+        render.advance(min(count, spp - render.done))
+        elapsed, samples = max(clock() - started, 1e-9), (render.done - before) * pixels
+        # The first pass also compiles; it says nothing about the rate unless it stays the only one.
+        if compiled or render.done >= spp:
+            counted_samples, counted_seconds = counted_samples + samples, counted_seconds + elapsed
+        rate = counted_samples / counted_seconds if counted_seconds else samples / elapsed
+        remaining = max(spp - render.done, 0) * pixels / rate
+        report(Progress(render.done, spp, rate, remaining))
+        if render.done >= spp:
+            return ""
+        if interrupted():
+            return "interrupt"
+        left = timeout - (clock() - begin) if timeout is not None else float("inf")
+        if left <= 0:
+            return "timeout"
+        if not fixed:
+            count = _next_count(count, elapsed, compiled)
+            if timeout is not None:
+                count = min(count, max(1, int(left * rate / pixels)))
+        compiled = True
+
+
+def _next_count(count: int, elapsed: float, compiled: bool) -> int:
+    """Samples per pixel of the next pass: what should take PASS_SECONDS, at most 8 times more than last time."""
+    if not compiled and elapsed > PASS_SECONDS:  # compiling, most likely
+        return count
+    return max(1, round(count * min(PASS_SECONDS / elapsed, 8)))
+
+
+def power_of_two(x: float) -> int:
+    """The largest power of two not above x, at least 1."""
+    return 1 << max(int(x).bit_length() - 1, 0)
+
+
+class Interrupts:
+    """While it is open, the first Ctrl-C sets `asked`, and a second one ends the process at once.
+
+    A signal handler of Python runs only between two of its instructions, and a pass is one long call. So the
+    signal's byte is taken from the wake-up socket by a thread of its own, which runs while the pass does.
+    """
+
+    def __init__(self, notice: Callable[[], None] = lambda: None) -> None:
+        self.asked = False
+        self._notice = notice
+
+    def __enter__(self) -> Interrupts:
+        # Signals belong to the main thread; a shell that ignores Ctrl-C for a background job has its reasons.
+        in_main = threading.current_thread() is threading.main_thread()
+        self._active = in_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+        if self._active:
+            self._listen, self._wake = socket.socketpair()
+            self._wake.setblocking(False)
+            self._old_handler = signal.signal(signal.SIGINT, lambda number, frame: None)
+            self._old_wake = signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
+            threading.Thread(target=self._watch, daemon=True).start()
+        return self
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt where it was asked for: for work that has nothing to keep yet."""
+        if self.asked:
+            raise KeyboardInterrupt
+
+    def __exit__(self, *exc: object) -> None:
+        if self._active:
+            signal.set_wakeup_fd(self._old_wake)
+            signal.signal(signal.SIGINT, self._old_handler)
+            self._wake.close()  # ends the thread
+            self._active = False
+
+    def _watch(self) -> None:
+        with contextlib.suppress(OSError), self._listen:
+            while numbers := self._listen.recv(16):
+                for number in numbers:
+                    if number != signal.SIGINT:
+                        continue
+                    if self.asked:
+                        if sys.stderr.isatty():
+                            os.write(2, b"\x1b[?25h\n")  # the progress bar had hidden the cursor
+                        os._exit(INTERRUPTED)
+                    self.asked = True
+                    self._notice()
