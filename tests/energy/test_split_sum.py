@@ -52,6 +52,11 @@ def test_prefiltered_maps_agree_with_brute_force():
         assert np.sqrt(np.mean((levels[index] - exact) ** 2)) < 0.01, index
 
 
+def test_a_constant_environment_stays_constant_when_prefiltered():
+    for level in split_sum.prefilter(np.full((16, 32, 3), 0.7), 4, 64):
+        np.testing.assert_allclose(level, 0.7)
+
+
 def test_a_prefiltered_map_knows_up_from_down_and_left_from_right():
     for axis in ((0, 0, 1), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, -1, 0)):
         w, _ = directions(HEIGHT, WIDTH)
