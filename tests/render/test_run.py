@@ -102,7 +102,9 @@ def test_progress_tells_samples_rate_and_time_left() -> None:
 
 def test_an_interrupt_ends_after_the_pass() -> None:
     render = FakeRender()
-    assert passes.run(render, 1000, PIXELS, interrupted=lambda: len(render.passes) == 3, clock=render.clock) == "interrupt"
+    assert (
+        passes.run(render, 1000, PIXELS, interrupted=lambda: len(render.passes) == 3, clock=render.clock) == "interrupt"
+    )
     assert len(render.passes) == 3 and 0 < render.done < 1000
 
 
@@ -197,7 +199,7 @@ def test_same_seed_same_bits_whatever_the_passes(scene: Path, monkeypatch: pytes
         return prepared.render.image()
 
     whole = rendered(1)
-    monkeypatch.setattr(run, "FIRST_PASS", 1)
+    monkeypatch.setattr(passes, "FIRST_PASS", 1)
     monkeypatch.setattr(passes, "PASS_SECONDS", 1e-9)  # passes of one sample
     assert np.array_equal(rendered(1), whole)
     assert not np.array_equal(rendered(2), whole)
