@@ -269,8 +269,9 @@ def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monke
         assert prepared.render.done == 6
         return prepared.render.image()
 
-    assert np.array_equal(rendered(1), rendered(1))
-    assert not np.array_equal(rendered(1), rendered(2))
+    # Mitsuba's film adds up with atomics where its filter is wider than a pixel: the order, and the last bit, may differ
+    np.testing.assert_allclose(rendered(1), rendered(1), rtol=1e-5)
+    assert not np.allclose(rendered(1), rendered(2), rtol=1e-2)
 
 
 def test_both_ways_through_a_mitsuba_scene_agree(xml: Path) -> None:

@@ -23,7 +23,8 @@ WAVEFRONT = 1 << 21
 class MitsubaRender:
     """A Mitsuba scene by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
 
-    The picture depends on the seed and the film, not on the clock. A sampler that needs a square number of
+    The picture depends on the seed and the film, not on the clock, up to the last bit: Mitsuba's film adds up with
+    atomics, in an order of their own. A sampler that needs a square number of
     samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
     """
 
