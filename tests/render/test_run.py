@@ -269,7 +269,7 @@ def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monke
         assert prepared.render.done == 6
         return prepared.render.image()
 
-    # Mitsuba's film adds up with atomics where its filter is wider than a pixel: the order, and the last bit, may differ
+    # Mitsuba's film adds up with atomics where its filter is wider than a pixel: their order, and the last bit, vary
     np.testing.assert_allclose(rendered(1), rendered(1), rtol=1e-5)
     assert not np.allclose(rendered(1), rendered(2), rtol=1e-2)
 
