@@ -9,6 +9,7 @@ import type { Variant } from "./data";
 import { actingLights } from "./lights";
 import { isFactor } from "./glsl";
 import { halfToFloat } from "./targets";
+import { fitted } from "./vectors";
 
 export interface LiveState {
   connected: boolean;
@@ -124,7 +125,9 @@ export class Live {
       return { ...light, image: key ? { key } : null };
     });
     const [width, height] = this.size();
-    const scene = { state: { rows, lights, camera: state.camera, spacing: state.view.spacing }, width, height, spp: TARGET };
+    const half = fitted(Math.tan((state.camera.fov * Math.PI) / 360), width / height);
+    const camera = { ...state.camera, fov: (Math.atan(half) * 360) / Math.PI };
+    const scene = { state: { rows, lights, camera, spacing: state.view.spacing }, width, height, spp: TARGET };
     const text = JSON.stringify(scene);
     if (text === this.sent) return;
     this.sent = text;

@@ -14,7 +14,7 @@ import type { Picture, Presenter } from "./panel";
 import type { Program, Shader, ShaderLibrary } from "./shaders";
 import type { State, Term } from "./state";
 import { type Target, areaSequence, createTarget, deleteTarget, floatBlending, readTarget, sequence } from "./targets";
-import { type Frame, cameraFrame, length, sphereBounds, sub } from "./vectors";
+import { type Frame, cameraFrame, fitted, length, sphereBounds, sub } from "./vectors";
 
 export interface DrawnBall {
   slot: number;
@@ -124,7 +124,7 @@ export class Renderer {
     gl.clearColor(0, 0, 0, 0);
     gl.clearDepth(1);
     gl.clear(gl.DEPTH_BUFFER_BIT | (this.samples === 0 ? gl.COLOR_BUFFER_BIT : 0));
-    if (scene.mesh) this.depthPass(scene, scene.mesh, draws, frame);
+    if (scene.mesh) this.depthPass(scene.mesh, draws, frame);
     gl.enable(gl.BLEND);
     gl.blendEquation(gl.FUNC_ADD);
     gl.blendFunc(gl.ONE, gl.ONE);
@@ -197,12 +197,13 @@ export class Renderer {
     gl.uniform3fv(program.uniform("right"), frame.right);
     gl.uniform3fv(program.uniform("up"), frame.up);
     gl.uniform3fv(program.uniform("back"), frame.back);
-    gl.uniform2f(program.uniform("half_size"), (frame.half * target.width) / target.height, frame.half);
+    const half = fitted(frame.half, target.width / target.height);
+    gl.uniform2f(program.uniform("half_size"), (half * target.width) / target.height, half);
     const [x, y] = sequence(2, this.samples) as [number, number];
     gl.uniform2f(program.uniform("jitter"), (2 * x - 1) / target.width, (2 * y - 1) / target.height);
   }
 
-  private depthPass(scene: Scene, mesh: MeshBuffers, draws: Draw[], frame: Frame): void {
+  private depthPass(mesh: MeshBuffers, draws: Draw[], frame: Frame): void {
     const { gl } = this;
     const program = this.shaders.program("depth", DEPTH_VERTEX, DEPTH_FRAGMENT);
     gl.useProgram(program.handle);
@@ -214,7 +215,6 @@ export class Renderer {
       gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
     }
     gl.colorMask(true, true, true, true);
-    void scene;
   }
 
   private draw(scene: Scene, frame: Frame, draw: Draw, program: Program, row: number, level: { texture: WebGLTexture; level: number } | null): void {
@@ -307,7 +307,8 @@ export class Renderer {
     gl.uniform3fv(program.uniform("right"), frame.right);
     gl.uniform3fv(program.uniform("up"), frame.up);
     gl.uniform3fv(program.uniform("back"), frame.back);
-    gl.uniform2f(program.uniform("half_size"), (frame.half * width) / height, frame.half);
+    const half = fitted(frame.half, width / height);
+    gl.uniform2f(program.uniform("half_size"), (half * width) / height, half);
     gl.uniform2f(program.uniform("size"), width, height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.bindVertexArray(null);

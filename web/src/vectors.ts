@@ -46,6 +46,12 @@ export function cameraFrame(camera: Camera): Frame {
   };
 }
 
+/**
+ * Tangent of half the vertical field of view in a picture of this shape. Scenes are framed for 16 : 9; a narrower
+ * picture keeps what that shows from side to side, so that on a phone no ball is cut off.
+ */
+export const fitted = (half: number, aspect: number): number => half * Math.max(1, 16 / 9 / aspect);
+
 /** A world point in the camera's frame: x right, y up, z toward the viewer. */
 export function toView(frame: Frame, point: Vec3): Vec3 {
   const d = sub(point, frame.eye);
@@ -56,14 +62,15 @@ export function toView(frame: Frame, point: Vec3): Vec3 {
 export function toPixel(frame: Frame, point: Vec3, width: number, height: number): [number, number] | null {
   const [x, y, z] = toView(frame, point);
   if (z > -1e-6) return null;
-  const focal = height / 2 / frame.half;
+  const focal = height / 2 / fitted(frame.half, width / height);
   return [width / 2 + (x / -z) * focal, height / 2 - (y / -z) * focal];
 }
 
 /** Unit direction of the ray through a pixel position. */
 export function pixelRay(frame: Frame, x: number, y: number, width: number, height: number): Vec3 {
-  const px = ((2 * x - width) / height) * frame.half;
-  const py = ((height - 2 * y) / height) * frame.half;
+  const half = fitted(frame.half, width / height);
+  const px = ((2 * x - width) / height) * half;
+  const py = ((height - 2 * y) / height) * half;
   return normalize(add(add(scale(frame.right, px), scale(frame.up, py)), scale(frame.back, -1)));
 }
 
@@ -74,13 +81,14 @@ export function pixelRay(frame: Frame, x: number, y: number, width: number, heig
 export function sphereBounds(frame: Frame, center: Vec3, radius: number, aspect: number): [number, number, number, number] | null {
   const [x, y, z] = toView(frame, center);
   if (z - radius > -1e-3) return null;
-  const extent = (offset: number, half: number): [number, number] => {
+  const extent = (offset: number, edge: number): [number, number] => {
     const across = Math.atan2(offset, -z);
     const spread = Math.asin(Math.min(1, radius / Math.hypot(offset, z)));
     const limit = Math.PI / 2 - 1e-3;
-    return [Math.tan(Math.max(across - spread, -limit)) / half, Math.tan(Math.min(across + spread, limit)) / half];
+    return [Math.tan(Math.max(across - spread, -limit)) / edge, Math.tan(Math.min(across + spread, limit)) / edge];
   };
-  const [x0, x1] = extent(x, frame.half * aspect);
-  const [y0, y1] = extent(y, frame.half);
+  const half = fitted(frame.half, aspect);
+  const [x0, x1] = extent(x, half * aspect);
+  const [y0, y1] = extent(y, half);
   return x0 > 1 || x1 < -1 || y0 > 1 || y1 < -1 ? null : [Math.max(x0, -1), Math.max(y0, -1), Math.min(x1, 1), Math.min(y1, 1)];
 }

@@ -31,6 +31,7 @@ class Base<T> extends Controller {
     const tip = [field.symbol ? `${field.symbol} — ` : "", field.doc, field.unit ? ` [${field.unit}]` : "", "\nDouble click: back to the default."].join("");
     this.domElement.title = tip;
     if (field.symbol && field.symbol !== field.label) this.$name.append(" ", element("i", {}, field.symbol));
+    if (field.unit) this.$name.append(" ", element("small", {}, field.unit === "degrees" ? "°" : field.unit));
     this.domElement.addEventListener("dblclick", (event) => {
       if ((event.target as HTMLElement).matches("input[type=number], select, button")) return;
       field.set(field.initial());

@@ -34,8 +34,8 @@ export class Labels {
         wanted.push({ text: row.balls[ball]?.label ?? "", x: below[0], y: below[1], kind: "ball", pressed });
       }
       if (ball === 0) {
-        const above = toPixel(frame, [center[0] - 1, center[1] + 1, center[2]], width, height);
-        if (above) wanted.push({ text: `${String.fromCharCode(65 + slot)}  ${row.label}`, x: Math.max(10, above[0]), y: Math.max(50, above[1] - 4), kind: "rowname", color: app.slotColor(slot) });
+        const beside = toPixel(frame, [center[0] - 1.08, center[1], center[2]], width, height);
+        if (beside) wanted.push({ text: `${String.fromCharCode(65 + slot)}  ${row.label}`, x: Math.max(14, beside[0]), y: beside[1], kind: "rowname", color: app.slotColor(slot) });
       }
     }
     while (this.spans.length < wanted.length) {
@@ -52,7 +52,7 @@ export class Labels {
       if (span.textContent !== text) span.textContent = text;
       span.className = label.kind;
       span.toggleAttribute("data-selected", label.pressed ?? false);
-      span.style.transform = `translate(${Math.round(label.x)}px, ${Math.round(label.y)}px)`;
+      span.style.translate = `${Math.round(label.x)}px ${Math.round(label.y)}px`;
       span.style.setProperty("--slot", label.color ?? "");
     });
   }

@@ -89,8 +89,8 @@ export class LightSection {
         const [a, e] = [azimuth / DEGREES, elevation / DEGREES];
         Object.assign(l, { direction: [Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)] });
       };
-      new RangeControl(folder, field("azimuth", "Where the light stands, about the vertical; 0 is behind the camera.", (l) => angles(l)[0], (l, v) => point(l, v, angles(l)[1]), "degrees"), { low: -180, high: 180, hint: () => "°" });
-      new RangeControl(folder, field("elevation", "Height above the horizon.", (l) => angles(l)[1], (l, v) => point(l, angles(l)[0], Math.min(89.9, Math.max(-89.9, v))), "degrees"), { low: -90, high: 90, hint: () => "°" });
+      new RangeControl(folder, field("azimuth", "Where the light stands, about the vertical; 0 is behind the camera.", (l) => angles(l)[0], (l, v) => point(l, v, angles(l)[1]), "degrees"), { low: -180, high: 180 });
+      new RangeControl(folder, field("elevation", "Height above the horizon.", (l) => angles(l)[1], (l, v) => point(l, angles(l)[0], Math.min(89.9, Math.max(-89.9, v))), "degrees"), { low: -90, high: 90 });
       power("irradiance", "On a surface that faces the light, linear RGB.", "irradiance", "W/m²");
     } else if (light.type === "point") {
       vector("position", "World coordinates; a ball has radius 1.", "position");
@@ -112,7 +112,7 @@ export class LightSection {
       new TripleControl(folder, field("radiance", "The same from everywhere, linear RGB.", (l) => (l as { constant: number[] }).constant ?? [], (l, v) => Object.assign(l, { constant: v }), "W/(m² sr)"), { low: 0, high: null, color: false });
     new RangeControl(folder, field("scale", "Factor on its radiance.", (l) => (l as { scale: number }).scale, (l, v) => Object.assign(l, { scale: v })), { low: 0.01, high: 100, scale: "log", open: true });
     if (pictured) {
-      new RangeControl(folder, field("rotation", "About the vertical.", (l) => (l as { rotation: number }).rotation * DEGREES, (l, v) => Object.assign(l, { rotation: v / DEGREES }), "degrees"), { low: -180, high: 180, hint: () => "°" });
+      new RangeControl(folder, field("rotation", "About the vertical.", (l) => (l as { rotation: number }).rotation * DEGREES, (l, v) => Object.assign(l, { rotation: v / DEGREES }), "degrees"), { low: -180, high: 180 });
       new ChoiceControl(
         folder,
         {

@@ -180,7 +180,6 @@ export class ModelsSection {
       new RangeControl(gui, { ...field(name, (v) => (v as number) * degrees, (d) => d / degrees), unit: "degrees" }, {
         low: low * degrees,
         high: (parameter.high ?? Math.PI) * degrees,
-        hint: () => "degrees",
       });
     } else if (kind === "spectrum") {
       const triple = (v: Value) => (Array.isArray(v) ? (v as number[]) : [v as number, v as number, v as number]);
@@ -192,7 +191,7 @@ export class ModelsSection {
       // What spans decades gets a logarithm, what starts at 0 and has no end a square.
       const scale = low > 0 && high / low >= 100 ? "log" : open && low === 0 ? "square" : "linear";
       const scalar = (v: Value) => [v].flat()[0] as number;
-      new RangeControl(gui, field(name, scalar, (v) => v), { low, high, scale, open, ...(parameter.unit ? { hint: () => parameter.unit } : {}) });
+      new RangeControl(gui, field(name, scalar, (v) => v), { low, high, scale, open });
     }
   }
 }

@@ -79,7 +79,7 @@ export class ViewSection {
         { value: "environment", label: "environment" },
       ],
     );
-    new RangeControl(gui, { label: "Exposure", doc: "Doublings of the light before the tone curve.", unit: "stops", get: () => app.state.display.exposure, set: (v) => store.set("display.exposure", v), initial: () => store.initial.display.exposure }, { low: -8, high: 8, open: false, hint: () => "stops" });
+    new RangeControl(gui, { label: "Exposure", doc: "Doublings of the light before the tone curve.", unit: "stops", get: () => app.state.display.exposure, set: (v) => store.set("display.exposure", v), initial: () => store.initial.display.exposure }, { low: -8, high: 8, open: false });
     new ChoiceControl(
       gui,
       { label: "Tone curve", doc: "From radiance to the screen; sRGB comes after it.", get: () => app.state.display.tone, set: (tone) => store.set("display.tone", tone as State["display"]["tone"]), initial: () => store.initial.display.tone },
