@@ -15,7 +15,7 @@ from gonio.ops import backend
 SIDE = 256  # the target is SIDE x SIDE pixels, one draw each
 COUNT = SIDE * SIDE
 TIGHT = 1e-5  # relative error that is always allowed
-MOVES = 8  # times the change of the float64 value when every input moves by one float32
+MOVES = 8  # times the change of the float64 value when the inputs move by one float32, each at its worst
 DIM = 1e-6  # values below are not judged
 
 
@@ -31,15 +31,16 @@ class Draws(NamedTuple):
         """Everything side by side, as the shader reads it."""
         return np.concatenate([self.wo, self.wi, self.u, *self.fields.values()], axis=1).astype(np.float32)
 
-    def moved(self, rng: np.random.Generator) -> Draws:
-        """Every input one float32 up or down; what is 0 stays."""
-
-        def move(x: np.ndarray) -> np.ndarray:
-            step = np.nextafter(x, x + rng.choice(np.float32([-1.0, 1.0]), x.shape), dtype=np.float32)
-            return np.where(x == 0.0, x, step)
-
-        u = np.clip(move(self.u), 0.0, np.float32(0.99999994))
-        return Draws(move(self.wo), move(self.wi), u, {k: move(v) for k, v in self.fields.items()})
+    def moved(self, column: int) -> Draws:
+        """One input, by its place among `columns`, one float32 toward 0; what is 0 stays."""
+        columns = self.columns()
+        x = columns[:, column]
+        columns[:, column] = np.nextafter(x, np.float32(0.0))
+        fields, place = {}, 9
+        for path, rows in self.fields.items():
+            fields[path] = columns[:, place : place + rows.shape[1]]
+            place += rows.shape[1]
+        return Draws(columns[:, :3], columns[:, 3:6], columns[:, 6:9], fields)
 
 
 # ------------------------------------------------------------------ inputs
@@ -149,7 +150,7 @@ def _filled(bundle: Any, draws: Draws, assign: str, types: dict[str, str]) -> li
     by_path = {f["path"]: f for f in bundle.manifest["fields"]}
     for path, rows in draws.fields.items():
         n = rows.shape[1]
-        values = ", ".join(f"read({place + i})" for i in range(n))
+        values = ", ".join(f"given({place + i})" for i in range(n))
         field = by_path[path]
         lines.append(f"{assign}{field['name']} = {types[field['type']]}({values});")
         place += n
@@ -171,8 +172,8 @@ def glsl_program(bundle: Any, draws: Draws) -> str:
     if m["derived"]:
         lines.append(f"{m['derived']['struct']} derived = {f['derive']}(self);")
     lines += [
-        "vec3 wo = vec3(read(0), read(1), read(2)), wi = vec3(read(3), read(4), read(5));",
-        "vec3 u = vec3(read(6), read(7), read(8));",
+        "vec3 wo = vec3(given(0), given(1), given(2)), wi = vec3(given(3), given(4), given(5));",
+        "vec3 u = vec3(given(6), given(7), given(8));",
         f"o0 = vec4({f['eval']}(self{derived}, wo, wi), {f['pdf']}(self{derived}, wo, wi));",
         f"Sample s = {f['sample']}(self{derived}, wo, u);",
         "o1 = vec4(s.wi, s.pdf); o2 = vec4(s.weight, s.delta ? 1.0 : 0.0); o3 = vec4(s.eta, 0.0, 0.0, 0.0);",
@@ -190,7 +191,7 @@ def glsl_program(bundle: Any, draws: Draws) -> str:
     return f"""{GLSL_HEAD}{bundle.text}
 uniform sampler2D inputs;
 {outs}
-float read(int i) {{
+float given(int i) {{
     ivec2 at = ivec2(gl_FragCoord.xy);
     return texelFetch(inputs, ivec2(at.x * {width} + i / 4, at.y), 0)[i % 4];
 }}
@@ -275,6 +276,100 @@ def run_glsl(page: Any, bundle: Any, draws: Draws) -> dict[str, np.ndarray]:
     return unpack([np.frombuffer(base64.b64decode(x), "<f4").reshape(-1, 4) for x in found])
 
 
+def wgsl_program(bundle: Any, draws: Draws) -> str:
+    """A compute shader that answers one draw an invocation."""
+    m = bundle.manifest
+    width = draws.columns().shape[1]
+    f = m["functions"]
+    derived = ", derived" if m["derived"] else ""
+    types = {"float": "f32", "vec2": "vec2f", "vec3": "vec3f"}
+    lines = [f"var model: {m['struct']};", *_filled(bundle, draws, "model.", types)]
+    if m["derived"]:
+        lines.append(f"let derived = {f['derive']}(model);")
+    lines += [
+        "let wo = vec3f(given(0), given(1), given(2)); let wi = vec3f(given(3), given(4), given(5));",
+        "let u = vec3f(given(6), given(7), given(8));",
+        f"put(0, vec4f({f['eval']}(model{derived}, wo, wi), {f['pdf']}(model{derived}, wo, wi)));",
+        f"let s = {f['sample']}(model{derived}, wo, u);",
+        "put(1, vec4f(s.wi, s.pdf)); put(2, vec4f(s.weight, select(0.0, 1.0, s.delta)));",
+        "var o3 = vec4f(s.eta, 0.0, 0.0, 0.0); var o4 = vec4f(0.0); var o5 = vec4f(0.0);",
+    ]
+    if "terms" in f:
+        names = [t["name"] for t in m["terms"]]
+        lines.append(f"let t = {f['terms']}(model{derived}, wo, wi);")
+        if "D" in names:
+            lines.append("o3.y = t.D; o3.z = t.G; o4 = vec4f(t.F, 0.0);")
+        if "multi" in names:
+            lines.append("o5 = vec4f(t.multi, 0.0);")
+    lines.append("put(3, o3); put(4, o4); put(5, o5);")
+    body = "\n    ".join(lines)
+    count = len(draws.wo)
+    return f"""{bundle.text}
+@group(1) @binding(0) var<storage, read> inputs: array<f32>;
+@group(1) @binding(1) var<storage, read_write> outputs: array<vec4f>;
+var<private> place: u32;
+fn given(i: u32) -> f32 {{ return inputs[place * {width}u + i]; }}
+fn put(i: u32, value: vec4f) {{ outputs[i * {count}u + place] = value; }}
+@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {{
+    place = id.x;
+    {body}
+}}
+"""
+
+
+RUN_WGSL = """async ({text, inputs, count, textures}) => {
+  const floats = (s) => new Float32Array(Uint8Array.from(atob(s), c => c.charCodeAt(0)).buffer);
+  const adapter = await navigator.gpu.requestAdapter();
+  const device = await adapter.requestDevice();
+  const errors = [];
+  device.addEventListener('uncapturederror', (e) => errors.push(e.error.message));
+  const module = device.createShaderModule({code: text});
+  const info = await module.getCompilationInfo();
+  const bad = info.messages.filter(m => m.type === 'error').map(m => `${m.lineNum}: ${m.message}`);
+  if (bad.length) throw new Error(bad.join('\\n'));
+  const pipeline = await device.createComputePipelineAsync({layout: 'auto', compute: {module, entryPoint: 'main'}});
+  const data = floats(inputs);
+  const input = device.createBuffer({size: data.byteLength, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST});
+  device.queue.writeBuffer(input, 0, data);
+  const size = count * 6 * 16;
+  const output = device.createBuffer({size, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_SRC});
+  const back = device.createBuffer({size, usage: GPUBufferUsage.MAP_READ | GPUBufferUsage.COPY_DST});
+  const entries = textures.map((t) => {
+    const format = {1: 'r32float', 2: 'rg32float', 4: 'rgba32float'}[t.channels];
+    const texture = device.createTexture({size: t.size, dimension: `${t.dimension}d`, format,
+      usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST});
+    device.queue.writeTexture({texture}, floats(t.data),
+      {bytesPerRow: t.size[0] * t.channels * 4, rowsPerImage: t.size[1]}, t.size);
+    return {binding: t.binding, resource: texture.createView()};
+  });
+  const encoder = device.createCommandEncoder();
+  const pass = encoder.beginComputePass();
+  pass.setPipeline(pipeline);
+  if (entries.length) pass.setBindGroup(0, device.createBindGroup({layout: pipeline.getBindGroupLayout(0), entries}));
+  pass.setBindGroup(1, device.createBindGroup({layout: pipeline.getBindGroupLayout(1), entries: [
+    {binding: 0, resource: {buffer: input}}, {binding: 1, resource: {buffer: output}}]}));
+  pass.dispatchWorkgroups(count / 64);
+  pass.end();
+  encoder.copyBufferToBuffer(output, 0, back, 0, size);
+  device.queue.submit([encoder.finish()]);
+  await back.mapAsync(GPUMapMode.READ);
+  const bytes = new Uint8Array(back.getMappedRange().slice(0));
+  let s = '';
+  for (let j = 0; j < bytes.length; j += 32768) s += String.fromCharCode(...bytes.subarray(j, j + 32768));
+  if (errors.length) throw new Error(errors.join('\\n'));
+  device.destroy();
+  return btoa(s);
+}"""
+
+
+def run_wgsl(page: Any, bundle: Any, draws: Draws) -> dict[str, np.ndarray]:
+    """As `run_glsl`, in WebGPU."""
+    textures = [{**t, "data": pack(bundle.tables[t["uniform"]])} for t in bundle.manifest["textures"]]
+    given = {"text": wgsl_program(bundle, draws), "inputs": pack(draws.columns()), "count": len(draws.wo)}
+    found = page.evaluate(RUN_WGSL, {**given, "textures": textures})
+    return unpack(list(np.frombuffer(base64.b64decode(found), "<f4").reshape(6, -1, 4)))
+
+
 def unpack(o: list[np.ndarray]) -> dict[str, np.ndarray]:
     """The six targets by name."""
     return {
@@ -295,44 +390,75 @@ def unpack(o: list[np.ndarray]) -> dict[str, np.ndarray]:
 # ------------------------------------------------------------------ the verdict
 
 
-def expected(model: go.BSDF, draws: Draws, terms: list[str]) -> dict[str, np.ndarray]:
-    """float64 by the same names."""
+def expected(model: go.BSDF, draws: Draws, chosen: np.ndarray, terms: list[str]) -> dict[str, np.ndarray]:
+    """float64 by the same names.
+
+    chosen  the directions that the shader sampled. Its pdf and weight are right where they are those of u, or where
+            they are pdf and eval / pdf at its own direction ("there"): where a lobe is narrow, or a pair grazes, the
+            rounding of the direction alone moves both
+    """
     found = {"eval": reference(model, draws, "eval")[0], "pdf": reference(model, draws, "pdf")[0]}
     for name, value in zip(go.Sample._fields, reference(model, draws, "sample"), strict=True):
         found[f"sample.{name}"] = value.astype(float)
+    if model.delta != "always":
+        there = draws._replace(wi=chosen)
+        density = reference(model, there, "pdf")[0]
+        found["there.pdf"] = density
+        found["there.weight"] = reference(model, there, "eval")[0] / np.where(density > 0, density, 1.0)[:, None]
     if terms:
         for name, value in zip(terms, reference(model, draws, "terms"), strict=True):
             found[f"terms.{name}"] = value
     return found
 
 
-def excess(model: go.BSDF, draws: Draws, got: dict[str, np.ndarray], terms: list[str], seed: int = 0) -> dict[str, Any]:
-    """By name: (worst error over what is allowed, the draw where, what was got, what is right)."""
-    right = expected(model, draws, terms)
-    rng = np.random.default_rng(seed)
+class Verdict(NamedTuple):
+    """The worst of one result: error over what is allowed, share of draws over it, and the draw."""
+
+    ratio: float
+    share: float
+    draw: int
+    got: Any
+    right: Any
+
+
+def judge(model: go.BSDF, draws: Draws, got: dict[str, np.ndarray], terms: list[str]) -> dict[str, Verdict]:
+    """A verdict for each result."""
+    chosen = np.where(np.isfinite(got["sample.wi"]), got["sample.wi"], 0.0).astype(np.float32)
+    right = expected(model, draws, chosen, terms)
     change = {name: np.zeros(value.shape) for name, value in right.items()}
-    for _ in range(MOVES):
-        near = expected(model, draws.moved(rng), terms)
+    for column in range(draws.columns().shape[1]):
+        near = expected(model, draws.moved(column), chosen, terms)
         for name in right:
-            change[name] = np.maximum(change[name], np.abs(near[name] - right[name]))
-    verdict = {}
-    for name, value in right.items():
-        if name not in got:
+            change[name] += np.abs(near[name] - right[name])
+    if model.delta != "always":  # what moves the sampled direction itself moves these
+        for column in range(3, 6):
+            near = expected(model, draws, draws._replace(wi=chosen).moved(column).wi, terms)
+            for name in ("there.pdf", "there.weight"):
+                change[name] += np.abs(near[name] - right[name])
+    verdicts, ratios = {}, {}
+    for name, value in sorted(right.items(), reverse=True):  # "there" before "sample"
+        if name.replace("there", "sample") not in got:
             continue
-        mine = np.asarray(got[name], float)
+        mine = np.asarray(got[name.replace("there", "sample")], float)
         size = np.abs(value)
         if name == "sample.wi":  # a vector is measured by its length
             size = np.linalg.norm(value, axis=1, keepdims=True) + 0 * value
-        allowed = np.maximum(TIGHT * size, MOVES * change[name])
         error = np.abs(mine - value)
         error[np.isnan(error)] = np.inf
+        allowed = np.maximum(TIGHT * size, MOVES * change[name])
         ratio = np.where(size > DIM, error / np.maximum(allowed, 1e-300), np.where(error > DIM, np.inf, 0.0))
         if name.startswith("sample.") and name != "sample.pdf":  # a failed sample has no direction
             failed = (right["sample.pdf"] <= DIM) & (np.asarray(got["sample.pdf"]) <= DIM)
             ratio[failed] = 0.0
+        ratios[name] = ratio
+        if name.startswith("there"):
+            continue
+        there_name = name.replace("sample", "there")
+        if there_name != name and there_name in ratios:
+            ratio = np.minimum(ratio, ratios[there_name])
         worst = int(np.argmax(ratio.max(axis=1) if ratio.ndim == 2 else ratio))
-        verdict[name] = (float(ratio.max()), worst, mine[worst], value[worst], float((ratio > 1).mean()))
-    return verdict
+        verdicts[name] = Verdict(float(ratio.max()), float((ratio > 1).mean()), worst, mine[worst], value[worst])
+    return verdicts
 
 
-__all__ = ["COUNT", "Draws", "Program", "draw", "excess", "json", "reference", "run_glsl"]
+__all__ = ["COUNT", "Draws", "Program", "draw", "judge", "json", "reference", "run_glsl"]

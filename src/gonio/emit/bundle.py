@@ -15,13 +15,15 @@ import numpy as np
 from ..errors import InputError, MachineError, did_you_mean
 from ..models import BSDF
 from . import program as programs
-from .dialect import Dialect, axes, groups, literal, pixels, width
+from .dialect import Dialect, axes, literal, pixels, reader, width
 from .glsl import GLSL
+from .hlsl import HLSL
 from .program import Program
 from .simplify import Record
-from .writer import Writer, comment, wrap
+from .wgsl import WGSL
+from .writer import Writer, comment
 
-DIALECTS: dict[str, Dialect] = {d.name: d for d in (GLSL,)}
+DIALECTS: dict[str, Dialect] = {d.name: d for d in (GLSL, WGSL, HLSL)}
 
 SYMBOLS = {"alpha": "α", "eta": "η", "sigma": "σ", "albedo": "ρ", "rotation": "φ", "weight": "w"}
 
@@ -94,8 +96,6 @@ def _text(made: Program, dialect: Dialect) -> str:
     writer = Writer(made, dialect)
     bodies = [writer.routine(routine) for routine in made.routines]
     parts: list[list[str]] = [_head(made)]
-    if dialect.prelude:
-        parts.append(dialect.prelude.strip().splitlines())
     constants = []
     for name, (value, about) in writer.constants.items():
         line = dialect.constant(name, literal(value))
@@ -111,8 +111,8 @@ def _text(made: Program, dialect: Dialect) -> str:
         uniform = f"table_{table.name}"
         size = " x ".join(map(str, table.shape))
         about = f"// {size} texels, {table.channels} channel{'s' * (table.channels > 1)}; linear between texel centres, held outside."
-        lookup = dialect.lookup(f"lookup_{table.name}", uniform, width(table), groups(table), table.shape)
-        parts.append([*dialect.binding(uniform, 3 if len(axes(table)) == 3 else 2, place), "", about, *lookup])
+        binding = dialect.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
+        parts.append([*binding, "", about, *reader(dialect, table)])
     parts += [body for body in bodies if body]
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 
@@ -201,8 +201,9 @@ def _manifest(made: Program, dialect: Dialect) -> dict[str, Any]:
                 "size": list(axes(table)),
                 "channels": width(table),
                 "file": f"{table.name}.f32",
+                "binding": place,
             }
-            for table in made.tables
+            for place, table in enumerate(made.tables)
         ],
         "transmits": bool(model.transmits),
         "delta": model.delta,

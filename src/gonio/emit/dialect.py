@@ -8,8 +8,7 @@ reserved    names that the language keeps for itself
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,11 +41,13 @@ class Dialect:
     types, words     see the module
     compare          operation -> template of a comparison of vectors; absent where the operators serve
     choice           templates of `where`: of a plain mask, and of a mask of each component
+    spread           template of a float, {1}, spread over a vector type, {0}
     splat            whether min, max, where and comparisons want floats spread to vectors
     overloads        whether functions of one name may differ in their types
     struct_literal   whether `Name(a, b)` makes a struct inside an expression
-    signature, local, constant, struct, table
-                     how a function's head, a local value, a constant, a struct and a table's reader are written
+    signature, local, constant, struct, binding, fetch, mix
+                     how a function's head, a local value, a constant, a struct, a table's declaration, one of its
+                     texels and a value between two are written
     """
 
     name: str
@@ -55,18 +56,18 @@ class Dialect:
     words: dict[str, str]
     compare: dict[str, str]
     choice: tuple[str, str]
+    spread: str
     splat: bool
     overloads: bool
     struct_literal: bool
     reserved: frozenset[str]
     signature: Callable[[str, str, list[tuple[str, str]]], str]
-    local: Callable[[str, str, str, bool], str]
+    local: Callable[[str, str, str], str]
     constant: Callable[[str, str], str]
     struct: Callable[[str, list[tuple[str, str]]], list[str]]
     binding: Callable[[str, int, int], list[str]]
-    lookup: Callable[[str, str, int, int, tuple[int, ...]], list[str]]
-    prelude: str = ""
-    more: dict[str, Any] = field(default_factory=dict)
+    fetch: Callable[[str, list[str]], str]
+    mix: str
 
     def type(self, name: str) -> str:
         return self.types.get(name, name)
@@ -131,3 +132,46 @@ def pixels(table: Table) -> np.ndarray:
     padded[..., : table.channels] = table.values
     split = padded.reshape(*table.shape, groups(table), width(table))
     return np.ascontiguousarray(np.moveaxis(split, -2, 0), dtype=np.float32).reshape(*reversed(axes(table)), -1)
+
+
+def reader(dialect: Dialect, table: Table) -> list[str]:
+    """The function that reads a table: linear in each axis between texel centres, held outside (`gonio.ops.table`).
+
+    A shader's own filtering would not do: its weights have eight bits.
+    """
+    names = list("xyz"[: len(table.shape)])  # in the order of a lookup, slowest axis first
+    sizes = dict(zip(names, table.shape, strict=True))
+    many = groups(table) > 1
+    channels = width(table)
+    real, whole = dialect.type("float"), dialect.type("int")
+    result = real if channels == 1 else dialect.type(f"vec{channels}")
+    parameters = [(real, name) for name in names] + [(whole, "group")] * many
+    lines = [dialect.signature(result, f"lookup_{table.name}", parameters)]
+    for axis, count in sizes.items():
+        at, cell = f"at_{axis}", f"{axis}0"
+        for type_, name, text in (
+            (real, at, f"clamp({axis} * {count}.0 - 0.5, 0.0, {count - 1}.0)"),
+            (whole, cell, f"min({whole}({at}), {max(count - 2, 0)})"),
+            (real, f"t_{axis}", f"{at} - {real}({cell})"),
+        ):
+            lines.append("    " + dialect.local(type_, name, text))
+
+    def texel(steps: dict[str, int]) -> str:
+        places = [f"{axis}0" + (" + 1" if steps[axis] and sizes[axis] > 1 else "") for axis in reversed(names)]
+        if many and len(places) == 3:
+            places[2] = f"group * {sizes[names[0]]} + {places[2]}"
+        elif many:
+            places.append("group")
+        elif len(places) == 1:
+            places.append("0")
+        return dialect.fetch(f"table_{table.name}", places) + {1: ".r", 2: ".rg", 4: ""}[channels]
+
+    def between(rest: list[str], steps: dict[str, int], indent: str) -> str:
+        if not rest:
+            return indent + texel(steps)
+        axis, *others = rest
+        low, high = (between(others, {**steps, axis: step}, indent + "    ") for step in (0, 1))
+        return f"{indent}{dialect.mix}(\n{low},\n{high},\n{indent}    t_{axis})"
+
+    body = between(names, {}, "    ").strip()
+    return [*lines, *f"    return {body};".splitlines(), "}"]

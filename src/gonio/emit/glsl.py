@@ -18,7 +18,9 @@ WORDS = {
     "atan2": "atan({0}, {1})",
     "floor": "floor({0})",
     "dot": "dot({0}, {1})",
-    "any": "any({0})",
+    "integer": "int({0})",
+    "exponent": "float((floatBitsToInt({0}) >> 23) - 127)",
+    "scaled": "{0} * intBitsToFloat((int({1}) + 127) << 23)",
 }
 
 COMPARE = {
@@ -48,7 +50,7 @@ def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str
     return f"{result} {name}({', '.join(f'{type_} {p}' for type_, p in parameters)}) {{"
 
 
-def _local(type_: str, name: str, text: str, changes: bool) -> str:
+def _local(type_: str, name: str, text: str) -> str:
     return f"{type_} {name} = {text};"
 
 
@@ -64,41 +66,8 @@ def _binding(name: str, dimension: int, place: int) -> list[str]:
     return [f"uniform highp sampler{dimension}D {name};"]
 
 
-def _lookup(name: str, table: str, channels: int, groups: int, shape: tuple[int, ...]) -> list[str]:
-    """A reader of a table: linear in each axis between texel centres."""
-    type_, swizzle = {1: ("float", ".r"), 2: ("vec2", ".rg"), 4: ("vec4", "")}[channels]
-    arguments = (
-        ["float " + axis for axis in "xyz"[-len(shape) :]] if len(shape) < 3 else ["float x", "float y", "float z"]
-    )
-    names = [a.split()[1] for a in arguments]
-    many = groups > 1
-    head = f"{type_} {name}({', '.join(arguments + ['int group'] * many)}) {{"
-    lines = [head]
-    for axis, count in zip(names, shape, strict=True):
-        lines.append(f"    float at_{axis} = clamp({axis} * {count}.0 - 0.5, 0.0, {count - 1}.0);")
-        lines.append(f"    int {axis}0 = min(int(at_{axis}), {max(count - 2, 0)});")
-        lines.append(f"    float t_{axis} = at_{axis} - float({axis}0);")
-
-    def texel(steps: dict[str, int]) -> str:
-        where = [f"{axis}0" + (" + 1" if steps[axis] and shape[names.index(axis)] > 1 else "") for axis in names]
-        where.reverse()
-        if many and len(shape) == 3:
-            where[2] = f"group * {shape[0]} + {where[2]}"
-        elif many:
-            where.append("group")
-        elif len(where) == 1:
-            where.append("0")
-        return f"texelFetch({table}, ivec{len(where)}({', '.join(where)}), 0){swizzle}"
-
-    def between(rest: list[str], steps: dict[str, int], indent: str) -> str:
-        if not rest:
-            return indent + texel(steps)
-        axis, *others = rest
-        low, high = (between(others, {**steps, axis: s}, indent + "    ") for s in (0, 1))
-        return f"{indent}mix(\n{low},\n{high},\n{indent}    t_{axis})"
-
-    text = between(names, {}, "    ").strip()
-    return [*lines, *f"    return {text};".splitlines(), "}"]
+def _fetch(table: str, places: list[str]) -> str:
+    return f"texelFetch({table}, ivec{len(places)}({', '.join(places)}), 0)"
 
 
 GLSL = Dialect(
@@ -108,6 +77,7 @@ GLSL = Dialect(
     words=WORDS,
     compare=COMPARE,
     choice=("{0} ? {1} : {2}", "mix({2}, {1}, {0})"),
+    spread="{0}({1})",
     splat=True,
     overloads=True,
     struct_literal=True,
@@ -117,5 +87,6 @@ GLSL = Dialect(
     constant=_constant,
     struct=_struct,
     binding=_binding,
-    lookup=_lookup,
+    fetch=_fetch,
+    mix="mix",
 )

@@ -275,6 +275,8 @@ class _Simplifier:
             return whole(a)
         if op == "sub" and is_number(a, 0.0) and b.type == type_:
             return self.build("neg", (b,), type_)
+        if op == "add" and b.op == "constant" and b.static < 0.0 and not b.name:
+            return self.build("sub", (a, self.constant(-b.static, b.type)), type_)
         if op == "add" and b.op == "neg":
             return self.build("sub", (a, b.args[0]), type_)
         if op == "sub" and b.op == "neg":

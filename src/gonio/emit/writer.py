@@ -227,7 +227,7 @@ class _RoutineWriter:
         text = self.whole(value, defining=True)
         name = self.fresh(self._name_for(value))
         type_ = self.writer.note(value.type)
-        self.lines += wrap(self.dialect.local(type_, name, text, False), INDENT)
+        self.lines += wrap(self.dialect.local(type_, name, text), INDENT)
         self.locals[value.order] = name
 
     def _name_for(self, value: Value) -> str:
@@ -272,7 +272,7 @@ class _RoutineWriter:
         text, level = self.compose(value)
         if not root and len(text) > INLINE and value.op not in ("parameter", "constant", "component", "element"):
             name = self.fresh(self._name_for(value))
-            self.lines += wrap(self.dialect.local(self.writer.note(value.type), name, text, False), INDENT)
+            self.lines += wrap(self.dialect.local(self.writer.note(value.type), name, text), INDENT)
             self.locals[value.order] = name
             return name, ATOM
         return text, level
@@ -289,7 +289,7 @@ class _RoutineWriter:
             field = value.args[0].static.record.fields[value.static][0]
             return f"{self.part(args[0], ATOM)}.{self.dialect.word(field)}", ATOM
         if op == "splat":
-            return self.splat(args[0], value.type), ATOM
+            return self.splat(args[0], value.type), SIGN
         if op == "vector":
             parts = [self.whole_or_local(a) for a in args]
             return f"{self.dialect.type(value.type)}({', '.join(parts)})", ATOM
@@ -353,8 +353,13 @@ class _RoutineWriter:
         if value.type == type_ or value.type not in ("float",) or not type_.startswith("vec"):
             return self.part(value, level)
         if value.op == "constant":
-            return f"{self.dialect.type(type_)}({self.constant(value)[0]})"
-        return f"{self.dialect.type(type_)}({self.whole_or_local(value)})"
+            return self.spread(type_, self.constant(value))
+        return self.spread(type_, self.expression(value))
+
+    def spread(self, type_: str, text: tuple[str, int]) -> str:
+        """A float spread over a vector."""
+        inside = text[0] if "({1})" in self.dialect.spread or text[1] == ATOM else f"({text[0]})"
+        return self.dialect.spread.format(self.dialect.type(type_), inside)
 
     def constant(self, value: Value) -> tuple[str, int]:
         if value.type in ("bool",) or value.type.startswith("bvec"):
@@ -362,7 +367,7 @@ class _RoutineWriter:
             return (text if value.type == "bool" else f"{self.dialect.type(value.type)}({text})"), ATOM
         text = self.writer.number(value)
         if value.type != "float":
-            return f"{self.dialect.type(value.type)}({text})", ATOM
+            return self.spread(value.type, (text, SIGN if text.startswith("-") else ATOM)), SIGN
         return text, SIGN if text.startswith("-") else ATOM
 
     def texel(self, value: Value) -> str:
@@ -419,13 +424,13 @@ class _RoutineWriter:
             if given is not None and (used or given.order in self.parameter_names):
                 parts.append(self.splat(given, type_))
             else:  # nobody reads it
-                parts.append("0.0" if type_ == "float" else f"{self.dialect.type(type_)}(0.0)")
+                parts.append("0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM)))
         key = (name, tuple(parts))
         if key not in self.built:
-            local = self.fresh(name[0].lower() + name[1:])
+            local = self.fresh(_common(parts) or name[0].lower() + name[1:])
             type_name = self.writer.note(struct.record)
             if self.dialect.struct_literal:
-                line = self.dialect.local(type_name, local, f"{type_name}({', '.join(parts)})", False)
+                line = self.dialect.local(type_name, local, f"{type_name}({', '.join(parts)})")
             else:
                 line = f"{type_name} {local} = {{ {', '.join(parts)} }};"
             self.lines += wrap(line, INDENT)
@@ -440,6 +445,13 @@ class _RoutineWriter:
         if struct is not None and struct.record.name in self.objects and path in struct.paths:
             own = self.objects[struct.record.name][1]
             self.parameter_names[parameter.order] = f"{own}.{self.dialect.word(flat(path))}"
+
+
+def _common(parts: list[str]) -> str:
+    """The inner material whose fields these are: "base" for self.base_eta, self.base_k, ..."""
+    paths = [part.partition(".")[2] for part in parts if "." in part and "(" not in part]
+    heads = {path.partition("_")[0] for path in paths if "_" in path}
+    return heads.pop() if len(heads) == 1 and len(paths) == len(parts) and all("_" in p for p in paths) else ""
 
 
 def stem_of(routine: Routine) -> str:

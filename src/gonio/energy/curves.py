@@ -7,9 +7,15 @@ variable makes one possible. Masking changes where mu is a few alpha, so with
     s(mu) = sqrt(mu / (mu + 4 alpha))        (GGX with Smith's masking; for others see `form_of`)
     x(mu) = 2 s(mu) / s(1) - 1  in [-1, 1]
 
-M is a smooth function of x whatever the width, down to a limit at alpha -> 0. Rows of a table hold the coefficients in
-x at equal steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial
-itself, so that what the table has, energy has exactly. Anisotropic widths add two axes, see `anisotropic`.
+M is a smooth function of x whatever the width, down to a limit at alpha -> 0. It all but vanishes at both ends, toward
+the normal like a square, and the terms of a plain polynomial would take its digits with them in float32. So it is kept
+as
+
+    M = (1 - z) (a + z (c + z Q(x))) + z^2 b,   z = (1 - x) / 2,
+
+with z and 1 - z found without cancellation (`descent`). Rows of a table hold a, c, b and the coefficients of Q at equal
+steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial itself, so that what the table has,
+energy has exactly. Anisotropic widths add two axes, see `anisotropic`.
 """
 
 from __future__ import annotations
@@ -56,12 +62,22 @@ def knee(form: str, masking: str, alpha: Any) -> Any:
     return alpha * (factor / 2.0)
 
 
-def squeeze(form: str, mu: Any, bend: Any) -> Any:
-    """s(mu)."""
+def descent(form: str, mu: Any, bend: Any) -> tuple[Any, Any]:
+    """(z, 1 - z), z = 1 - s(mu) / s(1): 0 at the normal, 1 at grazing. Each is a quotient of sums without differences."""
     if form == "hypot":
-        return sqrt(mu / sqrt(sqr(mu) + sqr(bend)))
-    ratio = mu / (mu + bend)
-    return ratio if form == "ratio" else sqrt(ratio)
+        bend2 = sqr(bend)
+        far, near = sqrt(sqr(mu) + bend2), mu * sqrt(1.0 + bend2)
+        middle = sqrt(far * near)
+        product = (far + near) * (far + middle)
+        over = 1.0 / (product * far)
+        return bend2 * ((1.0 - mu) * (1.0 + mu)) * far * over, middle * product * over
+    below, above = mu + bend, mu * (1.0 + bend)
+    if form == "ratio":
+        over = 1.0 / below
+        return bend * (1.0 - mu) * over, above * over
+    root = sqrt(below * above)
+    over = 1.0 / (below + root)
+    return bend * (1.0 - mu) * over, (above + root) * over
 
 
 def numpy_knee(form: str, masking: str, alpha: np.ndarray) -> np.ndarray:
@@ -80,7 +96,7 @@ def unsqueeze(form: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
 
 
 def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -> np.ndarray:
-    """Coefficients in x, lowest power first, of M at each bend: nearly minimax, by reweighted least squares.
+    """a, c, b and the coefficients of Q, lowest power first, of M at each bend: nearly minimax, by reweighted least squares.
 
     missing  a function of mu (rows, nodes) to M
     Returns (rows, CHANNELS); the last channel is M_avg, of the polynomial where that is not negative.
@@ -100,7 +116,15 @@ def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) ->
             error = np.abs(basis @ found - target)
             error = error * start
             weight *= np.sqrt(error / max(error.max(), 1e-300) + 0.02)
-        rows.append(np.polynomial.chebyshev.cheb2poly(found))
+        powers = np.zeros(DEGREE + 1)
+        plain = np.polynomial.chebyshev.cheb2poly(found)
+        powers[: len(plain)] = plain
+        # M = (1 - z) a + z b + z (1 - z) P, with z (1 - z) = (1 - x^2) / 4; the rest of the division is what is linear
+        p, rest = np.polynomial.polynomial.polydiv(powers, [0.25, 0.0, -0.25])
+        a, b = rest[0] + rest[1], rest[0] - rest[1]
+        q, at_normal = np.polynomial.polynomial.polydiv(p, [0.5, -0.5])  # P = P(1) + z Q
+        # at grazing the fit may end a little below 0, which no M is
+        rows.append(np.concatenate([[a, at_normal[0] + b, max(b, 0.0)], q]))
     coefficients = np.zeros((len(bend), DEGREE + 1))
     for row, found in zip(coefficients, rows, strict=True):
         row[: len(found)] = found
@@ -111,11 +135,13 @@ def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) ->
 
 def evaluate(form: str, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """M of rows of coefficients at mu (rows, nodes), as `missing` computes it."""
-    x = 2.0 * numpy_squeeze(form, mu, bend[:, None]) / numpy_squeeze(form, np.ones(1), bend[:, None]) - 1.0
-    total = np.zeros(np.broadcast_shapes(x.shape, (len(bend), 1)))
-    for power in range(DEGREE, -1, -1):
-        total = total * x + coefficients[:, power, None]
-    return np.maximum(total, 0.0)
+    rise = numpy_squeeze(form, mu, bend[:, None]) / numpy_squeeze(form, np.ones(1), bend[:, None])
+    fall = 1.0 - rise
+    total = np.zeros(np.broadcast_shapes(rise.shape, (len(bend), 1)))
+    for place in range(DEGREE, 2, -1):
+        total = total * (rise - fall) + coefficients[:, place, None]
+    a, c, b = (coefficients[:, place, None] for place in range(3))
+    return np.maximum((a + fall * (c + fall * total)) * rise + fall**2 * b, 0.0)
 
 
 @lru_cache
@@ -158,7 +184,8 @@ def anisotropic(ndf: str, masking: str) -> Table:
 
     About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from
     the axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 +
-    alpha_min^2 sin^2. Channel k HARMONICS + j holds the coefficient of x^k y^j.
+    alpha_min^2 sin^2. Channel k HARMONICS + j holds the coefficient of y^j in the k-th
+    number of a row.
     """
 
     def build() -> np.ndarray:
@@ -265,17 +292,20 @@ def _inverse(form: str, rows: np.ndarray, bend: np.ndarray, count: int) -> np.nd
 
 
 def coefficients(ndf: str, masking: str, alpha: Any) -> tuple[Any, ...]:
-    """The polynomial's coefficients, lowest power first, and M_avg, at an isotropic width."""
+    """a, c, b, the coefficients of Q, lowest power first, and M_avg, at an isotropic width."""
     return ops.lookup(isotropic(ndf, masking), ops.inset(sqrt(alpha), ROWS))
 
 
-def missing(form: str, found: tuple[Any, ...], bend: Any, top: Any, mu: Any) -> Any:
+def missing(form: str, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
     """M(mu), at least 0.
 
-    found  from `coefficients`;  bend, top  `knee` at this width, and 2 / s(1)
+    found  from `coefficients`;  bend  `knee` at this width
     """
-    x = ops.fma(squeeze(form, mu, bend), top, -1.0)
+    fall, rise = descent(form, mu, bend)
+    x = rise - fall
     total = found[DEGREE]
-    for power in range(DEGREE - 1, -1, -1):
-        total = ops.fma(total, x, found[power])
-    return ops.maximum(total, 0.0)
+    for place in range(DEGREE - 1, 2, -1):
+        total = ops.fma(total, x, found[place])
+    a, c, b = found[:3]
+    total = ops.fma(ops.fma(total, fall, c), fall, a)
+    return ops.maximum(ops.fma(total, rise, b * sqr(fall)), 0.0)

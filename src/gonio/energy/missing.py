@@ -109,7 +109,6 @@ class Metal:
         return {
             "missing": found[:-1],
             "bend": bend,
-            "top": 2.0 / curves.squeeze(form, 1.0 + 0.0 * width, bend),
             "scale": _scale(lobe_average),
             "added": added * _scale(average),
             "ratio": safe_div(mean(added), maximum(mean(f_avg * albedo), 1e-6)),
@@ -122,7 +121,7 @@ class Metal:
     def _isotropic(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction above the surface, of the mean of the widths."""
         form = curves.form_of(material.base.ndf, material.base.masking)
-        return curves.missing(form, found["missing"], found["bend"], found["top"], maximum(w.z, 1e-6))
+        return curves.missing(form, found["missing"], found["bend"], maximum(w.z, 1e-6))
 
     @staticmethod
     @function
@@ -147,8 +146,7 @@ class Metal:
             rows.append(value)
         form = curves.form_of(base.ndf, base.masking)
         bend = curves.knee(form, base.masking, seen)
-        top = 2.0 / curves.squeeze(form, 1.0 + 0.0 * bend, bend)
-        return curves.missing(form, tuple(rows), bend, top, maximum(w.z, 1e-6))
+        return curves.missing(form, tuple(rows), bend, maximum(w.z, 1e-6))
 
     @staticmethod
     @function
@@ -250,16 +248,11 @@ class Glass:
             side: curves.knee(curves.form_of(base.ndf, base.masking, side), base.masking, width)
             for side in curves.SIDES
         }
-        tops = {
-            side: 2.0 / curves.squeeze(curves.form_of(base.ndf, base.masking, side), 1.0 + 0.0 * width, bend)
-            for side, bend in bends.items()
-        }
         tint = _bounces(getattr(material, "color", "bounce"), base.albedo, 1.0 - 0.5 * (m_thin + m_dense))
         return {
             "thin": thin[:-1],
             "dense": dense[:-1],
             "bends": bends,
-            "tops": tops,
             "scale_thin": where(some, ops.inv_pi / maximum(m_thin, NOTHING), 0.0),
             "scale_dense": where(some, ops.inv_pi / maximum(m_dense, NOTHING), 0.0),
             "through_thin": enters * m_dense / total,
@@ -284,7 +277,7 @@ class Glass:
         sides = []
         for side in curves.SIDES:
             form = curves.form_of(material.base.ndf, material.base.masking, side)
-            sides.append(curves.missing(form, found[side], found["bends"][side], found["tops"][side], mu))
+            sides.append(curves.missing(form, found[side], found["bends"][side], mu))
         return where(thin, *sides)
 
     @staticmethod

@@ -50,7 +50,7 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     """Exact reflectance of a conductor with complex index eta + i k (Born1999, ch. 14).
 
     With n = eta + i k, sin^2 = s, cos^2 = c and w = a + i b = sqrt(n^2 - s):  t = eta^2 - k^2 - s,
-    a^2 + b^2 = sqrt(t^2 + 4 eta^2 k^2),  a^2 = (a^2 + b^2 + t) / 2,
+    a^2 + b^2 = sqrt(t^2 + 4 eta^2 k^2),  a b = eta k,  max(a^2, b^2) = (a^2 + b^2 + |t|) / 2: the other would cancel,
     R_s = |cos - w|^2 / |cos + w|^2 = |n^2 - 1|^2 / |cos + w|^4, as cos^2 - w^2 = 1 - n^2: nothing cancels,
     R_p / R_s = (c (a^2 + b^2) + s^2 - 2 a cos s) / (c (a^2 + b^2) + s^2 + 2 a cos s).
     """
@@ -58,7 +58,8 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     sin2 = 1.0 - cos2
     t = sqr(eta) - sqr(k) - sin2
     a2_b2 = sqrt(sqr(t) + 4.0 * sqr(eta * k))
-    a = safe_sqrt(0.5 * (a2_b2 + t))
+    larger = ops.maximum(0.5 * (a2_b2 + ops.abs(t)), 1e-30)
+    a = ops.rsqrt(larger) * ops.where(t > 0.0, larger, eta * k)
     sum2 = a2_b2 + cos2 + 2.0 * cos_i * a
     contrast = (sqr(eta - 1.0) + sqr(k)) * (sqr(eta + 1.0) + sqr(k))
     p1 = cos2 * a2_b2 + sqr(sin2)

@@ -1,0 +1,86 @@
+"""HLSL 2021, shader model 6."""
+
+from __future__ import annotations
+
+from .dialect import Dialect
+from .glsl import WORDS as GLSL_WORDS
+
+TYPES = {
+    "vec2": "float2",
+    "vec3": "float3",
+    "vec4": "float4",
+    "bvec2": "bool2",
+    "bvec3": "bool3",
+}
+
+WORDS = {
+    **GLSL_WORDS,
+    "atan2": "atan2({0}, {1})",
+    "exponent": "float((asint({0}) >> 23) - 127)",
+    "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
+}
+
+RESERVED = frozenset(
+    """AppendStructuredBuffer asm asm_fragment BlendState bool break Buffer ByteAddressBuffer case cbuffer centroid class
+    column_major compile compile_fragment CompileShader const continue ComputeShader ConsumeStructuredBuffer default
+    DepthStencilState DepthStencilView discard do double DomainShader dword else export extern false float for fxgroup
+    GeometryShader groupshared half Hullshader if in inline inout InputPatch int interface line lineadj linear
+    LineStream matrix min16float min10float min16int min12int min16uint namespace nointerpolation noperspective NULL out
+    OutputPatch packoffset pass pixelfragment PixelShader point PointStream precise RasterizerState RenderTargetView
+    return register row_major RWBuffer RWByteAddressBuffer RWStructuredBuffer RWTexture1D RWTexture2D RWTexture3D sample
+    sampler SamplerState SamplerComparisonState shared snorm stateblock stateblock_state static string struct switch
+    StructuredBuffer tbuffer technique texture Texture1D Texture2D Texture3D TextureCube this true typedef triangle
+    triangleadj TriangleStream uint uniform unorm unsigned vector vertexfragment VertexShader void volatile while
+    auto catch char const_cast delete dynamic_cast enum explicit friend goto long mutable new operator private protected
+    public reinterpret_cast short signed sizeof static_cast template throw try typename union using virtual
+    abs acos all any asfloat asin asint asuint atan atan2 ceil clamp clip cos cosh cross ddx ddy degrees determinant
+    distance dot exp exp2 floor fma fmod frac frexp isfinite isinf isnan ldexp length lerp lit log log10 log2 mad max
+    min modf mul noise normalize pow radians rcp reflect refract round rsqrt saturate select sign sin sincos sinh
+    smoothstep sqrt step tan tanh transpose trunc main""".split()
+)
+
+
+def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str:
+    return f"{result} {name}({', '.join(f'{type_} {p}' for type_, p in parameters)}) {{"
+
+
+def _local(type_: str, name: str, text: str) -> str:
+    return f"{type_} {name} = {text};"
+
+
+def _constant(name: str, text: str) -> str:
+    return f"static const float {name} = {text};"
+
+
+def _struct(name: str, fields: list[tuple[str, str]]) -> list[str]:
+    return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
+
+
+def _binding(name: str, dimension: int, place: int) -> list[str]:
+    return [f"Texture{dimension}D<float4> {name} : register(t{place});"]
+
+
+def _fetch(table: str, places: list[str]) -> str:
+    return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"
+
+
+HLSL = Dialect(
+    name="hlsl",
+    suffix=".hlsl",
+    types=TYPES,
+    words=WORDS,
+    compare={},
+    choice=("{0} ? {1} : {2}", "select({0}, {1}, {2})"),
+    spread="({0}){1}",
+    splat=True,
+    overloads=True,
+    struct_literal=False,
+    reserved=RESERVED,
+    signature=_signature,
+    local=_local,
+    constant=_constant,
+    struct=_struct,
+    binding=_binding,
+    fetch=_fetch,
+    mix="lerp",
+)
