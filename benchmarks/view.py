@@ -1,0 +1,227 @@
+"""What `gonio view` costs: the page's size, its first picture, the live reference, how far the two pictures are apart.
+
+    python benchmarks/view.py [--json]
+
+Needs a Chromium (see tests/browser.py); draws in software (SwiftShader), so that figures of two machines differ by
+their processors alone. Prints each figure beside its bar and exits with 1 where one is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import contextlib
+import itertools
+import json
+import platform
+import statistics
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from gonio.viewer import messages, page, server, stage
+from gonio.viewer.reference import Reference
+
+import browser
+
+SIZE = (640, 360)
+
+
+@dataclass
+class Figure:
+    """A measured figure and the most it may be; None for one that has no bar."""
+
+    what: str
+    value: float
+    unit: str
+    bar: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        return self.bar is None or self.value <= self.bar
+
+
+def scene(what: stage.Stage, number: int, spp: int, shift: float = 0.0, size: tuple[int, int] = SIZE) -> messages.Scene:
+    """The stage as the page asks for it, its widths moved by `shift`."""
+    rows = [
+        {
+            "material": row.material,
+            "balls": [
+                {path: [v + shift for v in values] for path, values in ball.values.items()} for ball in row.balls
+            ],
+        }
+        for row in what.rows
+    ]
+    state = {"rows": rows, "lights": list(what.lights), "camera": what.framed()}
+    text = {"type": "scene", "id": number, "width": size[0], "height": size[1], "state": state, "spp": spp}
+    found = messages.parse(json.dumps(text))
+    assert isinstance(found, messages.Scene)
+    return found
+
+
+def reference_figures(what: stage.Stage) -> Iterator[Figure]:
+    """The reference by itself, without server and page."""
+    reference = Reference(what)
+
+    def first(number: int) -> float:
+        started = time.perf_counter()
+        reference.show(scene(what, number, 1, shift=0.001 * number))
+        reference.advance()
+        messages.frame({}, reference.image())
+        return time.perf_counter() - started
+
+    first(0)
+    yield Figure(
+        "reference, first frame after a slider moved, 640 x 360", statistics.median(map(first, range(1, 9))), "s", 1.0
+    )
+    started = time.perf_counter()
+    reference.show(scene(what, 99, 256))
+    while not reference.done:
+        reference.advance()
+    yield Figure("reference, 256 samples a pixel", time.perf_counter() - started, "s")
+
+
+@contextlib.contextmanager
+def serving(what: stage.Stage) -> Iterator[str]:
+    """The address of a server in a thread."""
+    one = server.Server(server.Application(what, server.Door("127.0.0.1")), "127.0.0.1", 0, quiet=True)
+    thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
+    thread.start()
+    while not one.started:
+        time.sleep(0.01)
+    try:
+        yield one.url
+    finally:
+        one.should_exit = True
+        thread.join()
+
+
+# The time of the first frame by the page's own clock, which starts with the navigation.
+FIRST_PICTURE = """
+const look = () => window.gonio?.frames > 0 ? (window.firstPicture = performance.now()) : requestAnimationFrame(look);
+requestAnimationFrame(look);
+"""
+
+# From a value's change until the drawn pixels can be read back, so that what the GPU still has to do counts too.
+SLIDER = """async (alpha) => {
+  const started = performance.now();
+  const frames = gonio.frames;
+  gonio.setState((state) => { state.slots[0].balls[2].set["base.alpha"] = [alpha, alpha]; });
+  while (gonio.frames === frames) await new Promise(requestAnimationFrame);
+  gonio.readPixels();
+  return performance.now() - started;
+}"""
+
+PICTURES = """async () => {
+  const text = (picture) => {
+    const bytes = new Uint8Array(Float32Array.from(picture.data).buffer);
+    let found = "";
+    for (let i = 0; i < bytes.length; i += 32768) found += String.fromCharCode(...bytes.subarray(i, i + 32768));
+    return [picture.width, picture.height, btoa(found)];
+  };
+  return [text(await gonio.converge()), text(gonio.app.referencePicture())];
+}"""
+
+
+def wait(tab: Any, condition: str, seconds: float = 300.0) -> None:
+    """Until a condition holds; asked from outside, since the page's policy forbids to evaluate text within it."""
+    end = time.monotonic() + seconds
+    while not tab.evaluate(condition):
+        if time.monotonic() > end:
+            sys.exit(f"{condition} did not come to pass in {seconds:g} s")
+        time.sleep(0.05)
+
+
+def pixels(picture: list[Any]) -> np.ndarray:
+    """(height, width, 4) of a picture from the page."""
+    width, height, data = picture
+    return np.frombuffer(base64.b64decode(data), "<f4").reshape(height, width, 4)
+
+
+def relmse(test: np.ndarray, reference: np.ndarray) -> tuple[float, int]:
+    """Over pixels that balls cover wholly and whose neighbours they cover too; and the number of them."""
+    factor = test.shape[0] // reference.shape[0]
+    height, width = reference.shape[:2]
+    test = test.reshape(height, factor, width, factor, 4).mean((1, 3))
+    whole = np.minimum(test[..., 3], reference[..., 3]) >= 1 - 2**-11
+    inside = whole.copy()
+    for axis in (0, 1):
+        for step in (-1, 1):
+            inside &= np.roll(whole, step, axis)
+    x, r = test[inside][:, :3].astype(float), reference[inside][:, :3].astype(float)
+    return float(np.mean((x - r) ** 2 / (r**2 + 0.01))), int(inside.sum())
+
+
+def page_figures(what: stage.Stage) -> Iterator[Figure]:
+    """The exported file, and the live page."""
+    with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
+        path = page.export(what, Path(folder) / "page.html")
+        yield Figure("page, exported", path.stat().st_size / 1e6, "MB", 1.5)
+        firsts = []
+        for _ in range(3):
+            tab = chromium.new_page(viewport={"width": 1280, "height": 720})
+            tab.add_init_script(FIRST_PICTURE)
+            tab.goto(path.as_uri())
+            wait(tab, "window.firstPicture > 0")
+            firsts.append(tab.evaluate("window.firstPicture") / 1000)
+            tab.close()
+        yield Figure("exported page, first picture", statistics.median(firsts), "s", 1.5)
+
+        tab = chromium.new_page(viewport={"width": 1280, "height": 720})
+        tab.goto(path.as_uri())
+        wait(tab, "window.gonio?.frames > 0")
+        wanted = {"width": 1280 - tab.evaluate("gonio.app.canvas.clientWidth") + SIZE[0],
+                  "height": 720 - tab.evaluate("gonio.app.canvas.clientHeight") + SIZE[1]}  # fmt: skip
+        tab.set_viewport_size(wanted)
+        wait(tab, f"gonio.app.canvas.width === {SIZE[0]} && gonio.app.canvas.height === {SIZE[1]}")
+        times = [tab.evaluate(SLIDER, 0.1 + 0.02 * i) for i in range(20)]
+        yield Figure("slider to picture, 640 x 360, median", statistics.median(times), "ms", 100.0)
+        yield Figure("slider to picture, 640 x 360, worst of 20", max(times), "ms")
+        tab.close()
+
+        with serving(what) as url:
+            tab = chromium.new_page(viewport=wanted)
+            tab.goto(url)
+            wait(tab, "gonio?.live?.status.done")
+            test, reference = map(pixels, tab.evaluate(PICTURES))
+            found, count = relmse(test, reference)
+            samples = tab.evaluate("gonio.live.status.samples")
+            yield Figure(f"raster against reference ({samples} spp), relMSE over {count} ball pixels", found, "", 1e-4)
+            tab.close()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    given = parser.parse_args()
+    if browser.missing():
+        sys.exit(browser.missing())
+    what = stage.homework()
+    figures = []
+    for figure in itertools.chain(reference_figures(what), page_figures(what)):
+        figures.append(figure)
+        if not given.json:
+            bar = (
+                ""
+                if figure.bar is None
+                else f"  {'ok' if figure.passed else 'MISSED'}, bar {figure.bar:g} {figure.unit}"
+            )
+            print(f"{figure.what:<75} {figure.value:>10.4g} {figure.unit:<2}{bar}", flush=True)
+    if given.json:
+        print(json.dumps([{**vars(figure), "passed": figure.passed} for figure in figures]))
+    else:
+        print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
+    sys.exit(any(not figure.passed for figure in figures))
+
+
+if __name__ == "__main__":
+    main()
