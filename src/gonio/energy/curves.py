@@ -14,8 +14,8 @@ as
     M = (1 - z) (a + z (c + z Q(x))) + z^2 b,   z = (1 - x) / 2,
 
 with z and 1 - z found without cancellation (`descent`). Rows of a table hold a, c, b and the coefficients of Q at equal
-steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial itself, so that what the table has,
-energy has exactly. Anisotropic widths add two axes, see `anisotropic`.
+steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial itself, so
+that what the table has, energy has exactly. Anisotropic widths add two axes, see `anisotropic`.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def knee(form: str, masking: str, alpha: Any) -> Any:
 
 
 def descent(form: str, mu: Any, bend: Any) -> tuple[Any, Any]:
-    """(z, 1 - z), z = 1 - s(mu) / s(1): 0 at the normal, 1 at grazing. Each is a quotient of sums without differences."""
+    """(z, 1 - z), z = 1 - s(mu) / s(1): 0 at the normal, 1 at grazing; neither as a difference of near values."""
     if form == "hypot":
         bend2 = sqr(bend)
         far, near = sqrt(sqr(mu) + bend2), mu * sqrt(1.0 + bend2)
@@ -96,7 +96,7 @@ def unsqueeze(form: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
 
 
 def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -> np.ndarray:
-    """a, c, b and the coefficients of Q, lowest power first, of M at each bend: nearly minimax, by reweighted least squares.
+    """a, c, b and the coefficients of Q, lowest power first, at each bend: nearly minimax, by reweighted least squares.
 
     missing  a function of mu (rows, nodes) to M
     Returns (rows, CHANNELS); the last channel is M_avg, of the polynomial where that is not negative.
@@ -123,8 +123,7 @@ def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) ->
         p, rest = np.polynomial.polynomial.polydiv(powers, [0.25, 0.0, -0.25])
         a, b = rest[0] + rest[1], rest[0] - rest[1]
         q, at_normal = np.polynomial.polynomial.polydiv(p, [0.5, -0.5])  # P = P(1) + z Q
-        # at grazing the fit may end a little below 0, which no M is
-        rows.append(np.concatenate([[a, at_normal[0] + b, max(b, 0.0)], q]))
+        rows.append(np.concatenate([[a, at_normal[0] + b, b], q]))
     coefficients = np.zeros((len(bend), DEGREE + 1))
     for row, found in zip(coefficients, rows, strict=True):
         row[: len(found)] = found
