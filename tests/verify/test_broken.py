@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gonio as go
 import pytest
 from gonio.verify import verify
 
@@ -43,3 +44,9 @@ def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> No
 def test_the_sound_twin_passes_every_law(control: type) -> None:
     report = verify(control(), effort="quick")
     assert report.passed, str(report)
+
+
+def test_a_mistake_in_an_inner_material_is_caught_too() -> None:
+    inner = next(cls for cls in BROKEN if cls.caught_by == "gradients" and cls in FACETS)
+    verdict = verify(go.mix(go.Lambert(), inner(), 0.5), effort="quick", laws=["gradients"])["gradients"]
+    assert verdict.failed and "b.alpha" in str(verdict.worst)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,8 @@ STEP = 1e-4  # of the parameter's size: with five points the truncation is its f
 
 
 class Gradients(Law):
-    """d eval / d parameter by forward autodiff equals five-point differences, for every differentiable parameter."""
+    """d eval / d parameter by forward autodiff equals five-point differences, for every differentiable parameter, those
+    of inner materials included."""
 
     number = 8
     name = "gradients"
@@ -61,7 +63,14 @@ class Gradients(Law):
 
 
 def _numeric(model: BSDF) -> list[tuple[str, Parameter]]:
-    return [(name, p) for name, p in model.parameters().items() if p.numeric]
+    """Every numeric parameter by its path: "alpha", "base.alpha"."""
+    found = []
+    for name, parameter in model.parameters().items():
+        if parameter.numeric:
+            found.append((name, parameter))
+        elif parameter.kind == "bsdf":
+            found += [(f"{name}.{path}", inner) for path, inner in _numeric(getattr(model, name))]
+    return found
 
 
 def _size(value: Any) -> float:
@@ -73,28 +82,26 @@ def _size(value: Any) -> float:
 
 
 def _derivatives(
-    model: BSDF, name: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray
+    model: BSDF, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """By autodiff and by differences, (N, channels) each, where two different steps agree (N,), and the
     derivative below which there is none.
     """
     dr = backend.drjit()
     kind = backend.types("float64")
-    convert = converter(kind)
     a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
+    *inward, name = path.split(".")
+    plain = getattr(functools.reduce(getattr, inward, model), name)
 
     def value(shift: Any) -> Any:
-        def moved(p: Parameter, v: Any) -> Any:
-            if p is not parameter and p != parameter:
-                return convert(p, v)
-            if p.kind == "angle":
-                # the bound value is (cos, sin), or nothing at all where the angle is 0
-                angle = backend.float_of(v, kind) + shift
-                s, c = dr.sincos(angle)
-                return kind.vec2(c, s)
-            return convert(p, v) + shift
-
-        bound = model.bind(lambda p, v: moved(p, v))
+        bound = model.bind(converter(kind))
+        owner = functools.reduce(getattr, inward, bound)
+        if parameter.kind == "angle":
+            # the bound value is (cos, sin), or nothing at all where the angle is 0
+            s, c = dr.sincos(backend.float_of(plain, kind) + shift)
+            owner.__dict__[name] = kind.vec2(c, s)
+        else:
+            owner.__dict__[name] = getattr(owner, name) + shift
         return guarded(model, "eval", lambda: bound.eval(a, b, "radiance"))
 
     def number(shift: float) -> np.ndarray:
@@ -108,14 +115,14 @@ def _derivatives(
         exact = np.array(backend.to_numpy(dr.grad(result), len(wo)), float)
     else:
         exact = np.zeros((len(wo), 3))
-    step = STEP * _size(getattr(model, name))
+    step = STEP * _size(plain)
     shifted = {s: number(s * step) for s in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)}
     one, two, half = (shifted[s] - shifted[-s] for s in (1.0, 2.0, 0.5))
     lit = np.array([np.any(v != 0.0, axis=1) for v in shifted.values()])
     wide = (8.0 * one - two) / (12.0 * step)
     narrow = (8.0 * half - one) / (6.0 * step)
     # a percent more of the parameter that changes a value by less than its hundred-millionth changes nothing
-    least = 1e-6 * float(np.max(np.abs(number(0.0)), initial=0.0)) / _size(getattr(model, name))
+    least = 1e-6 * float(np.max(np.abs(number(0.0)), initial=0.0)) / _size(plain)
     noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.max(np.abs(narrow), initial=0.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
     return exact, narrow, smooth, least
