@@ -62,7 +62,7 @@ def test_a_metal_with_two_widths_keeps_its_energy():
     for mu, at in ((0.1, 0.0), (0.5, 1.0), (0.9, 2.0)):
         both = [m.eval(direction(mu, at), turned, precision="float64")[:, 0] for m in (metal, metal.base)]
         added = 2.0 * np.pi * np.sum((both[0] - both[1]).reshape(len(RING), -1).mean(1) * 2.0 * NODE * WEIGHT)
-        assert go.albedo(metal.base, mu, at).value[0, 0] + added == pytest.approx(1.0, abs=3e-3)
+        assert go.albedo(metal.base, mu, at).value[0, 0] + added == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize(

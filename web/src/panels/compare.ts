@@ -44,10 +44,6 @@ class ComparePanel implements Panel {
     if (change.touches("compare", `panels.${COMPARISON}`)) this.show();
   }
 
-  refresh(): void {
-    this.write();
-  }
-
   private show(): void {
     const { kind, range, pixels } = this.comparison.settings();
     this.mode.show(this.app.state.compare.mode);

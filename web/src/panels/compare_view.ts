@@ -127,14 +127,14 @@ export class CompareView implements Presenter {
    * Both pictures' linear radiance, at the reference's size: where the raster picture is a whole number of times larger,
    * its pixels are averaged, which is what its own pixel filter, a box, would have done. Null for any other sizes.
    */
-  pair(): Pair | null {
+  pair(): (Pair & { samples: [number, number] }) | null {
     const reference = this.app.referencePicture();
     if (!reference) return null;
     const raster = this.app.picture();
     const { width, height } = reference;
     const factor = raster.width / width;
     if (!Number.isInteger(factor) || raster.height !== factor * height) return null;
-    return { width, height, test: shrunk(raster, factor), reference: reference.data };
+    return { width, height, test: shrunk(raster, factor), reference: reference.data, samples: [raster.samples, reference.samples] };
   }
 
   private upload(gl: WebGL2RenderingContext): boolean {

@@ -34,6 +34,7 @@ export class Comparison {
   private flipOf = "";
   private flip: { map: Float32Array; mean: number } | null = null;
   private timer = 0;
+  private decorated = "";
   private readonly handle = element("button", "p-handle");
   private readonly tags = [element("span", "p-tag"), element("span", "p-tag")] as const;
   private readonly scale = element("div", "p-scale");
@@ -105,7 +106,7 @@ export class Comparison {
       return;
     }
     const { kind, pixels, range } = this.settings();
-    const samples: [number, number] = [app.picture().samples, reference.samples];
+    const { samples } = pair;
     const { exposure, tone, theme } = app.state.display;
     const seen = [samples, kind, pixels, range, exposure, tone, theme, pair.width, pair.height].join();
     if (seen === this.seen) return;
@@ -147,6 +148,9 @@ export class Comparison {
     const { mode, wipe } = this.app.state.compare;
     const reference = this.app.referencePicture();
     const ready = reference !== null && reference.samples > 0;
+    const decorated = JSON.stringify([mode, wipe, reference?.samples, reference?.done, this.view.high, this.settings(), this.app.canvas.clientWidth, this.app.canvas.clientHeight]);
+    if (decorated === this.decorated) return; // asked after every frame
+    this.decorated = decorated;
     const two = ready && (mode === "wipe" || mode === "side");
     this.handle.hidden = !(ready && mode === "wipe");
     this.handle.style.left = `${100 * wipe}%`;
