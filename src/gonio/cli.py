@@ -611,6 +611,51 @@ def verify(
         raise typer.Exit(found.exit_code)
 
 
+@app.command(rich_help_panel=MATERIALS)
+def emit(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="A material's name; see `gonio models`.")],
+    lang: Annotated[str, typer.Option(metavar="glsl|wgsl|hlsl", help="The shader language.")] = "glsl",
+    functions: Annotated[
+        str, typer.Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")
+    ] = "eval,pdf,sample",
+    param: Annotated[
+        list[str] | None, typer.Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")
+    ] = None,
+    preset: Annotated[str, typer.Option(metavar="NAME", help="A named preset, such as Au for conductor.")] = "",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Where to write; else it is printed.")
+    ] = None,
+    bundle: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write shader, manifest.json and tables (raw float32) there.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a material as shader code, traced from its own source: GLSL ES 3.00, WGSL or HLSL.
+
+    \b
+    Examples:
+      gonio emit conductor --preset Au
+      gonio emit dielectric --lang wgsl --functions eval -o glass.wgsl
+      gonio emit kulla-conty -p base=conductor --bundle shaders
+    """
+    from .emit import bundle as make_bundle
+    from .viewer import plots
+
+    made = make_bundle(plots.make(model, param or [], preset)[0], lang, functions)
+    written = [str(path) for path in made.write(bundle)] if bundle is not None else []
+    if output is not None:
+        from .render import images
+
+        images.write_whole(output, made.text.encode())
+        written.append(str(output))
+    if as_json:
+        print(json.dumps({"text": made.text, "manifest": made.manifest, "written": written}))
+    elif written:
+        print("\n".join(written))
+    else:
+        sys.stdout.write(made.text)
+
+
 @app.command("models", rich_help_panel=MATERIALS)
 def list_models(as_json: Json = False) -> None:
     """List the materials.

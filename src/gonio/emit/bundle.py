@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import inspect
 import json
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ class Bundle:
         return written
 
 
-def emit(model: BSDF, lang: str = "glsl", functions: tuple[str, ...] = ("eval", "pdf", "sample")) -> str:
+def emit(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:
     """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
 
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
@@ -74,7 +74,7 @@ def emit(model: BSDF, lang: str = "glsl", functions: tuple[str, ...] = ("eval", 
     return bundle(model, lang, functions).text
 
 
-def bundle(model: BSDF, lang: str = "glsl", functions: tuple[str, ...] = ("eval", "pdf", "sample", "terms")) -> Bundle:
+def bundle(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")) -> Bundle:
     """Shader, manifest and tables of a material; arguments as in `emit`."""
     if lang not in DIALECTS:
         raise InputError(f"unknown language '{lang}'", "emit: lang", did_you_mean(str(lang), list(DIALECTS)))
