@@ -191,7 +191,7 @@ def page_figures(what: stage.Stage) -> Iterator[Figure]:
         with serving(what) as url:
             tab = chromium.new_page(viewport=wanted)
             tab.goto(url)
-            wait(tab, "gonio?.live?.status.done")
+            wait(tab, "window.gonio?.live?.status.done")
             test, reference = map(pixels, tab.evaluate(PICTURES))
             found, count = relmse(test, reference)
             samples = tab.evaluate("gonio.live.status.samples")
