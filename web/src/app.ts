@@ -116,8 +116,17 @@ export class PageApp implements App {
     return slot;
   }
 
+  /** Whether the first row is shown only as what the others are subtracted from. */
+  private comparesRows(): boolean {
+    return this.state.view.term === "rows" && this.visibleSlots().length > 1;
+  }
+
   balls(): DrawnBall[] {
-    const visible = this.visibleSlots();
+    const all = this.visibleSlots();
+    return this.rowsOf(this.comparesRows() ? all.slice(1) : all);
+  }
+
+  private rowsOf(visible: number[]): DrawnBall[] {
     const { spacing } = this.state.view;
     return visible.flatMap((slot, row) => {
       const shader = this.shaderOf(slot);
@@ -130,7 +139,8 @@ export class PageApp implements App {
   }
 
   scene(): Scene {
-    return { state: this.state, balls: this.balls(), environment: this.environment, mesh: this.meshBuffers(), paper: this.paper() };
+    const minuend = this.comparesRows() ? this.rowsOf(this.visibleSlots().slice(0, 1)) : [];
+    return { state: this.state, balls: this.balls(), minuend, environment: this.environment, mesh: this.meshBuffers(), paper: this.paper() };
   }
 
   private meshBuffers(): MeshBuffers | null {

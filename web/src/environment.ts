@@ -56,10 +56,10 @@ export function environmentFromFloats(gl: WebGL2RenderingContext, width: number,
   return createEnvironment(gl, w, h, half);
 }
 
-const ALBEDO_WIDTH = 128;
+const ALBEDO_WIDTH = 64;
 const ALBEDO_ROWS = 64;
 const ALBEDO_SAMPLES = 128;
-const ALBEDO_PASSES = 96; // 12,288 points a node: E(mu) to about 1e-4, far below the 1/255 that a screen shows
+const ALBEDO_PASSES = 48; // 6,144 points a node: E(mu) to a few 1e-4, far below the 1/255 that a screen shows
 
 /** E(mu) of many balls, a row each, summed up over passes. */
 export class AlbedoTables {

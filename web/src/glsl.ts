@@ -35,7 +35,7 @@ export function derivedVaryings(manifest: Manifest): { vectors: number; pack: st
     const slots: string[] = [];
     for (let i = 0; i < size; i++) {
       slots.push(`derived_${parts.length >> 2}.${"xyzw"[parts.length & 3]}`);
-      parts.push(size === 1 ? `d.${field.name}` : `d.${field.name}.${"xyz"[i]}`);
+      parts.push(size === 1 ? `derived.${field.name}` : `derived.${field.name}.${"xyz"[i]}`);
     }
     arguments_.push(size === 1 ? (slots[0] as string) : `${field.type}(${slots.join(", ")})`);
   }
@@ -46,7 +46,7 @@ export function derivedVaryings(manifest: Manifest): { vectors: number; pack: st
   for (let v = 0; v < vectors; v++) stores.push(`  derived_${v} = vec4(${parts.slice(4 * v, 4 * v + 4).join(", ")});`);
   return {
     vectors,
-    pack: `  ${derived.struct} d = ${functions.derive}(material);\n${stores.join("\n")}`,
+    pack: `  ${derived.struct} derived = ${functions.derive}(material);\n${stores.join("\n")}`,
     unpack: `${derived.struct}(${arguments_.join(", ")})`,
   };
 }

@@ -7,7 +7,6 @@
 import type { PageApp } from "./app";
 import type { Variant } from "./data";
 import { actingLights } from "./lights";
-import { isFactor } from "./glsl";
 import { halfToFloat } from "./targets";
 import { fitted } from "./vectors";
 
@@ -112,7 +111,12 @@ export class Live {
     const { app } = this;
     if (this.socket?.readyState !== WebSocket.OPEN) return;
     const { state } = app;
-    if (isFactor(state.view.term)) return; // D, G and F are no light: there is nothing to trace
+    if (state.view.term !== "full" && state.view.term !== "compensated") {
+      // The server traces whole materials: beside a single term its picture would mislead.
+      this.sent = "";
+      if (app.reference) app.setReference(null);
+      return;
+    }
     const rows = app.visibleSlots().flatMap((slot) => {
       const row = state.slots[slot];
       if (!row) return [];

@@ -28,6 +28,8 @@ export interface DrawnBall {
 export interface Scene {
   state: State;
   balls: DrawnBall[];
+  /** Balls of the row that the others are subtracted from; empty unless that is shown. */
+  minuend: DrawnBall[];
   environment: EnvironmentPicture | null;
   mesh: MeshBuffers | null;
   /** sRGB of the page behind the balls. */
@@ -141,11 +143,9 @@ export class Renderer {
   private draws(scene: Scene, frame: Frame): Draw[] {
     const sorted = [...scene.balls].sort((a, b) => length(sub(a.center, frame.eye)) - length(sub(b.center, frame.eye)));
     const plain = (ball: DrawnBall): Draw => ({ ...ball, gain: 1, cover: 1, nearer: 0 });
-    if (scene.state.view.term !== "rows") return sorted.map(plain);
-    const first = Math.min(...sorted.map((b) => b.slot));
     return sorted.flatMap((ball) => {
-      const above = scene.balls.find((b) => b.slot === first && b.ball === ball.ball);
-      if (ball.slot === first || !above) return [plain(ball)];
+      const above = scene.minuend.find((b) => b.ball === ball.ball);
+      if (!above) return [plain(ball)];
       // The second draw of one ball must not lose the depth test to the first by a rounding.
       return [plain({ ...above, center: ball.center }), { ...ball, gain: -1, cover: 0, nearer: 1e-5 }];
     });
@@ -293,7 +293,7 @@ export class Renderer {
     gl.uniform1f(program.uniform("samples"), this.samples);
     gl.uniform1f(program.uniform("exposure"), 2 ** state.display.exposure);
     gl.uniform1i(program.uniform("curve"), TONES[state.display.tone].index);
-    gl.uniform1i(program.uniform("has_sign"), state.view.term === "rows" || state.view.term === "difference" ? 1 : 0);
+    gl.uniform1i(program.uniform("has_sign"), scene.minuend.length > 0 || state.view.term === "difference" ? 1 : 0);
     gl.uniform3fv(program.uniform("theme"), scene.paper);
     const shown = environmentOf(actingLights(state)) !== null && (state.furnace || state.view.background === "environment");
     gl.uniform1i(program.uniform("in_environment"), shown && !isFactor(state.view.term) ? 1 : 0);

@@ -20,7 +20,12 @@ export class Labels {
     const frame = cameraFrame(state.camera);
     const [width, height] = [app.canvas.clientWidth, app.canvas.clientHeight];
     const balls = app.balls();
-    const wanted: { text: string; x: number; y: number; kind: string; color?: string; pressed?: boolean }[] = [];
+    const wanted: { text: string; x: number; y: number; kind: string; color?: string; pressed?: boolean; long?: number }[] = [];
+    const letter = (slot: number) => String.fromCharCode(65 + slot);
+    const first = app.visibleSlots()[0] ?? 0;
+    const minuend = state.view.term === "rows" && !balls.some((b) => b.slot === first) ? `${letter(first)} − ` : "";
+    // Over a bright environment the words stand on paper of their own.
+    this.host.toggleAttribute("data-pictured", state.furnace || (state.view.background === "environment" && state.lights.some((l) => l.on && l.type === "environment")));
     let gap = Infinity;
     let last: [number, number] | null = null;
     for (const { slot, ball, center } of balls) {
@@ -34,8 +39,9 @@ export class Labels {
         wanted.push({ text: row.balls[ball]?.label ?? "", x: below[0], y: below[1], kind: "ball", pressed });
       }
       if (ball === 0) {
+        const [top, bottom] = [1, -1].map((y) => toPixel(frame, [center[0] - 1.08, center[1] + y, center[2]], width, height));
         const beside = toPixel(frame, [center[0] - 1.08, center[1], center[2]], width, height);
-        if (beside) wanted.push({ text: `${String.fromCharCode(65 + slot)}  ${row.label}`, x: Math.max(14, beside[0]), y: beside[1], kind: "rowname", color: app.slotColor(slot) });
+        if (beside) wanted.push({ text: `${minuend}${letter(slot)}  ${row.label}`, x: Math.max(16, beside[0]), y: beside[1], kind: "rowname", color: app.slotColor(slot), long: Math.max(60, top && bottom ? bottom[1] - top[1] : 0) });
       }
     }
     while (this.spans.length < wanted.length) {
@@ -54,6 +60,7 @@ export class Labels {
       span.toggleAttribute("data-selected", label.pressed ?? false);
       span.style.translate = `${Math.round(label.x)}px ${Math.round(label.y)}px`;
       span.style.setProperty("--slot", label.color ?? "");
+      span.style.setProperty("--long", `${Math.round(label.long ?? 0)}px`);
     });
   }
 }
