@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from .. import ops
-from ..ops import function, safe_sqrt, sqr, sqrt
+from ..ops import fma, function, rsqrt, safe_sqrt, sqr, sqrt
 
 KINDS = {
     "exact": "the Fresnel equations (Born1999)",
@@ -57,16 +57,19 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     cos2 = sqr(cos_i)
     sin2 = 1.0 - cos2
     t = sqr(eta) - sqr(k) - sin2
-    a2_b2 = sqrt(sqr(t) + 4.0 * sqr(eta * k))
+    eta_k = eta * k
+    a2_b2 = sqrt(fma(t, t, 4.0 * sqr(eta_k)))
     larger = ops.maximum(0.5 * (a2_b2 + ops.abs(t)), 1e-30)
-    a = ops.rsqrt(larger) * ops.where(t > 0.0, larger, eta * k)
-    sum2 = a2_b2 + cos2 + 2.0 * cos_i * a
-    contrast = (sqr(eta - 1.0) + sqr(k)) * (sqr(eta + 1.0) + sqr(k))
-    p1 = cos2 * a2_b2 + sqr(sin2)
-    p2 = 2.0 * cos_i * a * sin2
+    a = rsqrt(larger) * ops.where(t > 0.0, larger, eta_k)
+    sum2 = fma(2.0 * cos_i, a, a2_b2 + cos2)
+    contrast = fma(eta - 1.0, eta - 1.0, sqr(k)) * fma(eta + 1.0, eta + 1.0, sqr(k))
+    p1 = fma(cos2, a2_b2, sqr(sin2))
+    p2 = 2.0 * cos_i * sin2 * a
     # one division for both: R_s (1 + R_p / R_s) / 2; 0/0 is index 0 at normal incidence, which reflects all
-    below = sqr(sum2) * (p1 + p2)
-    return ops.where(below > 0.0, contrast * p1 / ops.where(below > 0.0, below, 1.0), 1.0)
+    return fma(contrast, p1, VANISHING) / fma(sqr(sum2), p1 + p2, VANISHING)
+
+
+VANISHING = 1e-36  # makes 0/0 a 1, and is lost beside any other value
 
 
 @function
