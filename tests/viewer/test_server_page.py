@@ -81,7 +81,7 @@ def live() -> Iterator[Live]:
         thread.start()
         while not one.started:
             time.sleep(0.01)
-        opened = Live(one, chromium.new_context(viewport={"width": 800, "height": 420}).new_page())
+        opened = Live(one, chromium.new_context(viewport={"width": 800, "height": 300}).new_page())
         opened.tab.goto(one.url)
         opened.wait("window.gonio?.frames > 0")
         try:
