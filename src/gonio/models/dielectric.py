@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..ops import abs, backend, dot, function, maximum, rsqrt, safe_div, sqr, where
+from ..ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
 from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet
@@ -82,7 +82,7 @@ class Dielectric(BSDF):
     def _normal(self, wo: Any, wi: Any, eta: Any) -> Any:
         """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
-        h = wo + wi * ratio
+        h = fma(wi, ratio, wo)
         h = h * rsqrt(maximum(dot(h, h), frame.TINY))
         return where(h.z < 0.0, -h, h)
 

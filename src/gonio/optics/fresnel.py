@@ -24,7 +24,7 @@ def cos_transmitted(cos_i: Any, eta: Any) -> Any:
 
     1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels nowhere but at the critical angle.
     """
-    return safe_sqrt((eta - 1.0) * (eta + 1.0) + sqr(cos_i)) / eta
+    return safe_sqrt(fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))) / eta
 
 
 @function
@@ -36,13 +36,13 @@ def dielectric(cos_i: Any, cos_t: Any, eta: Any) -> Any:
     eta is near 1, and likewise (eta^2 cos_i - q)(eta^2 cos_i + q) = (eta^2 - 1)((eta^2 + 1) cos_i^2 - 1).
     """
     q, eta2 = eta * cos_t, sqr(eta)
-    under_s, under_p = cos_i + q, eta2 * cos_i + q
+    under_s, under_p = cos_i + q, fma(eta2, cos_i, q)
     # one division for both; with cos_t over 1e-15 the product stays far above float32's smallest number
     over = 1.0 / (under_s * under_p)
     step = (eta - 1.0) * (eta + 1.0)
     r_s = step * sqr(under_p * over)
-    r_p = step * ((eta2 + 1.0) * sqr(cos_i) - 1.0) * sqr(under_s * over)
-    return ops.where(cos_t > 1e-15, 0.5 * (sqr(r_s) + sqr(r_p)), 1.0)
+    r_p = step * fma(eta2 + 1.0, sqr(cos_i), -1.0) * sqr(under_s * over)
+    return ops.where(cos_t > 1e-15, 0.5 * fma(r_s, r_s, sqr(r_p)), 1.0)
 
 
 @function

@@ -9,6 +9,7 @@ from ...ops import (
     abs,
     clamp,
     dot,
+    fma,
     function,
     maximum,
     minimum,
@@ -62,7 +63,7 @@ class GGX(NDF):
     def G1(self, v: Any, alpha: Any) -> Any:
         """2 |v.z| / (|v.z| + sqrt(v.z^2 + slant^2)) (Walter2007, eq. 34), without a tangent."""
         z = abs(v.z)
-        return safe_div(2.0 * z, z + sqrt(sqr(z) + slant2(v, alpha)))
+        return safe_div(2.0 * z, z + sqrt(fma(z, z, slant2(v, alpha))))
 
     @function
     def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
@@ -90,7 +91,7 @@ class GGX(NDF):
     def visible_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
         """Density of visible normals over |v.m|, G1 D / |v.z|, with |v.z| cancelled: finite at grazing."""
         z = abs(v.z)
-        return 2.0 * self.D(m, alpha) / maximum(z + sqrt(sqr(z) + slant2(v, alpha)), 1e-30)
+        return 2.0 * self.D(m, alpha) / maximum(z + sqrt(fma(z, z, slant2(v, alpha))), 1e-30)
 
     @function
     def sample_bounded(self, v: Any, u1: Any, u2: Any, alpha: Any) -> Any:
@@ -102,7 +103,7 @@ class GGX(NDF):
     def bounded_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
         """Density of `sample_bounded` over |v.m|: 2 D / (k |v.z| + sqrt(v.z^2 + slant^2)) (Eto2023)."""
         z = abs(v.z)
-        length = sqrt(sqr(z) + slant2(v, alpha))
+        length = sqrt(fma(z, z, slant2(v, alpha)))
         return 2.0 * self.D(m, alpha) / maximum(self._bound(v, alpha) * z + length, 1e-30)
 
     def _bound(self, v: Any, alpha: Any) -> Any:
