@@ -163,6 +163,14 @@ def test_the_imageworks_fit_is_within_a_percent_of_the_integral():
             assert fresnel_average.imageworks(*fresnel_average.edge_tint(eta, k)) == pytest.approx(exact, abs=0.01)
 
 
+def test_an_artists_two_colours_name_a_metal_and_come_back():
+    r, g = np.array([0.944, 0.776, 0.373]), np.array([0.9, 0.6, 0.2])
+    metal = go.Conductor(*fresnel_average.index_of(r, g))
+    for eta, k, reflectivity, tint in zip(metal.eta, metal.k, r, g, strict=True):
+        found = fresnel_average.edge_tint(float(eta), float(k))
+        assert found == pytest.approx((reflectivity, tint), abs=1e-9)
+
+
 def test_colours_agree_in_a_furnace_and_differ_on_gold():
     wo, wi = direction(0.5), direction(0.4, 2.0)
     white = go.Conductor(alpha=0.8, fresnel="one")

@@ -112,31 +112,14 @@ def bake(
     """
     material = isinstance(target, BSDF)
     lut = lut or (("E", "Eavg") if material else ("E", "Eavg", "dfg"))
-    for name in lut:
-        if name not in LUTS:
-            raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, list(LUTS)))
+    _check(lut, size, spp, points, layout)
     for name, given in (("masking", masking), ("aspect", aspect)):
         if material and given is not None:
             raise InputError(f"{name} of a material given", f"--{name}", "a material brings its own, by its parameters")
-    if material and "dfg" in lut:
-        raise InputError(
-            "split sum of a material asked for", "--lut", "bake its distribution, such as ggx: it is for any F0"
-        )
-    if layout not in LAYOUTS:
-        raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
-    if not 1 <= size <= LARGEST:
-        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {LARGEST}")
     if material and not isinstance(target, Conductor | Dielectric):
         return _any_material(target, lut, size, method, layout)  # type: ignore[arg-type]
-    model: Any = target if material else None
-    ndf = distribution(str(target) if model is None else model.ndf).name
-    masking = quadrature.known_masking(masking or "smith-correlated" if model is None else model.masking)
-    aspect = _aspect(model, 1.0 if aspect is None else aspect)
-    _check_method(method, ndf, model, spp)
-    if aspect != 1.0 and not 1 <= azimuths <= LARGEST:
-        raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {LARGEST}")
-    axes = Axes(layout, ndf, masking, size, aspect, azimuths if aspect != 1.0 else 0)
-    asked = _Target(model, ndf, masking)
+    asked, axes = _resolved(target, masking, layout, size, aspect, azimuths)
+    _check_target(asked, axes, lut, method)
 
     arrays: dict[str, np.ndarray] = {}
     errors: dict[str, dict[str, float]] = {}
@@ -147,39 +130,27 @@ def bake(
         if "E" in arrays and size > 1:
             errors["E"]["interpolation"] = _between(lambda *index: asked.exact(axes.at(*index))["E"], axes)
     if "Eavg" in lut:
-        rows = np.arange(size)
-        exact = asked.average(axes, rows)
-        if method == "quadrature":
-            some = rows[:: 4 if axes.azimuths else 1]
-            arrays["E_avg"], off = exact, exact[some] - asked.average(axes, some, fine=True)
-        else:
-            arrays["E_avg"] = _average_of_rows(tables["E"], axes)
-            off = arrays["E_avg"] - exact
-        errors["E_avg"] = _figures(off)
+        sampled = None if method == "quadrature" else _average_of_rows(tables["E"], axes)
+        arrays["E_avg"], errors["E_avg"] = _averaged(asked, axes, sampled)
     dims = {"E": list(axes.names), "dfg": list(axes.names), "E_avg": ["roughness"]}
-    nodes = axes.arrays()
+    nodes, text = axes.arrays(), axes.texts()
     if "glass" in lut:
-        if axes.azimuths:
-            raise InputError("glass with two widths asked for", "--lut", "this table has one width: leave --aspect out")
-        glass, found = _glass(axes, getattr(model, "fresnel", "exact"))
+        glass, found = _glass(axes, getattr(asked.model, "fresnel", "exact"))
         nodes["sqrt_f0"] = glass.pop("sqrt_f0")
+        text["sqrt_f0"] = f"slice j at (eta - 1) / (eta + 1) = (j + 1/2) / {GLASS_STEPS} of 2/3; eta is dense over thin"
         arrays.update(glass)
         errors.update(found)
         dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
-    how = {} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}
-    text = axes.texts()
-    if "glass" in lut:
-        text["sqrt_f0"] = f"slice j at (eta - 1) / (eta + 1) = (j + 1/2) / {GLASS_STEPS} of 2/3; eta is dense over thin"
     manifest = {
         "target": _describe(target),
-        "ndf": ndf,
-        "masking": masking,
+        "ndf": asked.ndf,
+        "masking": asked.masking,
         "method": method,
-        **how,
+        **({} if method == "quadrature" else {"spp": spp, "points": points, "seed": seed}),
         "size": size,
         "layout": layout,
         "alpha": "roughness^2" + (", the larger of both" if axes.azimuths else ""),
-        **({"aspect": aspect} if axes.azimuths else {}),
+        **({"aspect": axes.aspect} if axes.azimuths else {}),
         "axes": text,
     }
     return _sealed(arrays, nodes, dims, errors, manifest)
@@ -192,12 +163,8 @@ def cached(target: str | BSDF, **options: Any) -> Baked:
     """
     if isinstance(target, BSDF) and not isinstance(target, Conductor | Dielectric):
         return bake(target, **options)
-    key = (
-        "baked",
-        _describe(target),
-        None if isinstance(target, str) else _aspect(target, 1.0),
-        sorted(options.items()),
-    )
+    widths_of = None if isinstance(target, str) else _aspect(target, 1.0)
+    key = ("baked", _describe(target), widths_of, sorted(options.items()))
     text = repr(key)
 
     def write(made: Baked) -> bytes:
@@ -227,6 +194,50 @@ def _sealed(
     return Baked(everything, {"schema": SCHEMA, **manifest, **more})
 
 
+def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, layout: str) -> None:
+    """Raise InputError for what no target has."""
+    for name in lut:
+        if name not in LUTS:
+            raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, list(LUTS)))
+    if layout not in LAYOUTS:
+        raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
+    if not 1 <= size <= LARGEST:
+        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {LARGEST}")
+    if spp < 1:
+        raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
+    if points not in monte_carlo.POINTS:
+        raise InputError(f"unknown points '{points}'", "--points", did_you_mean(points, list(monte_carlo.POINTS)))
+
+
+def _resolved(
+    target: str | BSDF, masking: str | None, layout: str, size: int, aspect: float | None, azimuths: int
+) -> tuple[_Target, Axes]:
+    """What is baked, over which axes."""
+    model: Any = None if isinstance(target, str) else target
+    ndf = distribution(str(target) if model is None else model.ndf).name
+    masking = quadrature.known_masking(masking or "smith-correlated" if model is None else model.masking)
+    aspect = _aspect(model, 1.0 if aspect is None else aspect)
+    if aspect != 1.0 and not 1 <= azimuths <= LARGEST:
+        raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {LARGEST}")
+    return _Target(model, ndf, masking), Axes(layout, ndf, masking, size, aspect, azimuths if aspect != 1.0 else 0)
+
+
+def _check_target(asked: _Target, axes: Axes, lut: tuple[str, ...] | list[str], method: str) -> None:
+    """Raise InputError for what this target does not have."""
+    kind = type(asked.model).__name__
+    known = ["quadrature", *monte_carlo.methods(asked.ndf)]
+    if method not in known:
+        raise InputError(f"unknown method '{method}'", "--method", did_you_mean(method, known))
+    if method != "quadrature" and asked.model is not None:
+        raise InputError(f"{kind} by '{method}'", "--method", "a model is baked by quadrature: leave --method out")
+    if "dfg" in lut and asked.model is not None:
+        hint = "bake its distribution, such as ggx: it is for any F0"
+        raise InputError("split sum of a material asked for", "--lut", hint)
+    if "glass" in lut and (axes.azimuths or isinstance(asked.model, Conductor)):
+        what = "glass with two widths asked for" if axes.azimuths else "glass of a Conductor asked for"
+        raise InputError(what, "--lut", "this table is of a distribution or a Dielectric, with one width")
+
+
 def _aspect(model: Any, given: float) -> float:
     """alpha_y / alpha_x as given, or of a model's widths."""
     if model is not None:
@@ -237,19 +248,6 @@ def _aspect(model: Any, given: float) -> float:
         hint = f"give {1.0 / LARGEST_ASPECT:g} to {LARGEST_ASPECT:g}"
         raise InputError(f"alpha_y / alpha_x = {given:g}", "--aspect", hint)
     return given
-
-
-def _check_method(method: str, ndf: str, model: Any, spp: int) -> None:
-    known = ["quadrature", *monte_carlo.methods(ndf)]
-    if method not in known:
-        raise InputError(f"unknown method '{method}'", "--method", did_you_mean(method, known))
-    if method == "quadrature":
-        return
-    if spp < 1:
-        raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
-    if model is not None:
-        hint = "a model is baked by quadrature: leave --method out"
-        raise InputError(f"{type(model).__name__} by '{method}'", "--method", hint)
 
 
 def _figures(difference: np.ndarray) -> dict[str, float]:
@@ -273,6 +271,16 @@ def _directional(
         axes.ndf, axes.masking, at.mu, at.alpha, method, spp, points, seed, alpha_y=at.alpha_y, phi=at.phi
     ).value
     return {**exact, "E": estimate}, {"E": _figures(estimate - exact["E"]), "dfg": {"max": 0.0, "rms": 0.0}}
+
+
+def _averaged(asked: _Target, axes: Axes, sampled: np.ndarray | None) -> tuple[np.ndarray, dict[str, float]]:
+    """E_avg and its error: the quadrature judged by a finer one, or what was sampled judged by the quadrature."""
+    rows = np.arange(axes.size)
+    exact = asked.average(axes, rows)
+    if sampled is not None:
+        return sampled, _figures(sampled - exact)
+    some = rows[:: 4 if axes.azimuths else 1]
+    return exact, _figures(exact[some] - asked.average(axes, some, fine=True))
 
 
 def _average_of_rows(table: np.ndarray, axes: Axes) -> np.ndarray:

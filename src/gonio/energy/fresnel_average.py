@@ -44,6 +44,15 @@ def edge_tint(eta: Any, k: Any) -> tuple[Any, Any]:
     return r, clamp((largest - eta) / (largest - smallest), 0.0, 1.0)
 
 
+def index_of(r: Any, g: Any) -> tuple[Any, Any]:
+    """(eta, k) of the metal that an artist means by reflectivity r and edge tint g, in (0, 1) (Gulbrandsen2014, eq. 2
+    and 3): `go.Conductor(*index_of(np.array([0.944, 0.776, 0.373]), np.array([0.998, 0.981, 0.751])))` is about gold.
+    """
+    root = r**0.5
+    eta = g * (1.0 - r) / (1.0 + r) + (1.0 - g) * (1.0 + root) / (1.0 - root)
+    return eta, ((r * (eta + 1.0) ** 2 - (eta - 1.0) ** 2) / (1.0 - r)) ** 0.5
+
+
 @function
 def imageworks(r: Any, g: Any) -> Any:
     """Fit of F_avg in reflectivity r and edge tint g (Kulla2017, p. 26), held in [0, 1]."""
@@ -77,4 +86,4 @@ def of_glass(base: Any) -> Any:
     return dielectric(eta)
 
 
-__all__ = ["KINDS", "dielectric", "edge_tint", "imageworks", "integral", "of_glass", "of_metal", "schlick"]
+__all__ = ["KINDS", "dielectric", "edge_tint", "imageworks", "index_of", "integral", "of_glass", "of_metal", "schlick"]
