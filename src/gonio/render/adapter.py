@@ -165,6 +165,8 @@ def _adapter_class(mi: ModuleType) -> type:
     def mode_of(ctx: Any) -> str:
         return "radiance" if ctx.mode == mi.TransportMode.Radiance else "importance"
 
+    REFLECTION, TRANSMISSION = int(mi.BSDFFlags.Reflection), int(mi.BSDFFlags.Transmission)
+
     class GonioBSDF(mi.BSDF):  # type: ignore[misc, name-defined]
         """A Gonio model in a Mitsuba scene."""
 
@@ -299,8 +301,7 @@ def _adapter_class(mi: ModuleType) -> type:
 
         def _enabled(self, ctx: Any, wo: Any, wi: Any, active: Any) -> Any:
             """Lanes whose kind of lobe the context asks for."""
-            mask, F = ctx.type_mask, mi.BSDFFlags
-            reflect, transmit = bool(mask & int(F.Reflection)), bool(mask & int(F.Transmission))
+            reflect, transmit = bool(ctx.type_mask & REFLECTION), bool(ctx.type_mask & TRANSMISSION)
             if reflect and transmit:
                 return active
             same = wo.z * wi.z > 0.0
