@@ -120,9 +120,9 @@ def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) ->
         plain = np.polynomial.chebyshev.cheb2poly(found)
         powers[: len(plain)] = plain
         # M = (1 - z) a + z b + z (1 - z) P, with z (1 - z) = (1 - x^2) / 4; the rest of the division is what is linear
-        p, rest = np.polynomial.polynomial.polydiv(powers, [0.25, 0.0, -0.25])
+        p, rest = map(np.asarray, np.polynomial.polynomial.polydiv(powers, [0.25, 0.0, -0.25]))
         a, b = rest[0] + rest[1], rest[0] - rest[1]
-        q, at_normal = np.polynomial.polynomial.polydiv(p, [0.5, -0.5])  # P = P(1) + z Q
+        q, at_normal = map(np.asarray, np.polynomial.polynomial.polydiv(p, [0.5, -0.5]))  # P = P(1) + z Q
         rows.append(np.concatenate([[a, at_normal[0] + b, b], q]))
     coefficients = np.zeros((len(bend), DEGREE + 1))
     for row, found in zip(coefficients, rows, strict=True):

@@ -35,7 +35,10 @@ class AllParts(NamedTuple):
 
 def with_terms(base: Any, wo: Any, wi: Any, single: Any, multi: Any) -> Any:
     """The parts, with D, G and F where the base has them."""
-    return AllParts(*base.terms(wo, wi), single, multi) if hasattr(base, "terms") else Parts(single, multi)
+    if not hasattr(base, "terms"):
+        return Parts(single, multi)
+    d, g, f = base.terms(wo, wi)
+    return AllParts(d, g, f, single, multi)
 
 
 class _Added(BSDF):
