@@ -175,6 +175,15 @@ def test_a_scene_is_turned_so_that_its_camera_looks_along_minus_z(tmp_path: Path
     assert what.framed()["elevation"] == pytest.approx(math.pi / 4, abs=1e-4)
 
 
+def test_a_lamp_around_everything_is_an_environment(tmp_path: Path) -> None:
+    sphere = {"type": "sphere", "center": [0, 0, 0], "radius": 9}
+    lights = [{"type": "areaLight", "energy": [0.5, 0.6, 0.7], "shape": sphere},
+              {"type": "environmentLight", "radiance": [3, 3, 3]}]  # fmt: skip
+    what = lab_scene.stage(write_scene(tmp_path, lights, [ball(type="matte", albedo=0.5)]))
+    (light,) = what.lights
+    assert light["type"] == "environment" and light["constant"] == [0.5, 0.6, 0.7]
+
+
 def test_a_scene_without_light_gets_the_pages_and_a_note(tmp_path: Path) -> None:
     what = lab_scene.stage(write_scene(tmp_path, [], [ball(type="matte", albedo=0.5)]))
     assert [light["type"] for light in what.lights] == ["directional"]

@@ -20,6 +20,7 @@ from .stage import SUN, Ball, Material, Row, Stage, replaced, value_at, walk
 
 LARGEST_IMAGE = 1024  # pixels across of an environment in a page; a wider one is averaged down
 BALLS = 5  # a row
+ENVIRONMENT = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
 
 
 def stage(path: Path, allow_outside: bool = False) -> Stage:
@@ -27,8 +28,9 @@ def stage(path: Path, allow_outside: bool = False) -> Stage:
 
     Each distinct material is a ball; materials of one model and the same choices share a row. Each lamp becomes a
     directional light: it shines from where the lamp stands, seen from the point that the camera looks at, as bright
-    as the lamp is there with nothing in between. An environment stays what it is. A texture, which has no place on a
-    page of sliders, is replaced by its parameter's default, and a note says so.
+    as the lamp is there with nothing in between. An environment, and a lamp around that point, is light from all
+    around. A texture, which has no place on a page of sliders, is replaced by its parameter's default, and a note says
+    so.
 
     Raises InputError as the reader of scenes does: also where a file lies outside the scene's folder.
     """
@@ -93,11 +95,8 @@ def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
         key, first = f"m{index}", members[0]
         title = type(first).__name__
         materials[key] = Material(title, first)
-        for start in range(0, len(members), BALLS):
-            balls = tuple(
-                _ball(first, member, f"{title} {start + n + 1}") for n, member in enumerate(members[start:][:BALLS])
-            )
-            rows.append(Row(title, key, balls))
+        balls = _balls(members, title)
+        rows += [Row(title, key, balls[start : start + BALLS]) for start in range(0, len(balls), BALLS)]
     return materials, tuple(rows[:8])
 
 
@@ -115,11 +114,22 @@ def _code(bsdf: BSDF) -> Any:
     return tuple(facts)
 
 
-def _ball(first: BSDF, member: BSDF, label: str) -> Ball:
-    values = {path: value_at(member, path) for path, parameter, _ in walk(member) if parameter.numeric}
-    different = {path: _listed(v) for path, v in values.items() if v != value_at(first, path)}
-    named = [f"{path} {v:.4g}" for path, v in different.items() if isinstance(v, int | float)]
-    return Ball(", ".join(named) or label, different)
+def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
+    """A ball each, named by what tells it from the others; its numbers are those in which it differs from the first."""
+    paths = [path for path, parameter, _ in walk(members[0]) if parameter.numeric]
+    values = [{path: _listed(value_at(member, path)) for path in paths} for member in members]
+    telling = [path for path in paths if any(v[path] != values[0][path] for v in values)]
+    numbers = [path for path in telling if not isinstance(values[0][path], list)]
+    balls = []
+    for mine in values:
+        label = ", ".join(f"{path.rpartition('.')[2]} {_text(mine[path])}" for path in (numbers or telling)[:2])
+        different = {path: mine[path] for path in telling if mine[path] != values[0][path]}
+        balls.append(Ball(label or title, different))
+    return tuple(balls)
+
+
+def _text(value: Any) -> str:
+    return " ".join(f"{v:.3g}".removeprefix("0") or "0" for v in (value if isinstance(value, list) else [value]))
 
 
 def _listed(value: Any) -> Any:
@@ -134,7 +144,12 @@ def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
     placed = description.camera.transform
     target = np.array(placed.look_at, float)
     axes, _ = _axes(placed)
-    found, notes = [], []
+    found: list[dict[str, Any]] = []
+    notes: list[str] = []
+    around = [light for light in description.lights if _surrounds(light, target)]
+    if around:  # nothing from beyond such a lamp arrives
+        constant = [float(x) for x in rgb(around[0].energy)]
+        return ({**ENVIRONMENT, "constant": constant},), notes
     for light in description.lights:
         if isinstance(light, schema.EnvironmentLight):
             found.append(_environment(description, light, axes))
@@ -154,6 +169,14 @@ def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
         notes.append("the scene has no light; the page's own is on")
         return (SUN,), notes
     return tuple(found), notes
+
+
+def _surrounds(light: Any, target: np.ndarray) -> bool:
+    """Whether a lamp is a sphere around the point."""
+    if not isinstance(light, schema.AreaLight) or not isinstance(light.shape, schema.Sphere):
+        return False
+    centre = (light.shape.transform.matrix() @ [*light.shape.center, 1.0])[:3]
+    return float(np.linalg.norm(centre - target)) < light.shape.radius
 
 
 def _axes(placed: Any) -> tuple[np.ndarray, float]:
@@ -193,8 +216,7 @@ def _area(light: Any, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _environment(description: Any, light: Any, axes: np.ndarray) -> dict[str, Any]:
     source = light.texture if light.texture is not None else light.radiance
-    found: dict[str, Any] = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
-    found["rotation"] = -math.atan2(axes[2][0], axes[2][2])
+    found = {**ENVIRONMENT, "rotation": -math.atan2(axes[2][0], axes[2][2])}
     if not isinstance(source, ImageTexture):
         return {**found, "constant": [float(x) for x in rgb(source)]}
     where = description.where("/scene/lights")

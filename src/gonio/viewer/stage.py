@@ -72,7 +72,7 @@ class Stage:
     notes: tuple[str, ...] = ()
 
     def framed(self) -> dict[str, Any]:
-        """The camera, far enough away that all balls stand in a picture of 1.4 : 1 or wider with some air around them."""
+        """The camera, far enough away that all balls stand in a picture of 1.4 : 1 or wider, with some air."""
         across = (max(len(row.balls) for row in self.rows) - 1) * SPACING / 2 + 1.25
         up = (len(self.rows) - 1) * SPACING / 2 + 1.25
         half = math.tan(math.radians(CAMERA["fov"]) / 2)
