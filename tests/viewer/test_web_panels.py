@@ -57,7 +57,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
         tab.on("console", lambda m: result.messages.append(m.text) if m.type == "error" else None)
         tab.on("pageerror", lambda error: result.messages.append(str(error)))
         tab.goto(path.as_uri())
-        tab.wait_for_function("window.gonio !== undefined")
+        tab.wait_for_function("() => window.gonio !== undefined")
         yield result
         assert not result.messages
 
@@ -175,3 +175,177 @@ def test_figures_are_pythons(opened: Opened) -> None:
         assert got["rmse"] == pytest.approx(metrics.rmse(a, b), rel=1e-6)
         assert got["relmse"] == pytest.approx(metrics.relmse(a, b), rel=1e-6)
         assert got["meanRatio"] == pytest.approx(metrics.mean_ratio(a, b), rel=1e-6)
+
+
+# --------------------------------------------------------------------------- panels
+
+
+@pytest.fixture
+def fresh(opened: Opened) -> Iterator[Opened]:
+    """The page as it was written: no tab open, no reference, no comparison."""
+    opened.tab.set_viewport_size({"width": 1280, "height": 720})
+    opened.tab.evaluate("gonio.app.setReference(null), gonio.app.store.reset()")
+    yield opened
+    opened.tab.evaluate("gonio.app.setReference(null), gonio.app.store.reset()")
+
+
+def open_panel(opened: Opened, panel: str) -> Any:
+    opened.tab.evaluate("panel => gonio.app.store.set('dock.open', panel)", panel)
+    body = opened.tab.locator(f".panel-body[data-panel='{panel}']")
+    body.wait_for(state="visible")
+    return body
+
+
+def ink(image: bytes) -> np.ndarray:
+    """A screenshot as numbers, (H, W, 3)."""
+    import io
+
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(image)).convert("RGB"), dtype=float)
+
+
+@pytest.mark.parametrize("panel", ["lobe", "slices", "half-difference", "albedo", "tables", "compare", "probe"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
+def test_panels_open_and_draw(fresh: Opened, panel: str, theme: str, size: tuple[int, int]) -> None:
+    fresh.tab.set_viewport_size({"width": size[0], "height": size[1]})
+    fresh.tab.evaluate("theme => gonio.app.store.set('display.theme', theme)", theme)
+    body = open_panel(fresh, panel)
+    fresh.tab.wait_for_function(
+        "panel => document.querySelector(`.panel-body[data-panel='${panel}'] .p-note`)?.textContent.length > 10",
+        arg=panel,
+    )
+    assert body.bounding_box()["width"] <= size[0]
+    if panel in ("compare", "probe"):
+        return
+    canvas = body.locator("canvas >> visible=true").first
+    canvas.wait_for(state="visible")
+    fresh.tab.wait_for_timeout(300)  # the frame after the values
+    assert ink(canvas.screenshot()).std() > 3  # something is drawn on it
+
+
+def test_table_read_out_is_the_float(fresh: Opened) -> None:
+    body = open_panel(fresh, "tables")
+    manifest, tables = fresh.tab.evaluate("[gonio.app.shaderOf(0).manifest, gonio.app.shaderOf(0).variant.tables]")
+    assert manifest["textures"], "Kulla-Conty reads a table"
+    canvas = body.locator("canvas")
+    canvas.wait_for(state="visible")
+    box = canvas.bounding_box()
+    import base64
+    import re
+
+    texture = manifest["textures"][0]
+    floats = np.frombuffer(base64.b64decode(tables[texture["uniform"]]), "<f4")
+    columns, channels = texture["size"][0], texture["channels"]
+    seen = set()
+    for across in (0.2, 0.45, 0.7):
+        canvas.hover(position={"x": across * box["width"], "y": 0.2 * box["height"]})
+        read = body.locator(".p-read").text_content()
+        found = re.match(r"texel \((\d+), (\d+)\).*?: (.*)", read)
+        assert found, read
+        i, j = int(found[1]), int(found[2])
+        shown = np.array(found[3].split(), np.float32)
+        at = (j * columns + i) * channels
+        assert np.array_equal(shown, floats[at : at + channels])  # nine digits tell all float32 apart
+        seen.add(i)
+    assert len(seen) == 3
+
+
+REFERENCE = """([exposure]) => gonio.converge(4).then(picture => {
+  const data = picture.data.map((v, i) => i % 4 === 3 ? v : v * exposure);
+  gonio.app.setReference({ width: picture.width, height: picture.height, data, samples: 16, done: true });
+  return [picture.width, picture.height];
+})"""
+
+
+def test_wipe_shows_one_picture_on_each_side(fresh: Opened) -> None:
+    fresh.tab.evaluate("() => gonio.converge(4)")
+    plain = ink(fresh.tab.locator("canvas").first.screenshot())
+    fresh.tab.evaluate(REFERENCE, [0.25])
+    fresh.tab.evaluate("gonio.app.store.set('compare.mode', 'wipe'), gonio.app.store.set('display.tone', 'reinhard')")
+    fresh.tab.evaluate("gonio.app.store.set('display.tone', 'none')")
+    handle = fresh.tab.locator(".p-handle")
+    handle.wait_for(state="visible")
+    fresh.tab.wait_for_timeout(300)
+    half = ink(fresh.tab.locator("canvas").first.screenshot())
+    middle = plain.shape[1] // 2
+    left, right = slice(0, middle - 40), slice(middle + 40, None)
+    assert np.abs(half[:, left] - plain[:, left]).mean() < 1
+    assert plain[:, right].mean() - half[:, right].mean() > 2  # the reference is two stops darker
+    box = handle.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 4
+    fresh.tab.mouse.move(x, y)
+    fresh.tab.mouse.down()
+    fresh.tab.mouse.move(x - 300, y, steps=3)
+    fresh.tab.mouse.up()
+    fresh.tab.wait_for_timeout(300)
+    assert fresh.tab.evaluate("gonio.state.compare.wipe") < 0.4
+    moved = ink(fresh.tab.locator("canvas").first.screenshot())
+    band = slice(middle - 220, middle - 60)
+    assert half[:, band].mean() - moved[:, band].mean() > 1
+
+
+def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
+    open_panel(fresh, "compare")
+    fresh.tab.evaluate("gonio.app.store.setPanel('compare', { pixels: 'all', kind: 'relative' })")
+    fresh.tab.evaluate("gonio.app.store.set('compare.mode', 'difference')")
+    fresh.tab.evaluate(REFERENCE, [1.1])
+    fresh.tab.wait_for_function("() => gonio.comparison().figures?.flip > 0", timeout=60_000)
+    figures = fresh.tab.evaluate("gonio.comparison().figures")
+    pair = fresh.tab.evaluate(
+        "{ const p = gonio.comparison().pair; [p.width, p.height, [...p.test], [...p.reference]] }"
+    )
+    test, reference = (np.reshape(x, (pair[1], pair[0], 4))[..., :3] for x in pair[2:])
+    assert figures["rmse"] == pytest.approx(metrics.rmse(test, reference), rel=1e-6)
+    assert figures["relmse"] == pytest.approx(metrics.relmse(test, reference), rel=1e-6)
+    assert figures["meanRatio"] == pytest.approx(1 / 1.1, rel=0.02)  # the raster went on from 4 samples
+    assert 0 < figures["flip"] < 0.5
+    scale = fresh.tab.locator(".p-scale")
+    assert "0.01" in scale.text_content()
+
+
+def test_smaller_reference_is_compared_with_averages(fresh: Opened) -> None:
+    open_panel(fresh, "compare")
+    fresh.tab.evaluate("gonio.app.store.setPanel('compare', { pixels: 'all' })")
+    fresh.tab.evaluate(
+        """() => gonio.converge().then(picture => {
+      const [w, h] = [picture.width / 2, picture.height / 2];
+      const data = new Float32Array(4 * w * h);
+      for (let y = 0; y < 2 * h; y++) for (let x = 0; x < 2 * w; x++) for (let c = 0; c < 4; c++)
+        data[4 * ((y >> 1) * w + (x >> 1)) + c] += picture.data[4 * (y * 2 * w + x) + c] / 4;
+      gonio.app.setReference({ width: w, height: h, data, samples: 16, done: true });
+    })"""
+    )
+    fresh.tab.wait_for_function("() => gonio.comparison().figures !== null", timeout=30_000)
+    assert fresh.tab.evaluate("gonio.comparison().figures.rmse") < 1e-6
+
+
+def test_probe_reads_the_pixel(fresh: Opened) -> None:
+    body = open_panel(fresh, "probe")
+    fresh.tab.evaluate("() => gonio.converge()")
+    fresh.tab.evaluate(REFERENCE, [0.5])
+    picture = fresh.tab.evaluate("{ const p = gonio.app.picture(); [p.width, p.height, [...p.data]] }")
+    data = np.reshape(picture[2], (picture[1], picture[0], 4))
+    lit = np.argwhere((data[..., 3] > 0.999) & (data[..., 0] > 0.05))
+    y, x = lit[len(lit) // 2]
+    canvas = fresh.tab.locator("canvas").first
+    box = canvas.bounding_box()
+    canvas.hover(position={"x": (x + 0.5) / picture[0] * box["width"], "y": (y + 0.5) / picture[1] * box["height"]})
+    fresh.tab.wait_for_function("() => document.querySelectorAll('.panel-body[data-panel=probe] tr').length === 5")
+    cells = [row.locator("td").all_text_contents() for row in body.locator("tr").all()[1:]]
+    raster, reference, difference, ratio = np.array([[float(x) for x in row] for row in cells])
+    column, row = (int(x) for x in body.locator(".p-note").text_content().split("(")[1].split(")")[0].split(","))
+    assert abs(column - x) <= 1 and abs(row - y) <= 1  # the canvas may begin at a fraction of a pixel
+    assert np.allclose(raster[[0, 1, 2, 4]], data[row, column], rtol=1e-6)
+    assert np.allclose(reference[:3], 0.5 * raster[:3], rtol=1e-6)
+    assert np.allclose(difference[:3], raster[:3] - reference[:3], rtol=1e-5)
+    assert np.allclose(ratio[:3], 2, rtol=1e-5)
+
+
+def test_page_without_a_server_says_so(fresh: Opened) -> None:
+    body = open_panel(fresh, "compare")
+    fresh.tab.wait_for_function(
+        "() => document.querySelector('.panel-body[data-panel=compare] .p-note').textContent.includes('gonio view')"
+    )
+    assert body.locator("tr").count() == 0

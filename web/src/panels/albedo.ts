@@ -36,7 +36,9 @@ class AlbedoPanel implements Panel {
     body.append(cell);
     this.key = element("div", "p-legend");
     this.note = element("div", "p-note");
-    host.append(bar, body, this.key, this.note);
+    const foot = element("div", "p-foot");
+    foot.append(this.key, this.note);
+    host.append(bar, body, foot);
     this.curves = new Curves(cell, app);
     this.ask = latest(app, () => this.compute());
     this.ask();

@@ -32,7 +32,7 @@ class ComparePanel implements Panel {
     this.range = select<string>(bar, "colours", "Range of the colour scale", RANGES, (range) => set({ range }));
     this.pixels = select(bar, "pixels", "Which pixels count in the figures and the difference", PIXELS, (pixels) => set({ pixels }));
     this.table = element("table", "p-numbers");
-    const body = element("div", "p-body");
+    const body = element("div", "p-fit");
     body.append(this.table);
     this.note = element("div", "p-note");
     host.append(bar, body, this.note);

@@ -56,28 +56,19 @@ export class Curves {
     if (!this.plot || shape !== this.shape) {
       this.plot?.destroy();
       this.shape = shape;
-      this.plot = new uPlot(this.options(chart, width), data, this.host);
+      this.plot = new uPlot(this.options(chart, width, height), data, this.host);
     } else this.plot.setData(data);
-    this.fit();
-    // Once more when it is laid out: a legend just made does not know its width yet, so nor its height.
-    requestAnimationFrame(() => this.fit());
+    if (this.plot.width !== width || this.plot.height !== height) this.plot.setSize({ width, height });
   }
 
-  private fit(): void {
-    const { clientWidth: width, clientHeight } = this.host;
-    const legend = this.host.querySelector<HTMLElement>(".u-legend")?.offsetHeight ?? 0;
-    const height = Math.max(90, clientHeight - legend);
-    if (this.plot && width && (this.plot.width !== width || this.plot.height !== height)) this.plot.setSize({ width, height });
-  }
-
-  private options(chart: Chart, width: number): uPlot.Options {
+  private options(chart: Chart, width: number, height: number): uPlot.Options {
     const text = this.app.cssColor("--text");
     const grid = this.app.cssColor("--line");
     const font = "11px system-ui, sans-serif";
     const axis = { stroke: text, font, labelFont: font, labelSize: 18, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, size: 4 } };
     return {
       width,
-      height: 200,
+      height,
       padding: [8, 12, 0, 0],
       cursor: { y: false, drag: { x: false, y: false } },
       scales: {
@@ -120,7 +111,7 @@ export class Curves {
     const { ctx, bbox } = plot;
     const scale = window.devicePixelRatio || 1;
     ctx.save();
-    ctx.strokeStyle = ctx.fillStyle = this.app.cssColor("--accent");
+    ctx.strokeStyle = ctx.fillStyle = this.app.cssColor("--text");
     ctx.lineWidth = scale;
     ctx.font = `${11 * scale}px system-ui, sans-serif`;
     (this.last?.marks ?? []).forEach((mark, i) => {

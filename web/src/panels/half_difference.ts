@@ -40,6 +40,7 @@ class HalfDifferencePanel implements Panel {
   private key!: HTMLElement;
   private note!: HTMLElement;
   private ask!: () => void;
+  private readonly figures: Figure[] = [];
   private span: [number, number] = [0, 1];
 
   mount(host: HTMLElement, app: App): void {
@@ -63,7 +64,9 @@ class HalfDifferencePanel implements Panel {
     body.append(this.curvesHost, this.imagesHost);
     this.key = element("div", "p-legend");
     this.note = element("div", "p-note");
-    host.append(bar, body, this.key, this.note);
+    const foot = element("div", "p-foot");
+    foot.append(this.key, this.note);
+    host.append(bar, body, foot);
     this.curves = new Curves(this.curvesHost, app);
     this.ask = latest(app, () => this.compute());
     this.ask();
@@ -154,48 +157,66 @@ class HalfDifferencePanel implements Panel {
     const all = Float32Array.from(images.flatMap(({ rgb }) => Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)))).filter((v) => v > 0);
     const high = quantile(all, 0.99) || 1;
     this.span = [Math.min(Math.max(quantile(all, 0.01), high / 10 ** DECADES), high / 10), high];
-    this.imagesHost.replaceChildren(...images.map((image) => this.picture(image, settings)));
+    while (this.figures.length < images.length) this.figures.push(new Figure(app));
+    while (this.imagesHost.children.length > images.length) this.imagesHost.lastElementChild?.remove();
+    images.forEach((image, i) => {
+      const figure = this.figures[i] as Figure;
+      if (!figure.host.isConnected) this.imagesHost.append(figure.host);
+      figure.show(image, settings, this.span);
+    });
     legend(this.key, models);
     const scale = settings.falseColor
       ? `${channel}, viridis from ${short(this.span[0])} or less to ${short(this.span[1])} 1/sr or more (log)`
       : `f · 2^${short(settings.exposure)} shown as sRGB; 1 and more is white`;
     this.note.textContent = `f(θh, θd) at φd ${settings.phiD}°; ${scale}. Hatched: ωo or ωi below the surface.`;
   }
+}
 
-  private picture({ model, rgb }: Image, settings: typeof DEFAULTS): HTMLElement {
-    const { app } = this;
-    const figure = element("figure", "p-figure");
-    const read = element("figcaption", "p-read", model.label);
-    const bitmap = element("canvas");
-    bitmap.width = bitmap.height = SIDE;
-    const channel = channelIn(app);
-    const image = settings.falseColor
-      ? paint(Float32Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(rgb, i, channel)), SIDE, SIDE, "viridis", ...this.span, true)
-      : srgbImage(rgb, 2 ** settings.exposure);
-    (bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(image, 0, 0);
-    const sketch = new Sketch(figure, (context, width, height) => {
+/** One model's image slice, with its axes and the numbers under the pointer. */
+class Figure {
+  readonly host = element("figure", "p-figure");
+  private readonly read = element("figcaption", "p-read");
+  private readonly bitmap = Object.assign(element("canvas"), { width: SIDE, height: SIDE });
+  private readonly sketch: Sketch;
+  private image: Image | null = null;
+
+  constructor(private readonly app: App) {
+    this.sketch = new Sketch(this.host, (context, width, height) => {
       const box = plotBox(width, height);
       hatch(context, box, app.cssColor("--line"));
       context.imageSmoothingEnabled = false;
-      context.drawImage(bitmap, box.x, box.y, box.size, box.size);
-      frame(context, box, app.cssColor("--text"), model.color);
+      context.drawImage(this.bitmap, box.x, box.y, box.size, box.size);
+      frame(context, box, app.cssColor("--text"), this.image?.model.color ?? "");
     });
-    figure.append(read);
-    const point = (event: PointerEvent) => {
-      const bounds = sketch.canvas.getBoundingClientRect();
-      const box = plotBox(bounds.width, bounds.height);
-      const [x, y] = [(event.clientX - bounds.left - box.x) / box.size, (event.clientY - bounds.top - box.y) / box.size];
-      if (x < 0 || y < 0 || x >= 1 || y >= 1) return;
-      const [column, row] = [Math.floor(x * SIDE), Math.floor(y * SIDE)];
-      const i = row * SIDE + column;
-      const numbers = [0, 1, 2].map((c) => rgb[3 * i + c] as number);
-      const angles = `θh ${short(angleAt(column) / RADIANS)}° θd ${short(angleAt(SIDE - 1 - row) / RADIANS)}°`;
-      read.textContent = Number.isNaN(numbers[0]) ? `${model.letter}  ${angles}: below the surface` : `${model.letter}  ${angles}: ${numbers.map(exact).join("  ")} 1/sr`;
-    };
-    sketch.canvas.addEventListener("pointermove", point);
-    sketch.canvas.addEventListener("pointerdown", point);
-    sketch.canvas.addEventListener("pointerleave", () => (read.textContent = model.label));
-    return figure;
+    this.host.append(this.read);
+    const point = (event: PointerEvent) => this.point(event);
+    this.sketch.canvas.addEventListener("pointermove", point);
+    this.sketch.canvas.addEventListener("pointerdown", point);
+    this.sketch.canvas.addEventListener("pointerleave", () => (this.read.textContent = this.image?.model.label ?? ""));
+  }
+
+  show(image: Image, settings: typeof DEFAULTS, span: [number, number]): void {
+    this.image = image;
+    this.read.textContent = image.model.label;
+    const channel = channelIn(this.app);
+    const pixels = settings.falseColor
+      ? paint(Float32Array.from({ length: SIDE * SIDE }, (_, i) => channelOf(image.rgb, i, channel)), SIDE, SIDE, "viridis", ...span, true)
+      : srgbImage(image.rgb, 2 ** settings.exposure);
+    (this.bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(pixels, 0, 0);
+    this.sketch.redraw();
+  }
+
+  private point(event: PointerEvent): void {
+    if (!this.image) return;
+    const { model, rgb } = this.image;
+    const bounds = this.sketch.canvas.getBoundingClientRect();
+    const box = plotBox(bounds.width, bounds.height);
+    const [x, y] = [(event.clientX - bounds.left - box.x) / box.size, (event.clientY - bounds.top - box.y) / box.size];
+    if (x < 0 || y < 0 || x >= 1 || y >= 1) return;
+    const [column, row] = [Math.floor(x * SIDE), Math.floor(y * SIDE)];
+    const numbers = [0, 1, 2].map((c) => rgb[3 * (row * SIDE + column) + c] as number);
+    const angles = `θh ${short(angleAt(column) / RADIANS)}° θd ${short(angleAt(SIDE - 1 - row) / RADIANS)}°`;
+    this.read.textContent = `${model.letter}  ${angles}: ${Number.isNaN(numbers[0]) ? "below the surface" : `${numbers.map(exact).join("  ")} 1/sr`}`;
   }
 }
 

@@ -37,7 +37,9 @@ class LobePanel implements Panel {
     const body = element("div", "p-body p-lobe");
     this.key = element("div", "p-legend");
     this.note = element("div", "p-note");
-    host.append(bar, body, this.key, this.note);
+    const foot = element("div", "p-foot");
+    foot.append(this.key, this.note);
+    host.append(bar, body, foot);
     this.view = new LobeView(body, lobeIndices());
     this.ask = latest(app, () => this.compute());
     this.ask();
@@ -60,8 +62,7 @@ class LobePanel implements Panel {
     this.viewing.show(models.some((m) => m.shader.manifest.transmits));
     this.log.show(log);
     this.color.show(color);
-    const lobes: Lobe[] = [];
-    for (const model of models) lobes.push(await lobeOf(evaluatorOf(app), model, wo, channel));
+    const lobes: Lobe[] = await Promise.all(models.map((model) => lobeOf(evaluatorOf(app), model, wo, channel)));
     const peak = Math.max(...lobes.map((l) => l.peak), 0);
     const byValue = color === "value" || (color === "auto" && lobes.length === 1);
     const surfaces = lobes.map((lobe): Surface => {
@@ -88,7 +89,7 @@ class LobePanel implements Panel {
     const arrows: Arrow[] = [
       { direction: [0, 0, 1], color: ink, label: "n" },
       { direction: [1, 0, 0], color: ink, label: "t" },
-      { direction: wo, color: rgb(app.cssColor("--accent")), label: "ωo" },
+      { direction: wo, color: ink, label: "ωo" },
     ];
     this.view.show(surfaces, arrows, ink.map((v) => 0.5 * v + 0.25) as Vec3);
     legend(this.key, models, (m) => `: largest ${short(lobes.find((l) => l.model === m)?.peak ?? 0)} 1/sr`);

@@ -20,7 +20,7 @@ class ProbePanel implements Panel {
     host.classList.add("p-panel");
     this.table = element("table", "p-numbers");
     this.note = element("div", "p-note");
-    const body = element("div", "p-body");
+    const body = element("div", "p-fit");
     body.append(this.table);
     host.append(body, this.note);
     const point = (event: PointerEvent) => {

@@ -48,7 +48,9 @@ class SlicesPanel implements Panel {
     body.append(left, right);
     this.key = element("div", "p-legend");
     this.note = element("div", "p-note");
-    host.append(bar, body, this.key, this.note);
+    const foot = element("div", "p-foot");
+    foot.append(this.key, this.note);
+    host.append(bar, body, foot);
     this.sketch = new Sketch(left, (context, width, height) => this.drawPolar(context, width, height));
     this.curves = new Curves(right, app);
     this.ask = latest(app, () => this.compute());
@@ -88,21 +90,20 @@ class SlicesPanel implements Panel {
     };
     const even = Array.from({ length: 721 }, (_, i) => -half + ((i + 0.5) * 2 * half) / 721);
     const angles = [...even, thetaOf(wo) / RADIANS];
+    const coarse = angles.slice();
     // Angles crowd round the largest value of each model and side: a narrow lobe is drawn with its true height.
-    for (const model of models) {
-      const values = await read(model, angles);
+    for (const values of await Promise.all(models.map((model) => read(model, coarse)))) {
       for (const side of [(a: number) => Math.abs(a) < 90, (a: number) => Math.abs(a) > 90]) {
         let best = -1;
         values.forEach((v, i) => {
-          if (side(angles[i] as number) && (best < 0 || v > (values[best] as number))) best = i;
+          if (side(coarse[i] as number) && (best < 0 || v > (values[best] as number))) best = i;
         });
-        const centre = best < 0 ? null : (angles[best] as number);
+        const centre = best < 0 ? null : (coarse[best] as number);
         if (centre !== null) for (let k = -40; k <= 40; k++) if (k) angles.push(centre + Math.sign(k) * 10 ** (-3.5 + (4 * Math.abs(k)) / 40));
       }
     }
     const sorted = [...new Set(angles)].filter((a) => Math.abs(a) < half).sort((a, b) => a - b);
-    const slices: Slice[] = [];
-    for (const model of models) slices.push({ model, values: await read(model, sorted) });
+    const slices: Slice[] = await Promise.all(models.map(async (model) => ({ model, values: await read(model, sorted) })));
     const unit = `${QUANTITIES[quantity]} (1/sr)`;
     this.drawn = { angles: sorted, slices, wo: -thetaOf(wo) / RADIANS, half, unit };
     this.sketch.redraw();
@@ -173,7 +174,7 @@ class SlicesPanel implements Panel {
 
   private arrow(context: CanvasRenderingContext2D, from: [number, number], to: [number, number]): void {
     const angle = Math.atan2(to[1] - from[1], to[0] - from[0]);
-    context.strokeStyle = context.fillStyle = this.app.cssColor("--accent");
+    context.strokeStyle = context.fillStyle = this.app.cssColor("--text");
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(...from);
