@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import gonio as go
@@ -80,7 +81,7 @@ def test_a_lambert_ball_under_a_directional_light_is_the_closed_form() -> None:
 
 def test_the_homeworks_balls_are_their_models_eval() -> None:
     """What a shader has to draw: eval at every point of every ball, averaged over the pixel."""
-    what, size, fine = stage.homework(), (96, 54), 12
+    what, size, fine = stage.homework(), (96, 54), 16
     camera, light = what.framed(), what.lights[0]
     reference = picture(Reference(what), scene(what, [light], size=size, spp=1024))
     expected, whole = np.zeros((size[1], size[0], 3)), np.zeros((size[1], size[0]), bool)
@@ -101,9 +102,9 @@ def test_the_homeworks_balls_are_their_models_eval() -> None:
             expected += boxes(value, fine) * light["irradiance"]
             whole |= boxes(on_ball * 1.0, fine)[..., 0] == 1.0
     counted = whole & (reference[..., 3] == 1.0)
-    assert counted.sum() > 1000
+    assert counted.sum() > 800
     test, truth = expected[counted], reference[counted][:, :3]
-    assert np.mean((test - truth) ** 2 / (truth**2 + 0.01)) < 1e-6
+    assert np.mean((test - truth) ** 2 / (truth**2 + 0.01)) < 1e-5
 
 
 def test_two_balls_neither_shadow_nor_light_each_other() -> None:
@@ -196,6 +197,20 @@ def test_values_reach_the_picture() -> None:
     assert more[..., 0].sum() == pytest.approx(2 * half[..., 0].sum(), rel=1e-3)
     assert more[..., 1].sum() == pytest.approx(half[..., 1].sum(), rel=1e-3)
     assert more[..., 2].sum() == 0.0
+
+
+def test_a_class_of_the_users_own_is_rendered_and_no_model_of_that_name(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(
+        "from gonio.models.base import BSDF, spectrum\nfrom gonio import ops\n\n"
+        "class Lambert(BSDF):\n    tint_: object = spectrum(default=0.25, doc='share', high=1.0)\n\n"
+        "    def eval(self, wo, wi, mode='radiance'):\n"
+        "        return self.tint_ * ops.where((wo.z > 0.0) & (wi.z > 0.0), wi.z * ops.inv_pi, 0.0)\n"
+    )
+    own = one_ball(stage.of_targets([f"{tmp_path / 'own.py'}:Lambert"]).materials["m0"].bsdf)
+    built_in = one_ball(go.Lambert(albedo=0.5))
+    quarter = picture(Reference(own), scene(own, [SUN], balls=[{"tint_": [0.25] * 3}]))
+    half = picture(Reference(built_in), scene(built_in, [SUN]))
+    assert half[..., :3].sum() == pytest.approx(2 * quarter[..., :3].sum(), rel=1e-3)
 
 
 def test_every_pass_is_the_same_picture_whatever_the_pauses() -> None:
