@@ -44,6 +44,7 @@ export class PageApp implements App {
   private lastFrame = 0;
   private scheduled = false;
   private dirty = false;
+  private converging = false;
   private resolveReady: () => void = () => {};
 
   constructor(
@@ -55,7 +56,7 @@ export class PageApp implements App {
     if (!gl) throw new Error("This browser has no WebGL 2, which the page draws with.");
     this.gl = gl;
     this.store = new Store(data);
-    this.store.state = decodeState(location.hash, this.store.initial);
+    this.store.state = this.fromLink();
     this.shaders = new ShaderLibrary(gl, data);
     this.renderer = new Renderer(gl, this.shaders);
     this.ready = new Promise((resolve) => {
@@ -69,10 +70,14 @@ export class PageApp implements App {
     new ResizeObserver(() => this.resized()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.themeChanged());
     addEventListener("hashchange", () => {
-      if (location.hash.replace(/^#/, "") !== encodeState(this.state, this.store.initial)) this.store.replace(decodeState(location.hash, this.store.initial));
+      if (location.hash.replace(/^#/, "") !== encodeState(this.state, this.store.initial)) this.store.replace(this.fromLink());
     });
     this.themeChanged();
     this.resized();
+  }
+
+  private fromLink(): State {
+    return decodeState(location.hash, this.store.initial, (id) => this.data.materials.some((m) => m.id === id));
   }
 
   get state(): State {
@@ -206,6 +211,7 @@ export class PageApp implements App {
   }
 
   private frame(now: number): void {
+    if (this.converging) return this.schedule();
     const moving = now - this.changed < MOTION;
     // How long the last picture took shows in when this one may begin.
     const took = now - this.lastFrame;
@@ -236,19 +242,29 @@ export class PageApp implements App {
     }
   }
 
-  /** Draws until the picture is done or has so many samples: for a screenshot, a comparison, a test. */
+  /**
+   * Draws until the picture is done or has so many samples, begun anew where it has more already: one state and one
+   * number of samples give one picture, to the bit.
+   */
   async converge(samples = Infinity): Promise<Picture> {
-    this.changed = -Infinity;
-    if (this.dirty) this.renderer.invalidate();
-    this.dirty = false;
+    const { renderer } = this;
     const scene = this.scene();
     const [width, height] = this.size();
-    this.renderer.resize(width, height);
-    while (!this.renderer.done(scene) && this.renderer.samples < samples) {
-      for (let i = 0; i < 8 && !this.renderer.done(scene); i++) this.renderer.step(scene, false);
-      await new Promise((resolve) => setTimeout(resolve));
+    this.converging = true;
+    try {
+      renderer.resize(width, height);
+      if (this.dirty || renderer.samples > samples) renderer.invalidate();
+      this.dirty = false;
+      this.changed = -Infinity;
+      const wanted = () => !renderer.done(scene) && (renderer.samples < samples || !renderer.settled);
+      while (wanted()) {
+        for (let i = 0; i < 8 && wanted(); i++) renderer.step(scene, false);
+        await new Promise((resolve) => setTimeout(resolve));
+      }
+    } finally {
+      this.converging = false;
     }
-    this.renderer.present(scene, this.presenter, this.canvas.width, this.canvas.height);
+    renderer.present(scene, this.presenter, this.canvas.width, this.canvas.height);
     return this.picture();
   }
 

@@ -24,7 +24,8 @@ export function createEnvironment(gl: WebGL2RenderingContext, width: number, hei
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, width, height, 0, gl.RGBA, gl.HALF_FLOAT, half);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.REPEAT);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
@@ -77,7 +78,7 @@ export class AlbedoTables {
     return this.target?.texture ?? null;
   }
 
-  /** The row of a ball; `fresh` tells that its sum is not complete yet. Runs `passes` more passes when it is not. */
+  /** The row of a ball; runs `passes` more passes while its sum is not complete. */
   row(shader: Shader, values: Values, passes: number): { row: number; complete: boolean; finished: boolean } {
     const { gl } = this;
     this.target ??= createTarget(gl, ALBEDO_WIDTH, ALBEDO_ROWS, this.full, false);
@@ -150,7 +151,7 @@ export class PrefilteredEnvironments {
   ) {}
 
   /** Texture and level for a ball. */
-  of(shader: Shader, values: Values, picture: EnvironmentPicture): { texture: WebGLTexture; level: number; finished: boolean } {
+  of(shader: Shader, values: Values, picture: EnvironmentPicture): { texture: WebGLTexture; level: number; complete: boolean; finished: boolean } {
     const alpha = shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null);
     const rest = { ...values };
     if (alpha) delete rest[alpha.path];
@@ -169,6 +170,7 @@ export class PrefilteredEnvironments {
     return {
       texture: entry.texture,
       level: Math.min(mean, 1) * (entry.framebuffers.length - 1),
+      complete: entry.passes >= LEVEL_PASSES,
       finished: before < LEVEL_PASSES && entry.passes >= LEVEL_PASSES,
     };
   }

@@ -366,7 +366,12 @@ void main() {
     vec3 u = fract(start + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
     Sample s = ${call("sample", "vec3(0.0, 0.0, 1.0), u")};
     float weight = dot(s.weight, vec3(1.0 / 3.0));
-    if (weight > 0.0) sum += weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), 0.0).rgb, 1.0);
+    // As much of the picture as one sample stands for, by its mip levels (Krivanek and Colbert 2008): a small sun
+    // would else be hit by few samples and leave blotches.
+    float share = 1.0 / (${samples * 4}.0 * max(s.pdf, 1e-6));
+    vec2 texels = vec2(textureSize(environment_map, 0));
+    float lod = s.delta ? 0.0 : max(0.0, 0.5 * log2(share * texels.x * texels.y / 12.566370614359172) + 0.5);
+    if (weight > 0.0) sum += weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), lod).rgb, 1.0);
   }
   color = sum;
 }

@@ -58,6 +58,8 @@ export class Renderer {
   private readonly empty: WebGLVertexArrayObject;
   private black: WebGLTexture;
   private restart = false;
+  /** False while tables that the picture is made of still refine. */
+  settled = true;
 
   constructor(
     readonly gl: WebGL2RenderingContext,
@@ -111,6 +113,7 @@ export class Renderer {
     const frame = cameraFrame(scene.state.camera);
     const draws = this.draws(scene, frame);
     // Tables first: they have their own framebuffers.
+    this.settled = true;
     const prepared = draws.map((draw) => ({ draw, ...this.prepare(scene, draw, hurry) }));
     if (this.restart) {
       this.restart = false;
@@ -125,14 +128,20 @@ export class Renderer {
     gl.depthFunc(gl.LEQUAL);
     gl.clearColor(0, 0, 0, 0);
     gl.clearDepth(1);
-    gl.clear(gl.DEPTH_BUFFER_BIT | (this.samples === 0 ? gl.COLOR_BUFFER_BIT : 0));
-    if (scene.mesh) this.depthPass(scene.mesh, draws, frame);
+    gl.clear(gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT | (this.samples === 0 ? gl.COLOR_BUFFER_BIT : 0));
+    if (scene.mesh) {
+      this.depthPass(scene.mesh, draws, frame);
+      // Two triangles at one depth would both add their light: the first counts.
+      gl.enable(gl.STENCIL_TEST);
+      gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+    }
     gl.enable(gl.BLEND);
     gl.blendEquation(gl.FUNC_ADD);
     gl.blendFunc(gl.ONE, gl.ONE);
     for (const { draw, program, row, level } of prepared) this.draw(scene, frame, draw, program, row, level);
     gl.disable(gl.BLEND);
     gl.disable(gl.DEPTH_TEST);
+    gl.disable(gl.STENCIL_TEST);
     gl.bindVertexArray(null);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     this.samples += 1;
@@ -180,11 +189,13 @@ export class Renderer {
       const made = this.albedo.row(draw.shader, draw.values, hurry ? 1 : 4);
       row = made.row;
       if (made.finished) this.restart = true;
+      if (!made.complete) this.settled = false;
     }
     if (use === "split-sum" && scene.environment) {
       const made = this.prefiltered.of(draw.shader, draw.values, scene.environment);
       level = made;
       if (made.finished) this.restart = true;
+      if (!made.complete) this.settled = false;
     }
     const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${use} ${key.term}`;
     return { program: this.shaders.program(name, vertexText(draw.shader, key.geometry), fragmentText(draw.shader, key)), row, level };
@@ -248,6 +259,7 @@ export class Renderer {
     gl.uniform1f(program.uniform("draw_cover"), draw.cover);
     gl.uniform1f(program.uniform("nearer"), draw.nearer);
     if (scene.mesh) {
+      gl.stencilFunc(gl.EQUAL, draw.cover > 0 ? 0 : 1, 255);
       gl.bindVertexArray(scene.mesh.array);
       gl.drawElements(gl.TRIANGLES, scene.mesh.count, gl.UNSIGNED_INT, 0);
       return;

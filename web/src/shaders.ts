@@ -126,8 +126,9 @@ export function fieldValue(field: Field, manifest: Manifest, values: Values): nu
   const kind = manifest.parameters.find((p) => p.path === field.path)?.kind;
   if (kind === "angle" && typeof value === "number") return [Math.cos(value), Math.sin(value)];
   const size = { float: 1, vec2: 2, vec3: 3 }[field.type];
-  if (typeof value === "number") return Array<number>(size).fill(value);
-  return Array.isArray(value) ? value : [field.value].flat();
+  if (typeof value === "number" && Number.isFinite(value)) return Array<number>(size).fill(value);
+  // A link may say anything: what does not fit counts as not said.
+  return Array.isArray(value) && value.length === size && value.every(Number.isFinite) ? value : [field.value].flat();
 }
 
 function setField(gl: WebGL2RenderingContext, location: WebGLUniformLocation, field: Field, value: number[]): void {

@@ -1,5 +1,6 @@
 /** The state in the URL's fragment: what differs from the page's initial state, as JSON in base64url. */
-import type { State } from "./state";
+import { newLight } from "./lights";
+import type { Light, State } from "./state";
 
 type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
 
@@ -12,18 +13,65 @@ export function encodeState(state: State, initial: State): string {
   return `s=${btoa(binary).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "")}`;
 }
 
-/** The initial state with the fragment's patch; whatever does not fit (a newer page's, a stranger's) is left out. */
-export function decodeState(fragment: string, initial: State): State {
+/**
+ * The initial state with the fragment's patch; whatever does not fit (a newer page's, a stranger's) is left out.
+ * `known` tells whether the page holds a material.
+ */
+export function decodeState(fragment: string, initial: State, known: (material: string) => boolean = () => true): State {
   const match = /(?:^#?|&)s=([A-Za-z0-9_-]+)/.exec(fragment);
   const state = structuredClone(initial);
   if (!match) return state;
   try {
     const binary = atob((match[1] as string).replaceAll("-", "+").replaceAll("_", "/"));
     const patch = JSON.parse(new TextDecoder().decode(Uint8Array.from(binary, (c) => c.charCodeAt(0)))) as Json;
-    return merge(state as unknown as Json, patch, "") as unknown as State;
+    return bounded(merge(state as unknown as Json, patch, "") as unknown as State, initial, known);
   } catch {
     return state;
   }
+}
+
+/** Types fit by now; here what a type does not say: names that exist, numbers that can be drawn. */
+function bounded(state: State, initial: State, known: (material: string) => boolean): State {
+  const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
+  state.slots.forEach((slot, index) => {
+    if (!known(slot.material)) state.slots[index] = structuredClone(initial.slots[index] as State["slots"][number]);
+  });
+  if (state.solo !== null && !state.slots[state.solo]) state.solo = null;
+  if (!state.slots.some((slot) => slot.visible)) state.slots.forEach((slot) => (slot.visible = true));
+  const slot = Math.round(clamp(state.selection.slot, 0, state.slots.length - 1));
+  const balls = state.slots[slot]?.balls.length ?? 1;
+  state.selection = { slot, ball: Math.round(clamp(state.selection.ball, 0, balls - 1)) };
+  state.camera.distance = clamp(state.camera.distance, 0.5, 500);
+  state.camera.elevation = clamp(state.camera.elevation, -1.55, 1.55);
+  state.camera.fov = clamp(state.camera.fov, 2, 140);
+  state.view.spacing = clamp(state.view.spacing, 2, 20);
+  state.display.exposure = clamp(state.display.exposure, -30, 30);
+  state.dock.height = clamp(state.dock.height, 100, 4000);
+  const named: [holder: object, key: string, values: string[]][] = [
+    [state, "environment", ["sampled", "split-sum"]],
+    [state.view, "mesh", ["sphere", "shaderball", "torus", "file"]],
+    [state.view, "term", ["full", "D", "G", "F", "single", "multi", "compensated", "difference", "rows"]],
+    [state.view, "background", ["theme", "environment"]],
+    [state.display, "tone", ["none", "reinhard", "filmic"]],
+    [state.display, "theme", ["auto", "light", "dark"]],
+    [state.compare, "mode", ["off", "side", "wipe", "difference"]],
+  ];
+  for (const [holder, key, values] of named) {
+    const given = holder as Record<string, string>;
+    if (!values.includes(given[key] as string)) given[key] = values[0] as string;
+  }
+  return state;
+}
+
+/** A light of the link over a new one of its kind, so that every value it needs is there. */
+function lightFrom(patch: Json): Json[] {
+  const type = isObject(patch) ? patch["type"] : null;
+  if (type !== "directional" && type !== "point" && type !== "area" && type !== "environment") return [];
+  const made = newLight(type as Light["type"]) as unknown as { [key: string]: Json };
+  const image = isObject(patch) && isObject(patch["image"]) ? patch["image"] : null;
+  const sized = image && typeof image["width"] === "number" && typeof image["height"] === "number";
+  const merged = merge(made, patch, "light") as { [key: string]: Json };
+  return [type === "environment" ? { ...merged, image: sized ? { width: image["width"] as Json, height: image["height"] as Json, data: null } : null } : merged];
 }
 
 const isObject = (value: unknown): value is { [key: string]: Json } =>
@@ -42,6 +90,11 @@ function difference(before: Json | undefined, after: Json): Json | undefined {
   if (isObject(after) && isObject(before)) {
     const changed: { [key: string]: Json } = {};
     for (const key of Object.keys(after)) {
+      // Lights come and go: a list of them is written whole.
+      if (key === "lights") {
+        if (JSON.stringify(before[key]) !== JSON.stringify(after[key])) changed[key] = after[key] as Json;
+        continue;
+      }
       const inner = difference(before[key], after[key] as Json);
       if (inner !== undefined) changed[key] = inner;
     }
@@ -58,7 +111,8 @@ const FORBIDDEN = new Set(["__proto__", "constructor", "prototype"]);
 
 function merge(base: Json, patch: Json, path: string): Json {
   if (Array.isArray(base)) {
-    if (Array.isArray(patch)) return base.length === 0 || patch.every((v) => sameKind(base[0] as Json, v)) ? patch : base;
+    if (path === "lights") return Array.isArray(patch) ? patch.slice(0, 8).flatMap(lightFrom) : base;
+    if (Array.isArray(patch)) return patch.length === base.length && base.every((v, i) => !isObject(v) && sameKind(v, patch[i] as Json)) ? patch : base;
     if (!isObject(patch)) return base;
     return base.map((value, index) => (index in patch ? merge(value, patch[index] as Json, `${path}.${index}`) : value));
   }
@@ -76,9 +130,11 @@ function merge(base: Json, patch: Json, path: string): Json {
     }
     return merged;
   }
-  // null stands for "none" in solo, an open tab or an environment's picture, so it may take a value and give it back.
-  if (base === null || patch === null) return isObject(patch) && !/image$/.test(path) ? base : patch;
-  return sameKind(base, patch) ? patch : base;
+  // null stands for "none" in these, which may take a value and give it back.
+  if (path === "solo") return patch === null || (typeof patch === "number" && Number.isFinite(patch)) ? patch : base;
+  if (path === "dock.open") return patch === null || typeof patch === "string" ? patch : base;
+  if (FREE.test(path) && !isObject(patch)) return patch;
+  return patch !== null && sameKind(base, patch) ? patch : base;
 }
 
 function sameKind(a: Json, b: Json): boolean {
