@@ -95,17 +95,17 @@ class AlbedoPanel implements Panel {
     const bands: [number, number, string][] = [];
     let highest = 1;
     for (const model of models) {
+      // Without an estimate yet, a curve of no points: the plot need not be made anew when it comes.
       const estimate = estimates.get(model);
-      if (!estimate) continue;
-      const mean = MUS.map((_, i) => channelOf(estimate.value, i, channel));
-      // Channels come from the same samples: their errors add linearly at most, weights sum to one.
-      const error = MUS.map((_, i) => channelOf(estimate.error, i, channel));
+      const mean = MUS.map((_, i) => (estimate ? channelOf(estimate.value, i, channel) : null));
+      // All channels come from the same samples: the error of their weighted sum is at most the sum of their errors.
+      const edge = (side: number) => mean.map((v, i) => (v === null || !estimate ? null : v + side * channelOf(estimate.error, i, channel)));
       series.push({ label: `E ${model.letter}`, color: model.color, values: mean });
       const at = series.length;
-      series.push({ label: `${model.letter} +2σ`, color: "transparent", values: mean.map((v, i) => v + 2 * (error[i] as number)), width: 0, edge: true });
-      series.push({ label: `${model.letter} −2σ`, color: "transparent", values: mean.map((v, i) => v - 2 * (error[i] as number)), width: 0, edge: true });
+      series.push({ label: `${model.letter} +2σ`, color: "transparent", values: edge(2), width: 0, edge: true });
+      series.push({ label: `${model.letter} −2σ`, color: "transparent", values: edge(-2), width: 0, edge: true });
       bands.push([at, at + 1, `color-mix(in srgb, ${model.color} 30%, transparent)`]);
-      highest = Math.max(highest, ...mean);
+      highest = Math.max(highest, ...mean.map((v) => v ?? 0));
     }
     this.curves.show({
       x: MUS,
