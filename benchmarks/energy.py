@@ -29,7 +29,7 @@ CENTRES = (np.arange(128) + 0.5) / 128
 MU, ROUGHNESS = np.meshgrid(CENTRES, CENTRES)
 NDFS = ("ggx", "beckmann", "student-t")
 MASKINGS = ("smith-correlated", "smith-separable", "smith-separable-exact", "schlick-direct", "schlick-ibl")
-STEEP = np.array([0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0])
+STEEP = np.array([0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.985, 1.0])
 
 
 def figure(what: str, value: float, bar: float | None = None, form: str = ".1e", at_least: bool = False) -> None:

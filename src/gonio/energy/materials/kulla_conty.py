@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ...models.base import choice
+from typing import ClassVar
+
+from ...models.base import Breach, choice
 from ...models.conductor import Conductor
 from ...models.dielectric import Dielectric
 from .. import fresnel_average
@@ -34,6 +36,13 @@ class KullaConty(_Added):
     lays a false bright rim on smooth surfaces.
     """
 
+    breaks: ClassVar[dict[str, Breach]] = {
+        "gradients": Breach(
+            "a measured base is drawn from anew for each value, and samples that change lobes shift E by 1e-4",
+            lambda model: 2.0 if model.measured else 0.0,
+            certain=False,
+        )
+    }
     color: str = choice(default="bounce", doc="colour of the light that is given back", choices=COLORS)
     average: str = choice(
         default="exact", doc="how F_avg of a conductor or dielectric is found", choices=fresnel_average.KINDS
