@@ -135,12 +135,12 @@ PICTURES = f"async () => {{ {_TEXT} return [text(await gonio.converge()), text(g
 # Milliseconds of drawing one row alone, many samples of it, by turns; the readback waits for the GPU.
 COST = """async () => {
   const least = [Infinity, Infinity];
-  for (let round = 0; round < 8; round++) for (const solo of [0, 1]) {
+  for (let round = 0; round < 20; round++) for (const solo of [0, 1]) {
     gonio.setState((state) => { state.solo = solo; });
     await gonio.converge(1);
     const scene = gonio.app.scene();
     const started = performance.now();
-    for (let i = 0; i < 40; i++) gonio.app.renderer.step(scene, false);
+    for (let i = 0; i < 20; i++) gonio.app.renderer.step(scene, false);
     gonio.readPixels();
     least[solo] = Math.min(least[solo], performance.now() - started);
   }
