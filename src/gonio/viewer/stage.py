@@ -72,11 +72,14 @@ class Stage:
     notes: tuple[str, ...] = ()
 
     def framed(self) -> dict[str, Any]:
-        """The camera, far enough away that all balls stand in a picture of 1.4 : 1 or wider, with some air."""
+        """The camera, far enough away that all balls stand in a picture of 16 : 9 or wider, with some air.
+
+        The page keeps the horizontal field of view in narrower pictures, so they hold all balls too.
+        """
         across = (max(len(row.balls) for row in self.rows) - 1) * SPACING / 2 + 1.25
         up = (len(self.rows) - 1) * SPACING / 2 + 1.25
         half = math.tan(math.radians(CAMERA["fov"]) / 2)
-        distance = max(up / half, across / (half * 1.4), 4.0) + 0.3
+        distance = max(up / half, across / (half * 16 / 9), 4.0) + 0.3
         return {**CAMERA, "distance": round(distance, 2), **self.camera}
 
 
