@@ -169,10 +169,8 @@ def sincos(x: Any) -> tuple[Any, Any]:
 
 
 def fma(a: Any, b: Any, c: Any) -> Any:
-    """a b + c in one operation, rounded once; recorded as the two that it is."""
-    if is_drjit(a) or is_drjit(b) or is_drjit(c):
-        return drjit().fma(a, b, c)
-    return a * b + c
+    """a b + c, in float32 in one operation and rounded once; float64, the oracle, rounds both as NumPy does."""
+    return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
 
 @function
