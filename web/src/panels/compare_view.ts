@@ -18,7 +18,8 @@ uniform sampler2D raster;      // sums, bottom row first
 uniform sampler2D reference;   // means, top row first
 uniform sampler2D differences; // top row first; negative: does not count
 uniform sampler2D colors;
-uniform float samples, exposure, wipe, high;
+uniform float samples, exposure, wipe, high, shrink;
+uniform vec2 middle;
 uniform int curve, mode;
 uniform bool stacked, furnace;
 uniform vec3 theme;            // colour behind the balls, sRGB
@@ -41,13 +42,14 @@ void main() {
   if (mode <= 1) color = vec4(shown(picture(mode == 1, at)), 1.0);
   else if (mode == 2) color = vec4(shown(picture(at.x > wipe, at)), 1.0);
   else if (mode == 3) {
-    // Each picture at half its size; the mean of four pixels, since one in four would sparkle.
+    // Both cut to the part that holds the balls, each in its half. The mean of four: one pixel in several would sparkle.
     bool second = stacked ? at.y < 0.5 : at.x > 0.5;
-    vec2 half_at = stacked ? vec2(2.0 * at.x - 0.5, fract(2.0 * at.y)) : vec2(fract(2.0 * at.x), 2.0 * at.y - 0.5);
+    vec2 part = stacked ? vec2(at.x, fract(2.0 * at.y)) : vec2(fract(2.0 * at.x), at.y);
+    vec2 half_at = middle + (part - 0.5) * (stacked ? vec2(shrink, 0.5 * shrink) : vec2(0.5 * shrink, shrink));
     color = vec4(theme, 1.0);
     if (any(lessThan(half_at, vec2(0.0))) || any(greaterThan(half_at, vec2(1.0)))) return;
     vec4 sum = vec4(0.0);
-    for (int i = 0; i < 4; i++) sum += picture(second, half_at + (vec2(i & 1, i >> 1) - 0.5) / size);
+    for (int i = 0; i < 4; i++) sum += picture(second, half_at + 0.5 * shrink * (vec2(i & 1, i >> 1) - 0.5) / size);
     color = vec4(shown(0.25 * sum), 1.0);
   } else {
     float value = texture(differences, vec2(at.x, 1.0 - at.y)).r;
@@ -56,11 +58,23 @@ void main() {
 }
 `;
 
-/** Where in the picture a point of the canvas lies, both 0 to 1 from the top left; null in the margins. */
-export function pictureAt(mode: CompareMode, width: number, height: number, x: number, y: number): [number, number] | null {
-  if (mode !== "side") return [x, y];
-  const at: [number, number] = height > width ? [2 * x - 0.5, (2 * y) % 1] : [(2 * x) % 1, 2 * y - 0.5];
-  return at.every((v) => v >= 0 && v < 1) ? at : null;
+/** Left, bottom, right, top; 0 to 1. */
+type Box = [number, number, number, number];
+
+/** What the balls cover, a little more, and in steps of 1/32, so that it stands still while the picture converges. */
+function coveredBox({ width, height, data }: Picture): Box {
+  let [left, top, right, bottom] = [1, 1, 0, 0];
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < width; x++)
+      if ((data[4 * (y * width + x) + 3] as number) > 0.5) {
+        left = Math.min(left, x / width);
+        right = Math.max(right, (x + 1) / width);
+        top = Math.min(top, y / height);
+        bottom = Math.max(bottom, (y + 1) / height);
+      }
+  if (left > right) return [0, 0, 1, 1];
+  const out = (v: number) => Math.max(0, Math.floor(32 * v - 0.25) / 32);
+  return [out(left), out(1 - bottom), 1 - out(1 - right), 1 - out(top)];
 }
 
 interface Drawn {
@@ -73,7 +87,7 @@ interface Drawn {
 
 export class CompareView implements Presenter {
   private program: Program | null = null;
-  private reference: { picture: Picture; samples: number; texture: WebGLTexture } | null = null;
+  private reference: { picture: Picture; samples: number; texture: WebGLTexture; box: Box } | null = null;
   private differences: WebGLTexture | null = null;
   private colors: WebGLTexture | null = null;
   private vao: WebGLVertexArrayObject | null = null;
@@ -94,6 +108,26 @@ export class CompareView implements Presenter {
     if (mode === "difference" && !this.mapped) return false;
     this.draw(mode, { raster, reference: (this.reference as NonNullable<typeof this.reference>).texture, samples, width, height });
     return true;
+  }
+
+  /** Where in the picture a point of the canvas lies, both 0 to 1 from the top left; null in the margins. */
+  pictureAt(width: number, height: number, x: number, y: number): [number, number] | null {
+    if (this.app.state.compare.mode !== "side" || !this.reference) return [x, y];
+    const { middle, shrink } = this.crop(width, height);
+    const stacked = height > width;
+    const part = stacked ? [x, (2 * y) % 1] : [(2 * x) % 1, y];
+    const size = stacked ? [shrink, 0.5 * shrink] : [0.5 * shrink, shrink];
+    const u = middle[0] + ((part[0] as number) - 0.5) * (size[0] as number);
+    const v = 1 - middle[1] + ((part[1] as number) - 0.5) * (size[1] as number);
+    return u >= 0 && v >= 0 && u < 1 && v < 1 ? [u, v] : null;
+  }
+
+  /** Middle of what both halves show, from the bottom left, and how many pixels of the picture fall on one of the screen. */
+  private crop(width: number, height: number): { middle: [number, number]; shrink: number } {
+    const [left, bottom, right, top] = this.reference?.box ?? [0, 0, 1, 1];
+    const [w, h] = [right - left, top - bottom];
+    const shrink = Math.min(2, height > width ? Math.max(w, 2 * h) : Math.max(2 * w, h));
+    return { middle: [(left + right) / 2, (bottom + top) / 2], shrink };
   }
 
   /** Values a pixel, top row first; NaN: does not count. */
@@ -144,7 +178,7 @@ export class CompareView implements Presenter {
     if (known && known.picture === picture && known.samples === picture.samples) return true;
     const texture = known?.texture ?? gl.createTexture();
     image(gl, texture, gl.RGBA32F, picture.width, picture.height, gl.RGBA, gl.FLOAT, picture.data);
-    this.reference = { picture, samples: picture.samples, texture };
+    this.reference = { picture, samples: picture.samples, texture, box: coveredBox(picture) };
     return true;
   }
 
@@ -167,6 +201,9 @@ export class CompareView implements Presenter {
     });
     const numbers = { samples, exposure: 2 ** display.exposure, wipe: compare.wipe, high: this.high };
     for (const [name, value] of Object.entries(numbers)) gl.uniform1f(program.uniform(name), value);
+    const { middle, shrink } = this.crop(width, height);
+    gl.uniform2fv(program.uniform("middle"), middle);
+    gl.uniform1f(program.uniform("shrink"), shrink);
     gl.uniform1i(program.uniform("curve"), TONES[display.tone].index);
     gl.uniform1i(program.uniform("mode"), MODES[mode]);
     gl.uniform1i(program.uniform("stacked"), height > width ? 1 : 0);

@@ -98,6 +98,13 @@ export class Comparison {
       for (const listener of this.listeners) listener();
       return;
     }
+    const { term } = app.state.view;
+    if (term !== "full" && term !== "compensated") {
+      this.figures = this.pair = null;
+      this.lack = "The picture shows one term; the reference shows the whole material. Choose Full to compare.";
+      for (const listener of this.listeners) listener();
+      return;
+    }
     const pair = this.view.pair();
     if (!pair) {
       this.figures = this.pair = null;
@@ -160,8 +167,10 @@ export class Comparison {
     left.textContent = "raster";
     right.textContent = ready ? `reference, ${reference.samples} spp${reference.done ? "" : " …"}` : "";
     const stacked = tall && mode === "side";
-    Object.assign(left.style, { left: "8px", right: "auto" });
-    Object.assign(right.style, stacked ? { left: "8px", right: "auto", top: "calc(50% + 8px)" } : { left: "auto", right: "8px", top: "8px" });
+    // In the wipe the words go with the bar; below the page's own bar of terms in any case.
+    const bar = `${100 * wipe}%`;
+    Object.assign(left.style, mode === "wipe" ? { left: "auto", right: `calc(100% - ${bar} + 18px)` } : { left: "8px", right: "auto" });
+    Object.assign(right.style, mode === "wipe" ? { left: `calc(${bar} + 18px)`, top: "" } : stacked ? { left: "8px", top: "50%" } : { left: "50%", top: "" });
     this.scale.hidden = !(ready && mode === "difference");
     if (!this.scale.hidden) this.drawScale();
   }

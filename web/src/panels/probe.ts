@@ -1,7 +1,7 @@
 /** The numbers under the pointer: linear radiance of the raster picture and of the reference, and their difference. */
 import type { App, Panel, Picture } from "../panel";
 import { channelOf, element, exact } from "./base";
-import { pictureAt } from "./compare_view";
+import { comparisonOf } from "./comparison";
 
 class ProbePanel implements Panel {
   readonly id = "probe";
@@ -25,7 +25,7 @@ class ProbePanel implements Panel {
     host.append(body, this.note);
     const point = (event: PointerEvent) => {
       const { left, top, width, height } = app.canvas.getBoundingClientRect();
-      const at = pictureAt(app.state.compare.mode, width, height, (event.clientX - left) / width, (event.clientY - top) / height);
+      const at = comparisonOf(app).view.pictureAt(width, height, (event.clientX - left) / width, (event.clientY - top) / height);
       if (!at || at.some((v) => v < 0 || v >= 1)) return;
       this.at = at;
       this.soon();
