@@ -10,7 +10,7 @@ import type { Term } from "./state";
 export const MAX_LIGHTS = 8;
 
 /** How an environment acts on the surface. */
-export type EnvironmentUse = "none" | "sampled" | "albedo" | "split-sum";
+export type EnvironmentUse = "none" | "sampled" | "albedo" | "split-sum" | "dfg";
 
 export interface ShadingKey {
   geometry: "sphere" | "mesh";
@@ -210,6 +210,22 @@ vec3 prefiltered_radiance(vec3 d) {
 }
 `;
 
+const DFG = `
+uniform sampler2D dfg_table;      // A, B over mu (x) and roughness (y), at texel centres
+uniform float dfg_roughness;
+
+// Scale and bias of the reflectance at normal incidence (Karis2013), bilinear between texel centres
+vec2 page_dfg(float mu) {
+  vec2 size = vec2(textureSize(dfg_table, 0));
+  vec2 at = clamp(vec2(mu, dfg_roughness) * size - 0.5, vec2(0.0), size - 1.0);
+  ivec2 i = ivec2(min(floor(at), size - 2.0));
+  vec2 t = at - vec2(i);
+  vec2 low = mix(texelFetch(dfg_table, i, 0).rg, texelFetch(dfg_table, i + ivec2(1, 0), 0).rg, t.x);
+  vec2 high = mix(texelFetch(dfg_table, i + ivec2(0, 1), 0).rg, texelFetch(dfg_table, i + ivec2(1, 1), 0).rg, t.x);
+  return mix(low, high, t.y);
+}
+`;
+
 /** What of the scattering a term shows, as the value of eval would be: expression over `wo` and `wi`. */
 function scattered(shader: Shader, term: Term): string {
   const { call } = materialText(shader);
@@ -271,6 +287,12 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
     } else if (key.environment === "albedo") {
       parts.push(ALBEDO);
       body.push("  radiance += page_albedo(wo.z) * environment_constant * environment_scale;");
+    } else if (key.environment === "dfg") {
+      parts.push(DFG, SPLIT);
+      body.push(`  vec3 straight = ${call("terms", "vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 1.0)")}.F;`);
+      body.push("  vec2 scale_bias = page_dfg(wo.z);");
+      body.push("  vec3 mirrored = frame * vec3(-wo.xy, wo.z);");
+      body.push("  radiance += (straight * scale_bias.x + scale_bias.y) * prefiltered_radiance(mirrored) * environment_scale;");
     } else if (key.environment === "split-sum") {
       parts.push(ALBEDO, SPLIT);
       body.push("  vec3 mirrored = frame * vec3(-wo.xy, wo.z);");

@@ -4,10 +4,10 @@
  * A sample's position in the pixel and its random numbers come from low-discrepancy sequences, so that the sum tends
  * to the box-filtered picture that a path tracer makes. Only the pixels that a ball may cover are visited.
  */
-import type { Values, Vec3 } from "./data";
+import { type Values, type Vec3, decodeFloats } from "./data";
 import { TONES, displayProgram } from "./display";
 import { AlbedoTables, type EnvironmentPicture, PrefilteredEnvironments } from "./environment";
-import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, fragmentText, isFactor, vertexText } from "./glsl";
+import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, fragmentText, hasTerm, isFactor, vertexText } from "./glsl";
 import { actingLights, bindLights, environmentOf, localLights } from "./lights";
 import type { MeshBuffers } from "./meshes";
 import type { Picture, Presenter } from "./panel";
@@ -47,6 +47,9 @@ const SAMPLES_STILL = 256;
 const SAMPLES_RANDOM = 4096;
 const SAMPLES_HALF = 64; // float16 sums: at 64 a sample is still 16 units in the last place
 
+/** Path of the width that roughness means for this material, or null. */
+const alphaOf = (shader: Shader): string | null => shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null)?.path ?? null;
+
 export class Renderer {
   samples = 0;
   /** Draw calls and pictures since the page was loaded, for tests and the status line. */
@@ -57,6 +60,7 @@ export class Renderer {
   private readonly prefiltered: PrefilteredEnvironments;
   private readonly empty: WebGLVertexArrayObject;
   private black: WebGLTexture;
+  private readonly dfg: WebGLTexture | null;
   private restart = false;
   /** False while tables that the picture is made of still refine. */
   settled = true;
@@ -73,6 +77,13 @@ export class Renderer {
     this.black = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.black);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    const { dfg } = shaders.data;
+    this.dfg = dfg ? gl.createTexture() : null;
+    if (dfg) {
+      gl.bindTexture(gl.TEXTURE_2D, this.dfg);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32F, dfg.size[0], dfg.size[1], 0, gl.RG, gl.FLOAT, decodeFloats(dfg.data));
+      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+    }
   }
 
   get width(): number {
@@ -169,7 +180,9 @@ export class Renderer {
     const curve = shader.manifest.isotropic && !shader.manifest.stochastic && whole.includes(state.view.term);
     if (!curve) return "sampled";
     if (!light.image || !scene.environment) return "albedo";
-    return state.environment === "split-sum" ? "split-sum" : "sampled";
+    if (state.environment !== "dfg") return state.environment;
+    // The two numbers multiply a reflectance at normal incidence: a material without one has its own albedo instead.
+    return this.dfg && hasTerm(shader.manifest, "F") && alphaOf(shader) ? "dfg" : "split-sum";
   }
 
   private prepare(scene: Scene, draw: Draw, hurry: boolean): { program: Program; row: number; level: { texture: WebGLTexture; level: number } | null } {
@@ -191,7 +204,7 @@ export class Renderer {
       if (made.finished) this.restart = true;
       if (!made.complete) this.settled = false;
     }
-    if (use === "split-sum" && scene.environment) {
+    if ((use === "split-sum" || use === "dfg") && scene.environment) {
       const made = this.prefiltered.of(draw.shader, draw.values, scene.environment);
       level = made;
       if (made.finished) this.restart = true;
@@ -252,6 +265,9 @@ export class Renderer {
     gl.uniform1f(program.uniform("albedo_row"), row);
     texture("prefiltered", level?.texture ?? null);
     gl.uniform1f(program.uniform("prefiltered_level"), level?.level ?? 0);
+    texture("dfg_table", this.dfg);
+    const width = alphaOf(draw.shader);
+    if (width) gl.uniform1f(program.uniform("dfg_roughness"), Math.sqrt(([draw.values[width]].flat() as number[])[0] ?? 0));
     gl.uniform3fv(program.uniform("random_point"), sequence(3, this.samples));
     gl.uniform2fv(program.uniform("area_point"), areaSequence(this.samples));
     gl.uniform3fv(program.uniform("ball_center"), draw.center);

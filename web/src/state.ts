@@ -21,7 +21,8 @@ export interface Slot {
 
 export type Term = "full" | "D" | "G" | "F" | "single" | "multi" | "compensated" | "difference" | "rows";
 export type MeshName = "sphere" | "shaderball" | "torus" | "file";
-export type EnvironmentMethod = "sampled" | "split-sum";
+/** Brute force; albedo of the material itself times the blurred picture; the two-number table times it. */
+export type EnvironmentMethod = "sampled" | "split-sum" | "dfg";
 export type Background = "theme" | "environment";
 export type CompareMode = "off" | "side" | "wipe" | "difference";
 export type Theme = "auto" | "light" | "dark";

@@ -48,7 +48,7 @@ function bounded(state: State, initial: State, known: (material: string) => bool
   state.display.exposure = clamp(state.display.exposure, -30, 30);
   state.dock.height = clamp(state.dock.height, 100, 4000);
   const named: [holder: object, key: string, values: string[]][] = [
-    [state, "environment", ["sampled", "split-sum"]],
+    [state, "environment", ["sampled", "split-sum", "dfg"]],
     [state.view, "mesh", ["sphere", "shaderball", "torus", "file"]],
     [state.view, "term", ["full", "D", "G", "F", "single", "multi", "compensated", "difference", "rows"]],
     [state.view, "background", ["theme", "environment"]],

@@ -3,7 +3,7 @@ import { type GUI } from "lil-gui";
 import type { PageApp } from "../app";
 import type { Vec3 } from "../data";
 import { actingLights, newLight } from "../lights";
-import type { Light } from "../state";
+import type { EnvironmentMethod, Light } from "../state";
 import { normalize } from "../vectors";
 import { ChoiceControl, type Field, RangeControl, TickControl, TripleControl, addRow } from "./controls";
 import { button, element } from "./dom";
@@ -119,12 +119,13 @@ export class LightSection {
           label: "integral",
           doc: "How the light of the picture is summed over directions.",
           get: () => app.state.environment,
-          set: (value) => app.store.set("environment", value === "split-sum" ? "split-sum" : "sampled"),
+          set: (value) => app.store.set("environment", value as EnvironmentMethod),
           initial: () => "sampled",
         },
         () => [
           { value: "sampled", label: "sampled, brute force", doc: "The material's own sample(), summed until it stands still." },
-          { value: "split-sum", label: "split sum", doc: "Albedo times the picture blurred by the lobe, both made by the material's own sample()." },
+          ...(app.data.dfg ? [{ value: "dfg", label: "split sum, two-number table", doc: "F0 A + B for GGX (Karis 2013) times the blurred picture: what engines do. Materials without F take their own albedo." }] : []),
+          { value: "split-sum", label: "split sum, own albedo", doc: "Albedo times the picture blurred by the lobe, both made by the material's own sample()." },
         ],
       );
     }

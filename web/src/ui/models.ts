@@ -65,7 +65,6 @@ export class ModelsSection {
           ...material.presets.map((p) => ({ value: p.name, label: p.name })),
         ],
       );
-    for (const parameter of manifest.parameters) if (parameter.field === null) this.addChoice(slot, parameter);
     const numeric = manifest.parameters.filter((p) => p.field !== null);
     const row = app.state.slots[slot];
     const varying = numeric.filter((p) => row && edits.perBall(row, p.path));
@@ -84,6 +83,11 @@ export class ModelsSection {
     if (numeric.length > varying.length) {
       addRow(gui, element("div", { class: "subhead" }, varying.length ? "Whole row" : "Parameters"));
       for (const parameter of numeric) if (!varying.includes(parameter)) this.addParameter(slot, parameter);
+    }
+    const choices = manifest.parameters.filter((p) => (p.kind === "choice" || p.kind === "flag") && this.isOpen(slot, p));
+    if (choices.length) {
+      addRow(gui, element("div", { class: "subhead", title: "What shapes the code: each combination is a shader of its own." }, "Choices"));
+      for (const parameter of choices) this.addChoice(slot, parameter);
     }
     if (app.state.slots.length > 1)
       new TickControl(gui, {
@@ -120,11 +124,13 @@ export class ModelsSection {
 
   // ---------------------------------------------------------------- one parameter
 
+  /** A choice that the page cannot change is not worth a line, unless a server can write the shader for it. */
+  private isOpen(slot: number, parameter: Parameter): boolean {
+    return Boolean(this.app.data.socket) || edits.possibleChoices(this.app, slot, parameter).filter((o) => o.here).length > 1;
+  }
+
   private addChoice(slot: number, parameter: Parameter): void {
     const { app } = this;
-    const options = edits.possibleChoices(app, slot, parameter);
-    // A choice that the page cannot change is not worth a line, unless a server can write the shader for it.
-    if (options.filter((o) => o.here).length < 2 && !app.data.socket) return;
     new ChoiceControl(
       this.gui,
       {
