@@ -31,6 +31,17 @@ class Draws(NamedTuple):
         """Everything side by side, as the shader reads it."""
         return np.concatenate([self.wo, self.wi, self.u, *self.fields.values()], axis=1).astype(np.float32)
 
+    def rows(self, which: np.ndarray) -> Draws:
+        """Some of the draws."""
+        fields = {path: rows[which] for path, rows in self.fields.items()}
+        return Draws(self.wo[which], self.wi[which], self.u[which], fields)
+
+    def moved_each(self) -> Draws:
+        """The draws as often as there are inputs, each time with one of them moved."""
+        parts = [self.moved(column) for column in range(self.columns().shape[1])]
+        fields = {path: np.concatenate([p.fields[path] for p in parts]) for path in self.fields}
+        return Draws(*(np.concatenate([p[i] for p in parts]) for i in range(3)), fields)
+
     def moved(self, column: int) -> Draws:
         """One input, by its place among `columns`, one float32 toward 0; what is 0 stays."""
         columns = self.columns()
@@ -422,42 +433,47 @@ class Verdict(NamedTuple):
 
 
 def judge(model: go.BSDF, draws: Draws, got: dict[str, np.ndarray], terms: list[str]) -> dict[str, Verdict]:
-    """A verdict for each result."""
+    """A verdict for each result: error <= max(TIGHT of the value, MOVES times its change when inputs move)."""
     chosen = np.where(np.isfinite(got["sample.wi"]), got["sample.wi"], 0.0).astype(np.float32)
     right = expected(model, draws, chosen, terms)
-    change = {name: np.zeros(value.shape) for name, value in right.items()}
-    for column in range(draws.columns().shape[1]):
-        near = expected(model, draws.moved(column), chosen, terms)
-        for name in right:
-            change[name] += np.abs(near[name] - right[name])
-    if model.delta != "always":  # what moves the sampled direction itself moves these
-        for column in range(3, 6):
-            near = expected(model, draws, draws._replace(wi=chosen).moved(column).wi, terms)
-            for name in ("there.pdf", "there.weight"):
-                change[name] += np.abs(near[name] - right[name])
-    verdicts, ratios = {}, {}
-    for name, value in sorted(right.items(), reverse=True):  # "there" before "sample"
-        if name.replace("there", "sample") not in got:
-            continue
+    error, size = {}, {}
+    doubtful = np.zeros(len(draws.wo), bool)
+    right = {name: value for name, value in right.items() if name.replace("there", "sample") in got}
+    for name, value in right.items():
         mine = np.asarray(got[name.replace("there", "sample")], float)
-        size = np.abs(value)
+        error[name] = np.where(np.isnan(mine), np.inf, np.abs(mine - value))
+        size[name] = np.abs(value)
         if name == "sample.wi":  # a vector is measured by its length
-            size = np.linalg.norm(value, axis=1, keepdims=True) + 0 * value
-        error = np.abs(mine - value)
-        error[np.isnan(error)] = np.inf
-        allowed = np.maximum(TIGHT * size, MOVES * change[name])
-        ratio = np.where(size > DIM, error / np.maximum(allowed, 1e-300), np.where(error > DIM, np.inf, 0.0))
+            size[name] = np.linalg.norm(value, axis=1, keepdims=True) + 0 * value
+        if name == "terms.multi":  # shown, and added, beside what is scattered once
+            size[name] = np.maximum(size[name], np.abs(right["eval"]))
+        over = error[name] > TIGHT * size[name]
+        doubtful |= over.any(axis=1) if over.ndim == 2 else over
+    # only where the first bar is missed need it be asked how well conditioned the value is
+    change = {name: np.zeros(value.shape) for name, value in right.items()}
+    if doubtful.any():
+        few, there = draws.rows(doubtful), draws._replace(wi=chosen).rows(doubtful)
+        base = {name: value[doubtful] for name, value in right.items()}
+        times, count = draws.columns().shape[1], len(few.wo)
+        # the sampled direction moves too, where wi would: the shader's pdf and weight are those at its own
+        near = expected(model, few.moved_each(), there.moved_each().wi, terms)
+        for name, value in base.items():
+            each = near[name].reshape(times, count, *value.shape[1:])
+            change[name][doubtful] = np.abs(each - value).sum(axis=0)
+    ratios = {}
+    for name, value in right.items():
+        allowed = np.maximum(TIGHT * size[name], MOVES * change[name])
+        dim = np.where(error[name] > DIM, np.inf, 0.0)
+        ratio = np.where(size[name] > DIM, error[name] / np.maximum(allowed, 1e-300), dim)
         if name.startswith("sample.") and name != "sample.pdf":  # a failed sample has no direction
-            failed = (right["sample.pdf"] <= DIM) & (np.asarray(got["sample.pdf"]) <= DIM)
-            ratio[failed] = 0.0
+            ratio[(right["sample.pdf"] <= DIM) & (np.asarray(got["sample.pdf"]) <= DIM)] = 0.0
         ratios[name] = ratio
-        if name.startswith("there"):
-            continue
-        there_name = name.replace("sample", "there")
-        if there_name != name and there_name in ratios:
-            ratio = np.minimum(ratio, ratios[there_name])
+    verdicts = {}
+    for name in (n for n in right if not n.startswith("there")):
+        ratio = np.minimum(ratios[name], ratios.get(name.replace("sample", "there"), np.inf))
         worst = int(np.argmax(ratio.max(axis=1) if ratio.ndim == 2 else ratio))
-        verdicts[name] = Verdict(float(ratio.max()), float((ratio > 1).mean()), worst, mine[worst], value[worst])
+        mine, share = np.asarray(got[name])[worst], float((ratio > 1).mean())
+        verdicts[name] = Verdict(float(ratio.max()), share, worst, mine, right[name][worst])
     return verdicts
 
 

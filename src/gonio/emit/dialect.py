@@ -82,6 +82,7 @@ NATIVE = {"normalize", "clamp"}
 
 # what a name becomes where the language keeps it for itself
 PREFERRED = {
+    "log": "ln",
     "sin": "sine",
     "cos": "cosine",
     "mix": "mixed",

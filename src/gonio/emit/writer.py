@@ -97,6 +97,8 @@ class _RoutineWriter:
         self.locals: dict[int, str] = {}
         self.lines: list[str] = []
         self.built: dict[tuple, str] = {}
+        self.holders: dict[str, Value] = {}  # name -> the value that it stands for now
+        self.first_lines: dict[str, int] = {}  # name -> the line that declares it
         self._parameters()
 
     # ------------------------------------------------------------------ parameters
@@ -148,9 +150,10 @@ class _RoutineWriter:
         routine = self.routine
         values = routine.values()
         self._plan(values)
-        for value in values:
-            if value.order in self.named:
-                self._define(value)
+        statements = [value for value in values if value.order in self.named]
+        last_use = self._last_uses(statements)
+        for index, value in enumerate(statements):
+            self._define(value, index, last_use)
         body = self._result()
         head = self.dialect.signature(self.writer.note(routine.type), self.writer.names[routine], self.heads)
         return [*comment(routine.doc), *wrap(head, ""), *self.lines, *body, "}"]
@@ -223,11 +226,40 @@ class _RoutineWriter:
                     self.named.discard(values_[0].args[0].order)
         self.sizes = sizes
 
-    def _define(self, value: Value) -> None:
-        text = self.whole(value, defining=True)
-        name = self.fresh(self._name_for(value))
+    def _last_uses(self, statements: list[Value]) -> dict[int, int]:
+        """By named value: the last statement that reads it; the result comes after all."""
+        last: dict[int, int] = {}
+        roots = [(index, needed(value)) for index, value in enumerate(statements)]
+        roots.append((len(statements), [value for _, value in self.routine.results]))
+        for index, pending in roots:
+            pending, seen = list(pending), set()
+            while pending:
+                value = pending.pop()
+                if value.order in seen:
+                    continue
+                seen.add(value.order)
+                if value.order in self.named:
+                    last[value.order] = index
+                else:
+                    pending.extend(needed(value))
+        return last
+
+    def _define(self, value: Value, index: int, last_use: dict[int, int]) -> None:
+        text = self.whole(value)
         type_ = self.writer.note(value.type)
-        self.lines += wrap(self.dialect.local(type_, name, text), INDENT)
+        wanted = self.dialect.word(self._name_for(value))
+        holder = self.holders.get(wanted)
+        if value.name and holder is not None and holder.type == value.type and last_use[holder.order] <= index:
+            # Python gave the name anew when the old value had served: so does the shader
+            line = self.first_lines[wanted]
+            self.lines[line] = self.lines[line].replace("let ", "var ", 1)
+            self.lines += wrap(f"{wanted} = {text};", INDENT)
+            name = wanted
+        else:
+            name = self.fresh(self._name_for(value))
+            self.first_lines[name] = len(self.lines)
+            self.lines += wrap(self.dialect.local(type_, name, text), INDENT)
+        self.holders[name] = value
         self.locals[value.order] = name
 
     def _name_for(self, value: Value) -> str:
@@ -257,7 +289,8 @@ class _RoutineWriter:
 
     # ------------------------------------------------------------------ expressions
 
-    def whole(self, value: Value, defining: bool = False) -> str:
+    def whole(self, value: Value) -> str:
+        """The text of a statement's value."""
         return self.expression(value, root=True)[0]
 
     def part(self, value: Value, level: int, strict: bool = False) -> str:
@@ -337,6 +370,8 @@ class _RoutineWriter:
             )
         if value.type.startswith("bvec"):
             left, right = self.splat(a, "vec" + value.type[-1]), self.splat(b, "vec" + value.type[-1])
+        if value.op in ("lt", "le") and self.dialect.name == "wgsl":  # or `a < b, c > d` is read as a template
+            return f"({left} {symbol} {right})", ATOM
         return f"{left} {symbol} {right}", level
 
     def choice(self, value: Value) -> tuple[str, int]:

@@ -140,10 +140,7 @@ class Metal:
         rows = []
         for power in range(curves.DEGREE + 1):
             first = power * curves.HARMONICS
-            value = found["turned"][first + curves.HARMONICS - 1]
-            for step in range(curves.HARMONICS - 2, -1, -1):
-                value = ops.fma(value, y, found["turned"][first + step])
-            rows.append(value)
+            rows.append(_polynomial(y, found["turned"][first : first + curves.HARMONICS]))
         form = curves.form_of(base.ndf, base.masking)
         bend = curves.knee(form, base.masking, seen)
         return curves.missing(form, tuple(rows), bend, maximum(w.z, 1e-6))
@@ -183,6 +180,15 @@ class Metal:
     def eta(material: Any, wo: Any, wi: Any) -> Any:
         """Index on wi's side over index on wo's side."""
         return 1.0 + 0.0 * wo.z
+
+
+@function
+def _polynomial(y: Any, coefficients: tuple[Any, ...]) -> Any:
+    """A polynomial in y, lowest power first."""
+    value = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        value = ops.fma(value, y, c)
+    return value
 
 
 def _scale(average: Any) -> Any:

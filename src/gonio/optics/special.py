@@ -47,6 +47,7 @@ def log_share(q: Any, p: Any) -> Any:
     return where(p <= 0.5, 2.0 * z * series, log(ops.maximum(q, 1e-30)))
 
 
+@function
 def _stirling(x: Any) -> Any:
     """The series of log Gamma beyond its leading terms; the next term is under 2e-9 at x = 4."""
     r = 1.0 / x

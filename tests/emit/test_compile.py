@@ -1,0 +1,106 @@
+"""Every model compiles in every language, by compilers that others made: Chromium's for GLSL and WGSL, glslang for HLSL."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+import pytest
+from gonio.emit import bundle
+
+import browser
+from parity import GLSL_HEAD
+from variants import EVERY, FEW
+
+GLSL = """(texts) => {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  return texts.map((text) => {
+    const s = gl.createShader(gl.FRAGMENT_SHADER);
+    gl.shaderSource(s, text); gl.compileShader(s);
+    return gl.getShaderParameter(s, gl.COMPILE_STATUS) ? '' : gl.getShaderInfoLog(s) || 'no log';
+  });
+}"""
+
+WGSL = """async (texts) => {
+  const device = await (await navigator.gpu.requestAdapter()).requestDevice();
+  const found = [];
+  for (const code of texts) {
+    device.pushErrorScope('validation');
+    const info = await device.createShaderModule({code}).getCompilationInfo();
+    const scope = await device.popErrorScope();
+    const bad = info.messages.filter(m => m.type === 'error').map(m => `${m.lineNum}: ${m.message}`);
+    found.push(bad.join('; ') || (scope ? scope.message : ''));
+  }
+  return found;
+}"""
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Any]:
+    with browser.page() as opened:
+        yield opened
+
+
+def _failures(page: Any, script: str, texts: dict[str, str]) -> dict[str, str]:
+    found = page.evaluate(script, list(texts.values()))
+    return {name: log for name, log in zip(texts, found, strict=True) if log}
+
+
+def test_glsl_of_every_model_compiles_in_webgl2(page: Any) -> None:
+    end = "\nout vec4 color;\nvoid main() { color = vec4(0.0); }\n"
+    texts = {name: GLSL_HEAD + bundle(m, "glsl").text + end for name, m in EVERY.items()}
+    assert _failures(page, GLSL, texts) == {}
+    assert _failures(page, GLSL, {"broken": GLSL_HEAD + "float f() { return 1; }" + end}) != {}
+
+
+def test_wgsl_of_every_model_compiles_in_webgpu(page: Any) -> None:
+    if page.evaluate("async () => !navigator.gpu || !(await navigator.gpu.requestAdapter())"):
+        pytest.skip("NOT TRIED in WebGPU: this browser has no adapter")
+    texts = {name: bundle(m, "wgsl").text for name, m in EVERY.items()}
+    assert _failures(page, WGSL, texts) == {}
+    assert _failures(page, WGSL, {"broken": "fn f() -> f32 { return true; }"}) != {}
+
+
+def _glslang(text: str, folder: Path) -> str:
+    """What glslang says against HLSL, or ""."""
+    # glslang knows HLSL as it was before 2021, when ?: still chose component by component
+    source = "#define select(mask, a, b) ((mask) ? (a) : (b))\n" + text + "\nfloat4 main() : SV_Target { return 0.0; }\n"
+    file = folder / "shader.hlsl"
+    file.write_text(source)
+    command = ["glslangValidator", "-D", "-S", "frag", "-e", "main", "-V", "-o", str(folder / "out.spv"), str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    return "" if done.returncode == 0 else done.stdout
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
+    text = bundle(FEW[name], "hlsl").text
+    if shutil.which("glslangValidator") is None:
+        pytest.skip("HLSL was ONLY PRINTED, NOT COMPILED: no glslangValidator here (Debian: glslang-tools)")
+    assert _glslang(text, tmp_path) == ""
+
+
+def test_the_hlsl_compiler_refuses_what_is_wrong(tmp_path: Path) -> None:
+    if shutil.which("glslangValidator") is None:
+        pytest.skip("NOT TRIED: no glslangValidator here (Debian: glslang-tools)")
+    assert "error" in _glslang("float f() { return missing; }", tmp_path).lower()
+
+
+@pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
+def test_no_function_is_longer_than_sixty_lines(lang: str) -> None:
+    for name, material in FEW.items():
+        for part in bundle(material, lang).text.split("\n\n"):
+            body = [line for line in part.splitlines() if not line.startswith("//")]
+            if body and body[0].endswith("{") and "(" in body[0]:
+                assert len(body) <= 60, f"{name}: {body[0]}"
+
+
+def test_random_walks_cannot_be_written_and_say_so() -> None:
+    with pytest.raises(go.InputError, match="RandomWalk is estimated by random walks"):
+        go.emit(go.RandomWalk(go.Conductor()))
+    with pytest.raises(go.InputError, match="RandomWalk"):
+        go.emit(go.mix(go.RandomWalk(go.Conductor()), go.Lambert(), 0.5))

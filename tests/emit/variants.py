@@ -1,0 +1,38 @@
+"""The materials that shader code is tested on: those of `materials`, and the compensated ones on several bases."""
+
+from __future__ import annotations
+
+import gonio as go
+
+import materials
+
+GOLD = go.Conductor.preset("Au", alpha=0.3)
+TURNED = go.Conductor.preset("Au", alpha=(0.3, 0.1), rotation=0.3)
+GLASS = go.Dielectric(1.5, 0.3)
+
+COMPENSATED = {
+    "kulla-conty": go.KullaConty(GOLD),
+    "kulla-conty-sheet": go.KullaConty(
+        go.Conductor(alpha=0.3, ndf="beckmann", masking="smith-separable", fresnel="schlick"), color="sheet"
+    ),
+    "kulla-conty-imageworks": go.KullaConty(GOLD, average="imageworks"),
+    "kulla-conty-turned": go.KullaConty(TURNED),
+    "kulla-conty-glass": go.KullaConty(GLASS),
+    "kulla-conty-coat": go.KullaConty(go.Dielectric(1.5, 0.3, transmission=False)),
+    "fdez-aguera": go.FdezAguera(GOLD),
+    "turquin": go.Turquin(GOLD),
+    "turquin-turned": go.Turquin(TURNED),
+}
+NESTED = {
+    "mix-compensated": go.mix(go.KullaConty(GOLD), go.Conductor.preset("Au", alpha=0.3, ndf="beckmann"), 0.3),
+    "two-sided-compensated": go.two_sided(go.KullaConty(GOLD)),
+    "mix-of-mixes": go.mix(go.mix(go.Lambert(), go.Mirror(), 0.3), go.OrenNayar(), 0.2),
+}
+
+EVERY = {**materials.ALL, **COMPENSATED, **NESTED}
+# each model once, and what shapes its code most
+FEW = {
+    **materials.SMALL,
+    **{name: COMPENSATED[name] for name in COMPENSATED if name not in ("kulla-conty-sheet", "turquin-turned")},
+    **NESTED,
+}
