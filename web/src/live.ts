@@ -33,7 +33,7 @@ interface FrameHeader {
 
 const QUIET = 40; // ms without a change before the scene is sent: a slider sends sixty changes a second
 const TARGET = 1024;
-const MOST_PIXELS = 400_000;
+const MOST_PIXELS = 1_000_000;
 
 export class Live {
   readonly status: LiveState = { connected: false, device: "", samples: 0, target: TARGET, done: false, seconds: 0, message: "connecting" };

@@ -181,8 +181,10 @@ export class Renderer {
     if (!curve) return "sampled";
     if (!light.image || !scene.environment) return "albedo";
     if (state.environment !== "dfg") return state.environment;
-    // The two numbers multiply a reflectance at normal incidence: a material without one has its own albedo instead.
-    return this.dfg && hasTerm(shader.manifest, "F") && alphaOf(shader) ? "dfg" : "split-sum";
+    // The two numbers hold single scattering and multiply a reflectance at normal incidence: a compensated material,
+    // or one without Fresnel's term, takes its own albedo instead.
+    const single = hasTerm(shader.manifest, "F") && !hasTerm(shader.manifest, "multi");
+    return this.dfg && single && alphaOf(shader) ? "dfg" : "split-sum";
   }
 
   private prepare(scene: Scene, draw: Draw, hurry: boolean): { program: Program; row: number; level: { texture: WebGLTexture; level: number } | null } {
