@@ -241,6 +241,12 @@ def test_an_uploaded_environment_lights_the_balls(one: server.Server) -> None:
     assert found[9, 16, :3] == pytest.approx([2.0] * 3, rel=0.05)  # a white furnace of radiance 2
 
 
+def test_the_socket_is_not_compressed(one: server.Server) -> None:
+    address = f"ws://127.0.0.1:{one.port}/ws?token={one.application.door.token}"
+    with connect(address, origin=f"http://127.0.0.1:{one.port}", compression="deflate") as client:
+        assert client.response is not None and "Sec-WebSocket-Extensions" not in client.response.headers
+
+
 # --------------------------------------------------------------------------- bad messages
 
 
@@ -478,6 +484,8 @@ def test_it_ends_cleanly_on_ctrl_c_with_a_page_connected(sign: signal.Signals, t
 def test_a_taken_port_is_a_clear_error(one: server.Server) -> None:
     with pytest.raises(MachineError, match="cannot listen"):
         server.serve(STAGE, port=one.port, browser=False)
+    with pytest.raises(InputError, match="unknown device 'tpu'"):
+        server.serve(STAGE, browser=False, device="tpu")
     with pytest.raises(InputError, match="port 99999"):
         server.serve(STAGE, port=99999, browser=False)
     with pytest.raises(GonioError, match="cannot listen"):

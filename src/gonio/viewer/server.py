@@ -36,6 +36,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from ..errors import InputError, MachineError
+from ..render import engine
 from . import messages, page
 from .session import Renderer, Session
 from .stage import Stage
@@ -295,10 +296,11 @@ def serve(
     host     where to listen; anything but a loopback address opens it to the network, and a line says so
     port     0 takes any that is free
     browser  open the page there
-    Raises MachineError where the port is taken, InputError where a model cannot be shown.
+    Raises MachineError where the port is taken or the device missing, InputError where a model cannot be shown.
     """
     if not 0 <= port < 65536:
         raise InputError(f"port {port}", "--port", "give 0 to 65535")
+    engine.variant_for(device)  # complains about a missing GPU now, not when the first page asks
     application = Application(what, Door(host), device)
     server = Server(application, host, port, browser)
     if not _is_loopback(host):
