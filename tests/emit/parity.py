@@ -411,11 +411,10 @@ def expected(model: go.BSDF, draws: Draws, chosen: np.ndarray, terms: list[str])
     found = {"eval": reference(model, draws, "eval")[0], "pdf": reference(model, draws, "pdf")[0]}
     for name, value in zip(go.Sample._fields, reference(model, draws, "sample"), strict=True):
         found[f"sample.{name}"] = value.astype(float)
-    if model.delta != "always":
-        there = draws._replace(wi=chosen)
-        density = reference(model, there, "pdf")[0]
-        found["there.pdf"] = density
-        found["there.weight"] = reference(model, there, "eval")[0] / np.where(density > 0, density, 1.0)[:, None]
+    there = draws._replace(wi=chosen)
+    density = reference(model, there, "pdf")[0]
+    found["there.pdf"] = density
+    found["there.weight"] = reference(model, there, "eval")[0] / np.where(density > 0, density, 1.0)[:, None]
     if terms:
         for name, value in zip(terms, reference(model, draws, "terms"), strict=True):
             found[f"terms.{name}"] = value

@@ -269,11 +269,14 @@ def check(model: Any, functions: tuple[str, ...], where: str) -> None:
             raise InputError(f"unknown function '{function}'", where, did_you_mean(function, FUNCTIONS))
     if not functions:
         raise InputError("no function named", where, "known: " + ", ".join(FUNCTIONS))
-    if stochastic(model):
-        what = f"{type(model).__name__} is estimated by random walks and cannot be written as shader code"
+    random = stochastic(model)
+    if random is not None:
+        what = f"{type(random).__name__} is estimated by random walks and cannot be written as shader code"
         raise InputError(what, where, "KullaConty is its closed form")
 
 
-def stochastic(model: Any) -> bool:
-    """Whether values are random numbers, here or in an inner material."""
-    return model.stochastic or any(stochastic(inner) for _, inner in _inner(model))
+def stochastic(model: Any) -> Any:
+    """The material, this or one inside, whose values are random numbers; else None."""
+    if model.stochastic:
+        return model
+    return next((found for _, inner in _inner(model) if (found := stochastic(inner)) is not None), None)

@@ -6,9 +6,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..ops import dot, function, safe_div
-from ..optics.frame import half_vector, reflect
-from ..optics.warp import square_to_power_lobe, square_to_power_lobe_pdf
+from ..ops import dot, function, inv_pi, safe_div
+from ..optics.frame import half_vector, reflect, sin2
+from ..optics.special import power_of_cosine
+from ..optics.warp import square_to_power_lobe
 from .base import Breach
 from .phong import _Empirical
 
@@ -36,10 +37,16 @@ class BlinnPhong(_Empirical):
         return half_vector(wo, wi).z
 
     @function
+    def _peak(self, wo: Any, wi: Any) -> Any:
+        """(n.h)^p."""
+        h = half_vector(wo, wi)
+        return power_of_cosine(h.z, sin2(h), self.p)
+
+    @function
     def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
         """Density of wi when h has density (p + 1) / (2 pi) cos^p: over 4 (v.h) (Walter2007, eq. 14)."""
-        h = half_vector(wo, wi)
-        return safe_div(square_to_power_lobe_pdf(h.z, self.p), 4.0 * dot(wo, h))
+        lobe = (self.p + 1.0) * (0.5 * inv_pi) * self._peak(wo, wi)
+        return safe_div(lobe, 4.0 * dot(wo, half_vector(wo, wi)))
 
     @function
     def _highlight_sample(self, wo: Any, u1: Any, u2: Any) -> Any:

@@ -57,6 +57,10 @@ class _Empirical(BSDF):
         """Base of the power, the cosine that peaks in the highlight."""
         raise NotImplementedError
 
+    def _peak(self, wo: Any, wi: Any) -> Any:
+        """(highlight)^p."""
+        return pow(self._highlight(wo, wi), self.p)
+
     def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
         raise NotImplementedError
 
@@ -73,7 +77,7 @@ class _Empirical(BSDF):
     def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
         """kd (n.l) + ks (highlight)^p for light and viewer above the surface (course sheet, eq. 1)."""
         above = (wo.z > 0.0) & (wi.z > 0.0)
-        return self.kd * where(above, wi.z, 0.0) + self.ks * where(above, pow(self._highlight(wo, wi), self.p), 0.0)
+        return self.kd * where(above, wi.z, 0.0) + self.ks * where(above, self._peak(wo, wi), 0.0)
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         """Mixture of the cosine and the highlight's lobe."""

@@ -44,6 +44,7 @@ __all__ = [
     "function",
     "get_precision",
     "inset",
+    "is_short",
     "is_single",
     "isfinite",
     "log",
@@ -155,10 +156,15 @@ def isfinite(x: Any) -> Any:
 
 
 def is_single(x: Any) -> bool:
-    """Whether x is computed in float32, so that steps below its last digits can be left out; symbols: see `Graph`."""
+    """Whether x is a Dr.Jit value in float32."""
+    return is_drjit(x) and drjit().itemsize_v(x) == 4
+
+
+def is_short(x: Any) -> bool:
+    """Whether x is computed in 32 bits, by Dr.Jit or a shader, so that steps below its last digits can be left out."""
     if isinstance(x, Node):
         return graph._stack[-1][0].single
-    return is_drjit(x) and drjit().itemsize_v(x) == 4
+    return is_single(x)
 
 
 def sincos(x: Any) -> tuple[Any, Any]:
@@ -187,7 +193,7 @@ def clamp(x: Any, low: Any, high: Any) -> Any:
 
 def rsqrt(x: Any) -> Any:
     """1 / sqrt(x); in float32 by the processor's estimate and a step of Newton's method, within 2 units."""
-    return drjit().rsqrt(x) if is_drjit(x) and is_single(x) else 1.0 / sqrt(x)
+    return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 
 def _guarded(mask: Any, x: Any) -> Any:

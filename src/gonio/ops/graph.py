@@ -177,7 +177,7 @@ class Graph:
     """Recorded functions in order of definition; `entry` is the last.
 
     replacements  operation -> a function of the vocabulary to be recorded in its place, for languages that lack it
-    single        whether it is recorded for 32 bits, see `ops.is_single`
+    single        whether it is recorded for 32 bits, see `ops.is_short`
     """
 
     def __init__(self, replacements: dict[str, Callable] | None = None, single: bool = False) -> None:

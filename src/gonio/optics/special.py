@@ -34,6 +34,19 @@ def erfinv(x: Any) -> Any:
 
 
 @function
+def power_of_cosine(cos_theta: Any, sin2: Any, p: Any) -> Any:
+    """cos(theta)^p, from the squared sine where that is under 0.1: near 1 a cosine is rounded too coarsely for large p.
+
+    log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)), whose next term is under 1e-18.
+    """
+    t = minimum(sin2, 0.1)
+    z = t / (t - 2.0)
+    z2 = sqr(z)
+    series = 1.0 + z2 * (1 / 3 + z2 * (1 / 5 + z2 * (1 / 7 + z2 * (1 / 9 + z2 * (1 / 11 + z2 * (1 / 13))))))
+    return where((sin2 < 0.1) & (cos_theta > 0.0), exp(p * z * series), ops.pow(cos_theta, p))
+
+
+@function
 def log_share(q: Any, p: Any) -> Any:
     """log q of a share, p = 1 - q given beside it: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
 

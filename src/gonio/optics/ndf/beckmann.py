@@ -14,7 +14,7 @@ from ...ops import (
     exp,
     fma,
     function,
-    is_single,
+    is_short,
     log,
     maximum,
     minimum,
@@ -85,7 +85,7 @@ class Beckmann(NDF):
     @function
     def G1(self, v: Any, alpha: Any) -> Any:
         """1 / (1 + Lambda); in float32 by a rational function, within 8e-8 of it, at half the cost of erf and exp."""
-        if not is_single(v.z):
+        if not is_short(v.z):
             return 1.0 / (1.0 + self.Lambda(v, alpha))
         a = self._cotangent(v, alpha)
         return where(a < 4.0, a * _horner(a, _G1_OVER) / _horner(a, _G1_UNDER), 1.0)
@@ -137,7 +137,7 @@ class Beckmann(NDF):
             b = b - excess / maximum(0.5 * (1.0 - x * tan_v), 1e-4)
         b = clamp(b, low, high)
         slope_x, slope_y = erfinv(b), erfinv(clamp(2.0 * u2 - 1.0, -0.99999988, 0.99999988))
-        if not is_single(u1):
+        if not is_short(u1):
             slope_x, slope_y = self._polish(slope_x, tan_v, target), self._polish(slope_y, 0.0 * u2, u2)
         x = (cos_phi * slope_x - sin_phi * slope_y) * alpha.x
         y = (sin_phi * slope_x + cos_phi * slope_y) * alpha.y
@@ -158,7 +158,7 @@ class Beckmann(NDF):
     @function
     def visible_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
         """Density of visible normals over |v.m|, G1 D / |v.z| (Heitz2014b); in float32 G1 / |v.z| as one quotient."""
-        if not is_single(v.z):
+        if not is_short(v.z):
             return safe_div(self.G1(v, alpha) * self.D(m, alpha), abs(v.z))
         z = abs(v.z)
         over = rsqrt(maximum(slant2(v, alpha), 1e-18))
