@@ -350,6 +350,28 @@ def test_probe_reads_the_pixel(fresh: Opened) -> None:
     assert np.allclose(ratio[:3], 2, rtol=1e-5)
 
 
+@pytest.mark.parametrize("size", [(1280, 720), (390, 844)])
+def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int, int]) -> None:
+    fresh.tab.set_viewport_size({"width": size[0], "height": size[1]})
+    fresh.tab.evaluate(REFERENCE, [1.0])
+    fresh.tab.evaluate("gonio.app.store.set('compare.mode', 'side')")
+    fresh.tab.wait_for_timeout(300)
+    for width, height in ((800, 400), (300, 500)):
+        at = "([w, h, x, y]) => gonio.comparison().view.pictureAt(w, h, x, y)"
+        first = (0.3, 0.4) if width > height else (0.4, 0.3)
+        second = (0.8, 0.4) if width > height else (0.4, 0.8)
+        a, b = (fresh.tab.evaluate(at, [width, height, *point]) for point in (first, second))
+        assert a == pytest.approx(b)
+        assert all(0 < v < 1 for v in a)
+    stage_ = fresh.tab.locator("canvas").first.bounding_box()
+    shown = ink(fresh.tab.screenshot(clip=stage_))
+    h, w = shown.shape[:2]
+    halves = (shown[: h // 2], shown[h - h // 2 :]) if h > w else (shown[:, : w // 2], shown[:, w - w // 2 :])
+    # the words on the pictures differ, a few per cent of the pixels
+    assert np.mean(np.abs(halves[0] - halves[1]).max(axis=2) > 24) < 0.08
+    assert halves[0].std() > 10
+
+
 def test_page_without_a_server_says_so(fresh: Opened) -> None:
     body = open_panel(fresh, "compare")
     fresh.tab.wait_for_function(

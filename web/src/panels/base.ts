@@ -33,6 +33,17 @@ export function overlaid(app: App): Model[] {
   });
 }
 
+/** What a plot of eval cannot show of these models, as sentences to follow its note; "" where there is nothing to say. */
+export function limitsOf(models: readonly Model[]): string {
+  const letters = (which: (model: Model) => boolean) => models.filter(which).map((m) => m.letter).join(", ");
+  const delta = letters((m) => m.shader.manifest.delta !== "never");
+  const noisy = letters((m) => m.shader.manifest.stochastic);
+  return (
+    (delta ? ` ${delta}: a mirror's or smooth glass's light goes into single directions, has no finite value and is not drawn.` : "") +
+    (noisy ? ` ${noisy}: values are random, right in the mean only.` : "")
+  );
+}
+
 const evaluators = new WeakMap<App, Evaluator>();
 
 export function evaluatorOf(app: App): Evaluator {

@@ -2,7 +2,7 @@
 import type { Vec3 } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { channelOf, check, element, evaluatorOf, latest, legend, overlaid, select, short } from "./base";
+import { channelOf, check, element, evaluatorOf, latest, legend, limitsOf, overlaid, select, short } from "./base";
 import { colorTable } from "./colormaps";
 import { type Lobe, lobeIndices, lobeOf, radius } from "./lobe_mesh";
 import { type Arrow, LobeView, type Surface } from "./lobe_view";
@@ -94,8 +94,7 @@ class LobePanel implements Panel {
     this.view.show(surfaces, arrows, ink.map((v) => 0.5 * v + 0.25) as Vec3);
     legend(this.key, models, (m) => `: largest ${short(lobes.find((l) => l.model === m)?.peak ?? 0)} 1/sr`);
     const length = log ? `outer ring ${short(peak)} 1/sr, centre ${short(peak / 10 ** DECADES)} 1/sr and less (log)` : `outer ring ${short(peak)} 1/sr, centre 0`;
-    const delta = models.some((m) => m.shader.manifest.delta !== "never") ? " A delta lobe (mirror, smooth glass) has no finite length and is not drawn." : "";
-    this.note.textContent = peak > 0 ? `Length: f |cos θi|, ${channel}; ${length}.${delta}` : `No model scatters light from this ωo.${delta}`;
+    this.note.textContent = peak > 0 ? `Length: f |cos θi|, ${channel}; ${length}.${limitsOf(models)}` : `No model scatters light from this ωo.${limitsOf(models)}`;
   }
 }
 

@@ -1,7 +1,7 @@
 /** The BSDF in one plane through the normal: polar and Cartesian, with wo marked. */
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { channelOf, check, element, evaluatorOf, latest, legend, type Model, overlaid, range, select, short, Sketch } from "./base";
+import { channelOf, check, element, evaluatorOf, latest, legend, limitsOf, type Model, overlaid, range, select, short, Sketch } from "./base";
 import { Curves } from "./curves";
 import { phiOf, polar, RADIANS, thetaOf } from "./directions";
 import { radius } from "./lobe_mesh";
@@ -40,7 +40,7 @@ class SlicesPanel implements Panel {
     const bar = element("div", "p-bar");
     this.quantity = select(bar, "show", "f |cos θi| is what a picture adds up; f the BSDF itself; pdf the density of sample()", QUANTITIES, (quantity) => set({ quantity }));
     this.log = check(bar, "log", "Logarithmic values", (log) => set({ log }));
-    this.turn = range(bar, "turn", "Angle between the plane of the slice and the plane of incidence", [0, 90, 1], "°", (turn) => set({ turn }));
+    this.turn = range(bar, "turn", "Angle between the plane of the slice and the plane of incidence", [-90, 90, 1], "°", (turn) => set({ turn }));
     this.viewing = new ViewingControls(bar, app);
     const body = element("div", "p-body p-two");
     const left = element("div", "p-cell");
@@ -119,7 +119,7 @@ class SlicesPanel implements Panel {
     legend(this.key, models);
     this.note.textContent = `${turn === 0 ? "Plane of incidence" : `Plane ${turn}° out of the plane of incidence`}; θo ${short(thetaOf(wo) / RADIANS)}°; ${
       quantity === "pdf" ? "density over solid angle" : channel
-    }.`;
+    }.${limitsOf(models)}`;
   }
 
   private drawPolar(context: CanvasRenderingContext2D, width: number, height: number): void {

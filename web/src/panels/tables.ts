@@ -1,5 +1,5 @@
 /** The tables that the shaders read, as pictures, with the float32 number of the texel under the pointer. */
-import { decodeFloats, type TableTexture } from "../data";
+import { decodeFloats } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
 import { check, element, exact, range, select, short, Sketch } from "./base";
@@ -76,12 +76,11 @@ class TablesPanel implements Panel {
       for (const texture of manifest.textures) {
         const data = variant.tables[texture.uniform];
         if (data === undefined) continue;
-        const axes = (texture as TableTexture & { axes?: string[] }).axes ?? [];
         wanted.set(`${key}/${texture.uniform}`, () => ({
           label: `${material.title}: ${texture.uniform.replace(/^table_/, "")}`,
           size: texture.size,
           channels: texture.channels,
-          axes,
+          axes: [],
           floats: decodeFloats(data),
         }));
       }
