@@ -41,7 +41,8 @@ export class PageApp implements App {
   private changed = -Infinity;
   private steps = 1;
   private slow = false;
-  private lastFrame = 0;
+  private fence: WebGLSync | null = null;
+  private submitted = 0;
   private scheduled = false;
   private dirty = false;
   private converging = false;
@@ -213,12 +214,10 @@ export class PageApp implements App {
   private frame(now: number): void {
     if (this.converging) return this.schedule();
     const moving = now - this.changed < MOTION;
-    // How long the last picture took shows in when this one may begin.
-    const took = now - this.lastFrame;
-    this.lastFrame = now;
-    if (took < 400) {
-      if (moving) this.slow = this.slow ? took > 22 : took > 60;
-      if (!moving) this.steps = took < 20 ? Math.min(this.steps + 1, 8) : took > 34 ? Math.max(1, this.steps >> 1) : this.steps;
+    // What was asked of the GPU must be done before more is: a queue of samples would stand before the next slider.
+    if (this.fence && !this.dirty) {
+      if (this.gl.getSyncParameter(this.fence, this.gl.SYNC_STATUS) !== this.gl.SIGNALED) return this.schedule();
+      this.learn(now - this.submitted, moving);
     }
     const [width, height] = this.size();
     if (this.canvas.width !== width || this.canvas.height !== height) {
@@ -234,12 +233,28 @@ export class PageApp implements App {
       const steps = moving ? 1 : this.steps;
       for (let i = 0; i < steps && !this.renderer.done(scene); i++) this.renderer.step(scene, moving);
       this.renderer.present(scene, this.presenter, width, height);
+      this.submit(now);
       this.resolveReady();
       this.onRefresh("picture");
       if (moving || !this.renderer.done(scene)) this.schedule();
     } catch (error) {
       this.say(error instanceof Error ? error.message : String(error), "error");
     }
+  }
+
+  private submit(now: number): void {
+    if (this.fence) this.gl.deleteSync(this.fence);
+    this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.submitted = now;
+    this.gl.flush();
+  }
+
+  /** How long the last picture took decides how coarse the next in motion is, and how many samples one at rest gets. */
+  private learn(took: number, moving: boolean): void {
+    if (this.fence) this.gl.deleteSync(this.fence);
+    this.fence = null;
+    if (moving) this.slow = this.slow ? took > 25 : took > 60;
+    else this.steps = took < 20 ? Math.min(this.steps + 1, 8) : took > 34 ? Math.max(1, this.steps >> 1) : this.steps;
   }
 
   /**
