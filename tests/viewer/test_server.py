@@ -313,6 +313,17 @@ def test_a_message_of_100_mb_is_cut_off_and_others_go_on(one: server.Server) -> 
         assert final_frame(good, 1).any()
 
 
+@pytest.mark.parametrize("path", ["/", "/nothing", "/?token=wrong"])
+def test_a_connection_ends_with_its_answer(one: server.Server, path: str) -> None:
+    with socket.create_connection(("127.0.0.1", one.port), 10) as client:
+        client.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET / HT".encode())
+        answer = b""
+        with contextlib.suppress(ConnectionResetError):
+            while part := client.recv(4096):  # b"" is the end
+                answer += part
+        assert answer.startswith(b"HTTP/1.1 40")
+
+
 def test_a_long_request_is_cut_off(one: server.Server) -> None:
     with socket.create_connection(("127.0.0.1", one.port), 10) as client:
         client.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")

@@ -52,6 +52,7 @@ FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
 
 HEADERS = {
     "Cache-Control": "no-store",
+    "Connection": "close",  # one page is one request; a connection that lingered would have to be watched
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
