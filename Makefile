@@ -24,6 +24,7 @@ demo: .venv/rendering
 	$(BIN)/gonio bake ggx --lut E,Eavg,dfg -o out/tables
 	$(BIN)/gonio render examples/shading-balls -o out/shading-balls.png
 	$(BIN)/gonio render examples/white-furnace -o out/white-furnace.png
+	$(BIN)/gonio view --export out/shading-balls.html
 
 lint: .venv/installed
 	$(BIN)/ruff check .
@@ -49,6 +50,7 @@ bench: .venv/installed
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/bsdf.py
 	$(BIN)/python benchmarks/render.py
+	$(BIN)/python benchmarks/view.py
 
 docs: .venv/installed
 	$(BIN)/python docs/make_pages.py
