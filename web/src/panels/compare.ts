@@ -68,8 +68,8 @@ class ComparePanel implements Panel {
     this.table.replaceChildren(
       ...rows.map(([name, value, doc]) => {
         const row = element("tr");
-        const explained = element("td", "", doc);
-        explained.style.textAlign = "left";
+        const explained = element("td", "p-explained", doc);
+        row.title = doc;
         row.append(element("th", "", name), element("td", "", value), explained);
         return row;
       }),
