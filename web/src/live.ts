@@ -111,11 +111,14 @@ export class Live {
     const { app } = this;
     if (this.socket?.readyState !== WebSocket.OPEN) return;
     const { state } = app;
-    if (state.view.term !== "full" && state.view.term !== "compensated") {
-      // The server traces whole materials: beside a single term its picture would mislead.
+    // The server traces whole materials on balls: beside a single term or another shape its picture would mislead.
+    const whole = state.view.term === "full" || state.view.term === "compensated";
+    this.status.message = !whole ? "of whole materials only" : state.view.mesh !== "sphere" ? "of spheres only" : "";
+    if (this.status.message) {
       this.sent = "";
+      this.id += 1; // frames that are still under way are of no use
       if (app.reference) app.setReference(null);
-      return;
+      return this.onStatus();
     }
     const rows = app.visibleSlots().flatMap((slot) => {
       const row = state.slots[slot];
@@ -136,7 +139,7 @@ export class Live {
     if (text === this.sent) return;
     this.sent = text;
     this.id += 1;
-    Object.assign(this.status, { samples: 0, done: false, target: TARGET, message: "" });
+    Object.assign(this.status, { samples: 0, done: false, target: TARGET });
     this.text({ type: "scene", id: this.id, ...scene });
     this.onStatus();
   }

@@ -107,7 +107,7 @@ export class Layout {
     const parts = [`raster ${renderer.samples} spp`];
     const live = this.live?.status;
     if (live) {
-      if (!live.connected) parts.push(`reference: ${live.message}`);
+      if (!live.connected || live.message) parts.push(`reference: ${live.message}`);
       else parts.push(`reference ${live.samples} / ${live.target} spp${live.device ? ` · ${live.device}` : ""}${live.done ? " · done" : ""}`);
     }
     const text = parts.join("   ");

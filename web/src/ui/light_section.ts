@@ -28,6 +28,7 @@ export class LightSection {
       this.build();
     }
     this.gui.title(`Lights · ${state.furnace ? "white furnace" : `${actingLights(state).length} of ${state.lights.length} on`}`);
+    this.gui.domElement.toggleAttribute("data-furnace", state.furnace);
     for (const controller of this.gui.controllersRecursive()) controller.updateDisplay();
   }
 
