@@ -218,10 +218,31 @@ def test_every_pass_is_the_same_picture_whatever_the_pauses() -> None:
     one, other = Reference(what), Reference(what)
     first = picture(one, scene(what, [SUN], spp=32))
     other.show(scene(what, [SUN], spp=32))
-    other._rate = 1e9
     while not other.done:
+        other._per_sample = 1.0  # so slow that a pass is one sample
         other.advance()
     assert np.array_equal(first, other.image())
+
+
+def test_passes_grow_also_where_a_pass_itself_is_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine: 90 ms a pass whatever it does, and 1 ms a sample."""
+    what = one_ball(go.Lambert())
+    reference = Reference(what)
+    reference.show(scene(what, [SUN], size=(8, 8), spp=1024))
+    now, counts = [0.0], []
+    advance = reference._render.advance
+
+    def slow(count: int) -> None:
+        counts.append(count)
+        now[0] += 0.09 + 0.001 * count
+        advance(count)
+
+    monkeypatch.setattr(reference._render, "advance", slow)
+    monkeypatch.setattr("gonio.viewer.reference.time.perf_counter", lambda: now[0])
+    while not reference.done:
+        reference.advance()
+    assert counts[:6] == [1, 1, 2, 4, 8, 16]
+    assert max(counts) in range(45, 65) and len(counts) < 30
 
 
 @pytest.mark.parametrize(

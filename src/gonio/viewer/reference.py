@@ -35,6 +35,7 @@ from .stage import Stage
 
 PASS_SECONDS = 0.05  # of work before someone may interrupt: half of what a slider's change may take to be seen
 MOST_PER_PASS = 64
+QUICKEST = PASS_SECONDS / MOST_PER_PASS  # seconds a sample, where none was measured yet
 
 # Mitsuba's sphere has its axis along z and u from x toward y; the page's has it along y and u from z toward x.
 SPHERE_AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
@@ -58,7 +59,8 @@ class Reference:
         self._balls = _Balls(self.mi)
         self._lamps = _Lamps(self.mi)
         self._whole: tuple[tuple[Any, Any], Any] = ((None, None), None)
-        self._rate = 0.0  # samples per pixel and second
+        self._first_pass = 0.0  # seconds
+        self._per_sample = QUICKEST
 
     @property
     def device(self) -> str:
@@ -130,16 +132,27 @@ class Reference:
         )
 
     def advance(self) -> None:
-        """Some more samples: one at first, so that there is a picture soon; then about PASS_SECONDS of them."""
+        """Some more samples: one at first, so that there is a picture soon; then as many again as there are, while that
+        takes no more than PASS_SECONDS.
+
+        A pass costs something by itself, in Python, besides its samples. The first pass, of one sample, tells how much;
+        without it a busy machine would seem to need all its time for one sample, and never try two.
+        """
         if self.done:
             return
         render, scene = self._render, self.scene
         assert render is not None and scene is not None
-        count = 1 if render.done == 0 else max(1, min(int(self._rate * PASS_SECONDS), MOST_PER_PASS, render.done))
-        count = min(count, scene.spp - render.done)
+        most = min(render.done, MOST_PER_PASS, scene.spp - render.done, int(PASS_SECONDS / self._per_sample))
+        count = max(1, most)
         started = time.perf_counter()
         render.advance(count)
-        self._rate = count / max(time.perf_counter() - started, 1e-6)
+        took = time.perf_counter() - started
+        if render.done == count:
+            self._first_pass, self._per_sample = took, QUICKEST
+        elif count > 1:
+            self._per_sample = max((took - self._first_pass) / (count - 1), QUICKEST)
+        else:  # whatever held it up may be over: soon two are tried again
+            self._per_sample = max(self._per_sample / 2, QUICKEST)
 
     def image(self) -> np.ndarray:
         """(height, width, 4) float32: linear radiance of the balls alone, averaged over the pixel, and coverage."""
