@@ -6,6 +6,7 @@ The picture is judged by Python: rays through the pixels of the same camera, `ev
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import math
 import re
@@ -168,18 +169,31 @@ def python_picture(what: stage.Stage, lights: list[dict[str, Any]], size: tuple[
             frame = np.stack([t, np.cross(n, t), n], 1)
             model = stage.replaced(what.materials[row.material].bsdf, ball.values)
             total = np.zeros((len(n), 3))
-            for light in lights:
-                if light["type"] == "directional":
-                    d = np.broadcast_to(np.array(light["direction"]) / np.linalg.norm(light["direction"]), n.shape)
-                    power = np.broadcast_to(light["irradiance"], n.shape)
-                else:
-                    to = np.array(light["position"]) - centre - n
-                    d = to / np.linalg.norm(to, axis=-1, keepdims=True)
-                    power = np.array(light["intensity"]) / np.sum(to * to, -1, keepdims=True)
+            for d, power in (part for light in lights for part in light_parts(light, centre + n)):
                 local = [np.einsum("nij,nj->ni", frame, v) for v in (-w, d)]
                 total += power * np.asarray(model.eval(*local, precision="float64"))
             picture[hit] = np.concatenate([total, np.ones((len(n), 1))], -1)
     return picture.reshape(height, side, width, side, 4).mean((1, 3))
+
+
+def light_parts(light: dict[str, Any], surface: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Directions from surface points to a light, and irradiance across them; an area light in 8 x 8 cells."""
+    if light["type"] == "directional":
+        d = np.array(light["direction"]) / np.linalg.norm(light["direction"])
+        yield np.broadcast_to(d, surface.shape), np.broadcast_to(light["irradiance"], surface.shape)
+        return
+    if light["type"] == "point":
+        places, power, across = [np.array(light["position"])], np.array(light["intensity"]), None
+    else:
+        cells = (np.arange(8) + 0.5) / 4 - 1
+        u, v = np.array(light["u"]), np.array(light["v"])
+        places = [light["center"] + a * u + b * v for a in cells for b in cells]
+        power, across = np.array(light["radiance"]) * 4 / 64, np.cross(u, v)
+    for place in places:
+        to = place - surface
+        distance = np.linalg.norm(to, axis=-1, keepdims=True)
+        d = to / distance
+        yield d, power / distance**2 * (1.0 if across is None else abs(d @ across)[:, None])
 
 
 POINT = {"type": "point", "position": [3.0, 4.0, 5.0], "intensity": [120.0, 90.0, 60.0]}
@@ -198,6 +212,31 @@ def test_converged_picture_is_what_python_computes(page: Page, light: dict[str, 
     print(f"relMSE {error:.2e}")
     assert error < 1e-4
     assert abs(raster[..., 3] - truth[..., 3]).max() < 0.1  # a rim along one of the 6 lines of rays: 1/12
+
+
+AREA = {
+    "type": "area",
+    "center": [-3.0, 4.0, 6.0],
+    "u": [1.5, 0, 0],
+    "v": [0, 1.0, -0.7],
+    "radiance": [12.0, 12.0, 12.0],
+}
+
+
+def test_area_light_is_summed_over_its_surface(page: Page) -> None:
+    """Means over the balls, rough ones, since cells stand for the light in Python."""
+    lower = dataclasses.replace(stage.homework(), rows=stage.homework().rows[1:])
+    camera = {k: v for k, v in stage.homework().framed().items() if k in ("distance", "fov")}
+    page.set(f"s.lights = [{{ ...{json.dumps(AREA)}, on: true, name: 'only' }}]; s.solo = 1")
+    raster = page.picture(256)
+    truth = python_picture(dataclasses.replace(lower, camera=camera), [AREA], raster.shape[1::-1], 2)
+    inner = (raster[..., 3] > 1 - 1e-4) & (truth[..., 3] > 1 - 1e-4)
+    columns = np.arange(raster.shape[1])
+    for ball in (2, 3, 4):
+        here = inner & (abs(columns - raster.shape[1] * (ball + 0.6) / 6.2) < raster.shape[1] / 13)
+        assert raster[here][:, 1].mean() == pytest.approx(truth[here][:, 1].mean(), rel=2e-3)
+        difference = (raster - truth)[here][:, 1]
+        assert np.mean(difference**2 / (truth[here][:, 1] ** 2 + 0.01)) < 1e-3
 
 
 def test_upper_row_is_brighter_the_more_so_the_rougher(page: Page) -> None:
