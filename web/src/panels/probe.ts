@@ -13,7 +13,6 @@ class ProbePanel implements Panel {
   /** 0 to 1 from the top left of the picture. */
   private at: [number, number] | null = null;
   private timer = 0;
-  private raster: Picture | null = null;
 
   mount(host: HTMLElement, app: App): void {
     this.app = app;
@@ -39,8 +38,7 @@ class ProbePanel implements Panel {
     this.soon();
   }
 
-  refresh(what: string): void {
-    if (what === "picture") this.raster = null;
+  refresh(): void {
     this.soon();
   }
 
@@ -59,8 +57,7 @@ class ProbePanel implements Panel {
       this.note.textContent = "Point at the picture.";
       return;
     }
-    this.raster ??= this.app.picture();
-    const { raster } = this;
+    const raster = this.app.picture();
     const reference = this.app.referencePicture();
     const read = (picture: Picture) => {
       const [x, y] = this.pixel(picture);
