@@ -10,11 +10,11 @@ from gonio import cli
 
 def test_bake_info_and_plot_work_together(tmp_path, capsys):
     folder = tmp_path / "t"
-    assert cli._run(["bake", "ggx", "--size", "8", "-o", str(folder), "--json"]) == 0
+    assert cli.run(["bake", "ggx", "--size", "8", "-o", str(folder), "--json"]) == 0
     baked = json.loads(capsys.readouterr().out)
-    assert cli._run(["info", str(folder), "--json"]) == 0
+    assert cli.run(["info", str(folder), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["hash"] == baked["hash"]
-    assert cli._run(["plot", str(folder), "-o", str(tmp_path / "t.png")]) == 0
+    assert cli.run(["plot", str(folder), "-o", str(tmp_path / "t.png")]) == 0
     assert (tmp_path / "t.png").stat().st_size > 1000
 
 
@@ -30,18 +30,18 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
 )
 def test_every_kind_of_table_is_printed_and_drawn(tmp_path, capsys, words):
     folder = tmp_path / "t"
-    assert cli._run(["bake", *words, "--size", "4", "-o", str(folder)]) == 0
+    assert cli.run(["bake", *words, "--size", "4", "-o", str(folder)]) == 0
     text = capsys.readouterr().out
     assert "max error" in text and "mu  " in text
-    assert cli._run(["info", str(folder)]) == 0
+    assert cli.run(["info", str(folder)]) == 0
     assert capsys.readouterr().out == text
-    assert cli._run(["plot", str(folder), "-o", str(tmp_path / "t.png")]) == 0
+    assert cli.run(["plot", str(folder), "-o", str(tmp_path / "t.png")]) == 0
     assert (tmp_path / "t.png").stat().st_size > 1000
 
 
 def test_a_model_with_parameters_is_baked(tmp_path, capsys):
     words = ["bake", "conductor", "--preset", "Au", "-p", "masking=smith-separable", "--lut", "E", "--size", "4"]
-    assert cli._run([*words, "-o", str(tmp_path / "t"), "--json"]) == 0
+    assert cli.run([*words, "-o", str(tmp_path / "t"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["masking"] == "smith-separable"
 
 
@@ -60,6 +60,6 @@ def test_a_model_with_parameters_is_baked(tmp_path, capsys):
 )
 def test_bad_input_exits_with_2_and_writes_nothing(tmp_path, monkeypatch, capsys, words):
     monkeypatch.chdir(tmp_path)
-    assert cli._run(words) == 2
+    assert cli.run(words) == 2
     assert "error:" in capsys.readouterr().err
     assert not any(tmp_path.iterdir())

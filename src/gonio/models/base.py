@@ -373,9 +373,10 @@ class BSDF:
         """The method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
         bound = self.symbols()
         inner = inspect.unwrap(getattr(type(self), method))
-        more = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
+        more: dict[str, Any] = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
         kinds = {"wo": "vec3", "u": "vec3"} if method == "sample" else {"wo": "vec3", "wi": "vec3"}
-        return ops.record(inner, types=kinds, name=f"{type(self).__name__}_{method}", **{"self": bound}, **more)
+        given: dict[str, Any] = {"self": bound, **more}
+        return ops.record(inner, types=kinds, name=f"{type(self).__name__}_{method}", **given)
 
 
 @functools.cache

@@ -1,0 +1,73 @@
+"""What verbs print with: a progress bar, tables, warnings."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..render.passes import Progress
+
+
+def print_warnings(warnings: tuple[str, ...]) -> None:
+    """One line each, on stderr."""
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+class Bar:
+    """A progress bar on stderr: samples done, rate, time left; nothing where stderr is no terminal."""
+
+    def __init__(self, title: str, total: float | None = None) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+        self._console = Console(stderr=True)
+        columns = "[cyan]{task.description}", "{task.fields[state]}"
+        self._bar = Progress(
+            SpinnerColumn(),
+            TextColumn(columns[0]),
+            BarColumn(),
+            TextColumn(columns[1]),
+            console=self._console,
+            transient=True,
+            disable=not self._console.is_terminal,
+        )
+        self._task = self._bar.add_task(title, total=total, state="loading")
+
+    def __enter__(self) -> Bar:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(self, *exc: Any) -> None:
+        self._bar.__exit__(*exc)
+
+    def update(self, progress: Progress) -> None:
+        minutes, seconds = divmod(round(progress.remaining), 60)
+        state = f"{progress.done}/{progress.wanted} spp  {progress.rate / 1e6:.2f} M samples/s"
+        state += f"  {minutes}:{seconds:02} left" if progress.done < progress.wanted else "  writing"
+        self._bar.update(self._task, total=progress.wanted, completed=progress.done, state=state)
+
+    def step(self, done: int, total: int, state: str) -> None:
+        self._bar.update(self._task, total=total, completed=done, state=state)
+
+    def stopping(self) -> None:
+        self._console.print("Ctrl-C: ending in a moment; again to end at once")
+
+
+def listing(*headings: str) -> Any:
+    """A table for the terminal."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    found = Table(box=SIMPLE_HEAD, show_header=any(headings), pad_edge=False)
+    for index, heading in enumerate(headings):
+        found.add_column(heading, no_wrap=index == 0, style="cyan" if index == 0 else "")
+    return found
+
+
+def print_rich(what: Any) -> None:
+    """Print with colours where the terminal has them."""
+    from rich.console import Console
+
+    Console().print(what)
