@@ -143,7 +143,8 @@ def compensation(
     table = listing("method", *names, "loss", "recip.", "time")
     print("RMS distance of the albedo to the random walk; largest loss in a white furnace; breach of reciprocity; time")
     for method in comparison.METHODS:
-        rms = [f"{found['rms'][n][method]:.2g}" if method in found["rms"][n] else "" for n in names]
+        distances = [found["rms"][n].get(method) for n in names]
+        rms = ["" if d is None else f"{d:.3f}" if d >= 1e-3 else f"{d:.0e}" for d in distances]
         broken = f"{found['reciprocity'][method]:.0e}" if method in found["reciprocity"] else ""
         furnace = f"{found['furnace']['white'].get(method, 0.0):.0e}"
         table.add_row(method, *rms, furnace, broken, f"{found['cost'][method]:.2f}")
