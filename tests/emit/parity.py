@@ -82,7 +82,7 @@ def _directions(rng: np.random.Generator, count: int, below: bool) -> np.ndarray
     r = np.sqrt(np.maximum(1 - z * z, 0.0))
     v = np.stack([r * np.cos(phi), r * np.sin(phi), z], 1)
     v[kind == 2] = (0.0, 0.0, 1.0)
-    up = ~((rng.random(count) < (0.5 if below else 0.1)))
+    up = ~(rng.random(count) < (0.5 if below else 0.1))
     v[:, 2] = np.where(up, np.abs(v[:, 2]), v[:, 2])
     return v.astype(np.float32)
 
@@ -179,7 +179,10 @@ def glsl_program(bundle: Any, draws: Draws) -> str:
     width = -(-draws.columns().shape[1] // 4)
     f = m["functions"]
     derived = ", derived" if m["derived"] else ""
-    lines = [f"{m['struct']} self;", *_filled(bundle, draws, "self.", {"float": "float", "vec2": "vec2", "vec3": "vec3"})]
+    lines = [
+        f"{m['struct']} self;",
+        *_filled(bundle, draws, "self.", {"float": "float", "vec2": "vec2", "vec3": "vec3"}),
+    ]
     if m["derived"]:
         lines.append(f"{m['derived']['struct']} derived = {f['derive']}(self);")
     lines += [
@@ -224,7 +227,7 @@ RUN_GLSL = """async ({text, inputs, width, textures, side}) => {
   };
   const program = gl.createProgram();
   gl.attachShader(program, shader(gl.VERTEX_SHADER, `#version 300 es
-    void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0), 0.0, 1.0); }`));
+    void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`));
   gl.attachShader(program, shader(gl.FRAGMENT_SHADER, text));
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
@@ -460,7 +463,7 @@ def judge(model: go.BSDF, draws: Draws, got: dict[str, np.ndarray], terms: list[
             each = near[name].reshape(times, count, *value.shape[1:])
             change[name][doubtful] = np.abs(each - value).sum(axis=0)
     ratios = {}
-    for name, value in right.items():
+    for name in right:
         allowed = np.maximum(TIGHT * size[name], MOVES * change[name])
         dim = np.where(error[name] > DIM, np.inf, 0.0)
         ratio = np.where(size[name] > DIM, error[name] / np.maximum(allowed, 1e-300), dim)
@@ -476,4 +479,4 @@ def judge(model: go.BSDF, draws: Draws, got: dict[str, np.ndarray], terms: list[
     return verdicts
 
 
-__all__ = ["COUNT", "Draws", "Program", "draw", "judge", "json", "reference", "run_glsl"]
+__all__ = ["COUNT", "Draws", "Program", "draw", "json", "judge", "reference", "run_glsl"]

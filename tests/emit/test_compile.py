@@ -1,4 +1,4 @@
-"""Every model compiles in every language, by compilers that others made: Chromium's for GLSL and WGSL, glslang for HLSL."""
+"""Every model compiles in every language: Chromium takes the GLSL and the WGSL, glslang the HLSL."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any
 import gonio as go
 import pytest
 from gonio.emit import bundle
-
-import browser
 from parity import GLSL_HEAD
 from variants import EVERY, FEW
+
+import browser
 
 GLSL = """(texts) => {
   const gl = document.createElement('canvas').getContext('webgl2');
@@ -68,7 +68,9 @@ def test_wgsl_of_every_model_compiles_in_webgpu(page: Any) -> None:
 def _glslang(text: str, folder: Path) -> str:
     """What glslang says against HLSL, or ""."""
     # glslang knows HLSL as it was before 2021, when ?: still chose component by component
-    source = "#define select(mask, a, b) ((mask) ? (a) : (b))\n" + text + "\nfloat4 main() : SV_Target { return 0.0; }\n"
+    source = (
+        "#define select(mask, a, b) ((mask) ? (a) : (b))\n" + text + "\nfloat4 main() : SV_Target { return 0.0; }\n"
+    )
     file = folder / "shader.hlsl"
     file.write_text(source)
     command = ["glslangValidator", "-D", "-S", "frag", "-e", "main", "-V", "-o", str(folder / "out.spv"), str(file)]

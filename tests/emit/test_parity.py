@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import parity
 import pytest
 from gonio.emit import bundle
+from variants import COMPENSATED, EVERY, FEW
 
 import browser
-import parity
-from variants import COMPENSATED, EVERY, FEW
 
 RUN = {"glsl": parity.run_glsl, "wgsl": parity.run_wgsl}
 

@@ -18,14 +18,23 @@ from . import program as programs
 from .dialect import Dialect, axes, literal, pixels, reader, width
 from .glsl import GLSL
 from .hlsl import HLSL
+from .layout import comment
 from .program import Program
 from .simplify import Record
 from .wgsl import WGSL
-from .writer import Writer, comment
+from .writer import Writer
 
 DIALECTS: dict[str, Dialect] = {d.name: d for d in (GLSL, WGSL, HLSL)}
 
-SYMBOLS = {"alpha": "α", "eta": "η", "sigma": "σ", "albedo": "ρ", "rotation": "φ", "weight": "w"}
+# how papers write a parameter
+SYMBOLS = {
+    "alpha": "\u03b1",
+    "eta": "\u03b7",
+    "sigma": "\u03c3",
+    "albedo": "\u03c1",
+    "rotation": "\u03c6",
+    "weight": "w",
+}
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,8 @@ def _text(made: Program, dialect: Dialect) -> str:
     for place, table in enumerate(made.tables):
         uniform = f"table_{table.name}"
         size = " x ".join(map(str, table.shape))
-        about = f"// {size} texels, {table.channels} channel{'s' * (table.channels > 1)}; linear between texel centres, held outside."
+        channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
+        about = f"// {size} texels, {channels}; linear between texel centres, held outside."
         binding = dialect.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
         parts.append([*binding, "", about, *reader(dialect, table)])
     parts += [body for body in bodies if body]

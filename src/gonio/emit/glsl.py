@@ -33,17 +33,18 @@ COMPARE = {
     "not": "not({0})",
 }
 
-RESERVED = frozenset(
-    """attribute const uniform varying layout centroid flat smooth break continue do for while switch case default if
-    else in out inout float int void bool true false invariant discard return mat2 mat3 mat4 vec2 vec3 vec4 ivec2
-    ivec3 ivec4 bvec2 bvec3 bvec4 uint lowp mediump highp precision sampler2D sampler3D samplerCube struct coherent
-    volatile restrict readonly writeonly resource atomic_uint noperspective patch sample subroutine common partition
-    active asm class union enum typedef template this goto inline noinline public static extern external interface
-    long short double half fixed unsigned superp input output filter sizeof cast namespace using main
-    radians degrees sin cos tan asin acos atan pow exp log exp2 log2 sqrt inversesqrt abs sign floor trunc round ceil
-    fract mod modf min max clamp mix step smoothstep isnan isinf length distance dot cross normalize reflect refract
-    transpose inverse outerProduct determinant texture any all not equal""".split()
-)
+_WORDS = """
+    attribute const uniform varying layout centroid flat smooth break continue do for while switch case default
+    if else in out inout float int void bool true false invariant discard return mat2 mat3 mat4 vec2 vec3 vec4
+    ivec2 ivec3 ivec4 bvec2 bvec3 bvec4 uint lowp mediump highp precision sampler2D sampler3D samplerCube struct
+    coherent volatile restrict readonly writeonly resource atomic_uint noperspective patch sample subroutine
+    common partition active asm class union enum typedef template this goto inline noinline public static extern
+    external interface long short double half fixed unsigned superp input output filter sizeof cast namespace
+    using main radians degrees sin cos tan asin acos atan pow exp log exp2 log2 sqrt inversesqrt abs sign floor
+    trunc round ceil fract mod modf min max clamp mix step smoothstep isnan isinf length distance dot cross
+    normalize reflect refract transpose inverse outerProduct determinant texture any all not equal
+"""
+RESERVED = frozenset(_WORDS.split())
 
 
 def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str:

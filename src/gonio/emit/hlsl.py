@@ -20,24 +20,26 @@ WORDS = {
     "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
 }
 
-RESERVED = frozenset(
-    """AppendStructuredBuffer asm asm_fragment BlendState bool break Buffer ByteAddressBuffer case cbuffer centroid class
-    column_major compile compile_fragment CompileShader const continue ComputeShader ConsumeStructuredBuffer default
-    DepthStencilState DepthStencilView discard do double DomainShader dword else export extern false float for fxgroup
-    GeometryShader groupshared half Hullshader if in inline inout InputPatch int interface line lineadj linear
-    LineStream matrix min16float min10float min16int min12int min16uint namespace nointerpolation noperspective NULL out
-    OutputPatch packoffset pass pixelfragment PixelShader point PointStream precise RasterizerState RenderTargetView
-    return register row_major RWBuffer RWByteAddressBuffer RWStructuredBuffer RWTexture1D RWTexture2D RWTexture3D sample
-    sampler SamplerState SamplerComparisonState shared snorm stateblock stateblock_state static string struct switch
-    StructuredBuffer tbuffer technique texture Texture1D Texture2D Texture3D TextureCube this true typedef triangle
-    triangleadj TriangleStream uint uniform unorm unsigned vector vertexfragment VertexShader void volatile while
-    auto catch char const_cast delete dynamic_cast enum explicit friend goto long mutable new operator private protected
-    public reinterpret_cast short signed sizeof static_cast template throw try typename union using virtual
-    abs acos all any asfloat asin asint asuint atan atan2 ceil clamp clip cos cosh cross ddx ddy degrees determinant
-    distance dot exp exp2 floor fma fmod frac frexp isfinite isinf isnan ldexp length lerp lit log log10 log2 mad max
-    min modf mul noise normalize pow radians rcp reflect refract round rsqrt saturate select sign sin sincos sinh
-    smoothstep sqrt step tan tanh transpose trunc main""".split()
-)
+_WORDS = """
+    AppendStructuredBuffer asm asm_fragment BlendState bool break Buffer ByteAddressBuffer case cbuffer centroid
+    class column_major compile compile_fragment CompileShader const continue ComputeShader
+    ConsumeStructuredBuffer default DepthStencilState DepthStencilView discard do double DomainShader dword else
+    export extern false float for fxgroup GeometryShader groupshared half Hullshader if in inline inout
+    InputPatch int interface line lineadj linear LineStream matrix min16float min10float min16int min12int
+    min16uint namespace nointerpolation noperspective NULL out OutputPatch packoffset pass pixelfragment
+    PixelShader point PointStream precise RasterizerState RenderTargetView return register row_major RWBuffer
+    RWByteAddressBuffer RWStructuredBuffer RWTexture1D RWTexture2D RWTexture3D sample sampler SamplerState
+    SamplerComparisonState shared snorm stateblock stateblock_state static string struct switch StructuredBuffer
+    tbuffer technique texture Texture1D Texture2D Texture3D TextureCube this true typedef triangle triangleadj
+    TriangleStream uint uniform unorm unsigned vector vertexfragment VertexShader void volatile while auto catch
+    char const_cast delete dynamic_cast enum explicit friend goto long mutable new operator private protected
+    public reinterpret_cast short signed sizeof static_cast template throw try typename union using virtual abs
+    acos all any asfloat asin asint asuint atan atan2 ceil clamp clip cos cosh cross ddx ddy degrees determinant
+    distance dot exp exp2 floor fma fmod frac frexp isfinite isinf isnan ldexp length lerp lit log log10 log2
+    mad max min modf mul noise normalize pow radians rcp reflect refract round rsqrt saturate select sign sin
+    sincos sinh smoothstep sqrt step tan tanh transpose trunc main
+"""
+RESERVED = frozenset(_WORDS.split())
 
 
 def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str:

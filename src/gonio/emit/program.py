@@ -109,6 +109,7 @@ class Program:
         derive.results = [(path, kept[path]) for path in struct.paths]
         derive.used = {derive.parameters.index(v) for v in derive.values() if v.op == "parameter"}
         derive.record, derive.single = struct.record, False
+        self.routines = self._reachable(self.routines)  # without what served only fields that nobody uses
 
     @property
     def _settled(self) -> Any:
@@ -131,7 +132,7 @@ class Program:
             if routine in wanted:
                 wanted |= {v.static for v in routine.values() if v.op == "call"}
         for routine in found:
-            if routine in wanted and not routine.single and routine.name != f"{type(self.model).__name__}_derive":
+            if routine in wanted and not routine.single and routine.record is None and routine.name != f"{type(self.model).__name__}_derive":
                 self._name_result(routine)
         return [routine for routine in found if routine in wanted]
 

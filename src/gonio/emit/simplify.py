@@ -225,7 +225,8 @@ class _Simplifier:
 
     def fold(self, op: str, args: tuple, type_: str) -> Value | None:
         if op == "where":
-            return self.fold_where(*args, type_)
+            mask, a, b = args
+            return self.fold_where(mask, a, b, type_)
         if args and all(a.op == "constant" for a in args):
             found = _compute(op, [a.static for a in args])
             if found is not None:

@@ -23,24 +23,26 @@ WORDS = {
 }
 
 # keywords, and the words that the specification keeps for later
-RESERVED = frozenset(
-    """alias break case const const_assert continue continuing default diagnostic discard else enable false fn for if
-    let loop override requires return struct switch true var while
-    NULL Self abstract active alignas alignof as asm asm_fragment async attribute auto await become cast catch class
-    co_await co_return co_yield coherent column_major common compile compile_fragment concept const_cast consteval
-    constexpr constinit crate debugger decltype delete demote demote_to_helper do dynamic_cast enum explicit export
-    extends extern external fallthrough filter final finally friend from fxgroup get goto groupshared highp impl
-    implements import inline instanceof interface layout lowp macro macro_rules match mediump meta mod module move mut
-    mutable namespace new nil noexcept noinline nointerpolation noperspective null nullptr of operator package
-    packoffset partition pass patch pixelfragment precise precision premerge priv protected pub public readonly ref
-    regardless register reinterpret_cast require resource restrict self set shared sizeof smooth snorm static
-    static_assert static_cast std subroutine super target template this thread_local throw trait try type typedef typeid
-    typename typeof union unless unorm unsafe unsized use using varying virtual volatile wgsl where with writeonly yield
-    f16 f32 i32 u32 bool vec2 vec3 vec4 array atomic mat2x2 mat3x3 mat4x4 ptr sampler texture_2d texture_3d
-    bitcast all any select abs acos acosh asin asinh atan atanh atan2 ceil clamp cos cosh cross degrees determinant
-    distance dot exp exp2 floor fma fract frexp inverseSqrt ldexp length log log2 max min mix modf normalize pow radians
-    reflect refract round saturate sign sin sinh smoothstep sqrt step tan tanh transpose trunc main""".split()
-)
+_WORDS = """
+    alias break case const const_assert continue continuing default diagnostic discard else enable false fn for
+    if let loop override requires return struct switch true var while NULL Self abstract active alignas alignof
+    as asm asm_fragment async attribute auto await become cast catch class co_await co_return co_yield coherent
+    column_major common compile compile_fragment concept const_cast consteval constexpr constinit crate debugger
+    decltype delete demote demote_to_helper do dynamic_cast enum explicit export extends extern external
+    fallthrough filter final finally friend from fxgroup get goto groupshared highp impl implements import
+    inline instanceof interface layout lowp macro macro_rules match mediump meta mod module move mut mutable
+    namespace new nil noexcept noinline nointerpolation noperspective null nullptr of operator package
+    packoffset partition pass patch pixelfragment precise precision premerge priv protected pub public readonly
+    ref regardless register reinterpret_cast require resource restrict self set shared sizeof smooth snorm
+    static static_assert static_cast std subroutine super target template this thread_local throw trait try type
+    typedef typeid typename typeof union unless unorm unsafe unsized use using varying virtual volatile wgsl
+    where with writeonly yield f16 f32 i32 u32 bool vec2 vec3 vec4 array atomic mat2x2 mat3x3 mat4x4 ptr sampler
+    texture_2d texture_3d bitcast all any select abs acos acosh asin asinh atan atanh atan2 ceil clamp cos cosh
+    cross degrees determinant distance dot exp exp2 floor fma fract frexp inverseSqrt ldexp length log log2 max
+    min mix modf normalize pow radians reflect refract round saturate sign sin sinh smoothstep sqrt step tan
+    tanh transpose trunc main
+"""
+RESERVED = frozenset(_WORDS.split())
 
 
 def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str:

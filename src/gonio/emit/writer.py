@@ -6,11 +6,10 @@ import math
 from typing import Any
 
 from .dialect import AND, ATOM, CHOICE, NATIVE, OPERATORS, OR, SIGN, Dialect, literal
+from .layout import INDENT, comment, wrap
 from .program import Program, Struct, flat, place
 from .simplify import Record, Routine, Value, check_single, module_constant, needed
 
-INDENT = "    "
-COLUMNS = 100
 INLINE = 88  # characters: a longer part of an expression gets a line of its own
 
 CONSTANTS = {
@@ -165,10 +164,8 @@ class _RoutineWriter:
         record = routine.record
         assert record is not None
         values = [value for _, value in routine.results]
-        called = values[0].args[0] if values[0].op == "element" else None
-        if called is not None and all(
-            v.op == "element" and v.args[0] is called and v.static == i for i, v in enumerate(values)
-        ):
+        called = self._forwarded()
+        if called is not None:
             return wrap(f"return {self.whole(called)};", INDENT)
         parts = [self.splat(value, type_) for value, (_, type_) in zip(values, record.fields, strict=True)]
         name = self.writer.note(record)
@@ -177,6 +174,15 @@ class _RoutineWriter:
         result = self.fresh("result")
         lines = wrap(f"{name} {result} = {{ {', '.join(parts)} }};", INDENT)
         return [*lines, f"{INDENT}return {result};"]
+
+    def _forwarded(self) -> Value | None:
+        """The call whose several results are returned as they stand, if there is one."""
+        values = [value for _, value in self.routine.results]
+        if self.routine.single or values[0].op != "element":
+            return None
+        called = values[0].args[0]
+        same = all(v.op == "element" and v.args[0] is called and v.static == i for i, v in enumerate(values))
+        return called if same else None
 
     def _plan(self, values: list[Value]) -> None:
         """Which values get a line and a name."""
@@ -209,22 +215,19 @@ class _RoutineWriter:
             several = uses[value.order] > 1
             cheap = sizes[value.order] <= 1 and value.op not in ("call", "texel", "div", "sqrt", "vector", "dot")
             author = bool(value.name) and value.order not in results and sizes[value.order] >= 2
-            if (several and not (cheap and not value.name)) or author:
-                self.named.add(value.order)
-            elif several and value.op in ("mul", "div", "sqrt"):
+            if (
+                (several and not (cheap and not value.name))
+                or author
+                or (several and value.op in ("mul", "div", "sqrt"))
+            ):
                 self.named.add(value.order)
         if len(results) == 1 and self.routine.single:
             order = self.routine.results[0][1].order
             if uses[order] == 1:
                 self.named.discard(order)
-        elif not self.routine.single:  # an element's call that is returned as it stands
-            values_ = [v for _, v in self.routine.results]
-            if all(
-                v.op == "element" and v.args[0] is values_[0].args[0] and v.static == i for i, v in enumerate(values_)
-            ):
-                if uses[values_[0].args[0].order] == len(values_):
-                    self.named.discard(values_[0].args[0].order)
-        self.sizes = sizes
+        called = self._forwarded()
+        if called is not None and uses[called.order] == len(self.routine.results):
+            self.named.discard(called.order)
 
     def _last_uses(self, statements: list[Value]) -> dict[int, int]:
         """By named value: the last statement that reads it; the result comes after all."""
@@ -267,7 +270,7 @@ class _RoutineWriter:
             for other in self.routine.values():
                 if other.op == "element" and other.args[0] is value and "." in other.name:
                     return other.name.rpartition(".")[0].rpartition(".")[2]
-            return stem_of(value.static).rpartition("_")[2] + "d"
+            return {"sample": "sampled"}.get(stem_of(value.static).rpartition("_")[2], "found")
         if value.name:
             root, _, last = value.name.rpartition(".")
             return last if not last.isdigit() else f"{root.rpartition('.')[2]}_{last}"
@@ -501,56 +504,3 @@ def _size(value: Value, sizes: dict[int, int]) -> int:
         return 0
     below = sum(sizes.get(a.order, 0) for a in needed(value))
     return below + (0 if value.op in ("component", "element") else 1)
-
-
-def comment(doc: str, indent: str = "") -> list[str]:
-    """A docstring as a comment."""
-    return [f"{indent}// {line}".rstrip() for line in doc.strip().splitlines()]
-
-
-def wrap(line: str, indent: str) -> list[str]:
-    """A statement in lines of at most `COLUMNS` characters, broken where the least is torn apart."""
-    text = indent + line
-    if len(text) <= COLUMNS:
-        return [text]
-    cut = _break(text, COLUMNS)
-    if cut is None:
-        return [text]
-    first, rest = text[:cut].rstrip(), text[cut:].lstrip()
-    return [first, *_continued(rest, indent + INDENT)]
-
-
-def _continued(rest: str, indent: str) -> list[str]:
-    text = indent + rest
-    if len(text) <= COLUMNS:
-        return [text]
-    cut = _break(text, COLUMNS)
-    if cut is None:
-        return [text]
-    return [text[:cut].rstrip(), *_continued(text[cut:].lstrip(), indent)]
-
-
-def _break(text: str, limit: int) -> int | None:
-    """Where to break: at the shallowest operator or comma before the limit, the last of those."""
-    depth, best = 0, None
-    for i, c in enumerate(text[: limit + 1]):
-        if c in "([{":
-            depth += 1
-        elif c in ")]}":
-            depth -= 1
-        if i < len(text) - len(text.lstrip()) + 8:
-            continue
-        place_ = None
-        if c == "," and i < limit:
-            place_ = i + 1
-        elif c == " " and text[i + 1 : i + 3] in ("+ ", "- ", "? ", ": ", "* ", "/ ", "&&", "||"):
-            place_ = i
-        if place_ is not None:
-            loose = 0 if text[i + 1 : i + 2] in "?:&|" or c == "," else 1 if text[i + 1] in "+-" else 2
-            rank = (depth, loose)
-            if best is None or rank <= best[0]:
-                best = (rank, place_)
-    return best[1] if best else None
-
-
-__all__ = ["Writer", "comment", "wrap"]

@@ -1,0 +1,138 @@
+"""What the text of a shader keeps of its source, what the manifest tells, and how both are refused."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio import cli
+from gonio.emit import bundle
+from gonio.emit.dialect import literal, pixels
+from gonio.energy import curves
+from gonio.ops import Table, lookup
+
+from variants import COMPENSATED, FEW, GOLD
+
+LANGS = ("glsl", "wgsl", "hlsl")
+
+
+def _functions(text: str) -> dict[str, str]:
+    """Functions of GLSL by name."""
+    return dict(re.findall(r"^\w+ (\w+)\([^{]*\) \{\n(.*?)^\}", text, re.S | re.M))
+
+
+def test_names_docstrings_citations_and_constants_of_the_source_survive() -> None:
+    text = go.emit(GOLD)
+    assert "// (-1 + sqrt(1 + alpha^2 tan^2)) / 2 (Heitz2014, eq. 72)" in text
+    assert {"GGX_D", "GGX_Lambda", "half_vector", "masking_shadowing", "Conductor_reflectance"} <= set(_functions(text))
+    assert "float area = alpha.x * alpha.y;" in text and "const float SMOOTH = 0.0001;" in text
+    assert "Below this width a facet's tilt" in text and "const float INV_PI = 0.31830987;" in text
+
+
+def test_functions_that_differ_in_a_number_alone_are_one() -> None:
+    for name, material in FEW.items():
+        copies = [f for f in _functions(bundle(material).text) if re.fullmatch(r".*_[3-9]|.*_\d\d", f)]
+        assert not copies, (name, copies)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_nothing_is_defined_and_not_used(name: str) -> None:
+    made = bundle(FEW[name])
+    code = "\n".join(line for line in made.text.splitlines() if not line.startswith("//"))
+    entries = set(made.manifest["functions"].values())
+    for function, body in _functions(code).items():
+        if function not in entries:
+            assert len(re.findall(rf"\b{function}\(", code)) > 1, function
+        head = re.search(rf"^\w+ {function}\(([^{{]*?)\) \{{", code, re.M | re.S)
+        assert head is not None
+        for parameter in re.findall(r"(\w+)(?:,|$)", head[1].strip()):
+            used = re.search(rf"\b{parameter}\b", body)
+            assert used or function in entries, f"{function}: {parameter}"
+        for local in re.findall(r"^    \w+ (\w+) = ", body, re.M):
+            assert len(re.findall(rf"\b{local}\b", body)) > 1, f"{function}: {local}"
+
+
+@pytest.mark.parametrize("name", [n for n in COMPENSATED if "turquin" not in n])
+def test_what_follows_from_parameters_alone_is_a_function_of_its_own(name: str) -> None:
+    made = bundle(COMPENSATED[name])
+    assert made.manifest["derived"]["struct"] == made.manifest["struct"] + "Derived"
+    functions = _functions(made.text)
+    derive = functions.pop(made.manifest["functions"]["derive"])
+    # the table of M is read there, and nowhere else
+    assert "lookup_missing" in derive and not any("lookup_missing" in body for body in functions.values())
+
+
+@pytest.mark.parametrize("lang", LANGS)
+def test_manifest_tells_what_a_program_must_know(lang: str) -> None:
+    made = bundle(go.KullaConty(go.Conductor.preset("Au", alpha=(0.3, 0.1), rotation=0.5)), lang)
+    m = made.manifest
+    json.dumps(m, allow_nan=False)
+    assert m["lang"] == lang and m["title"] == "KullaConty" and m["model"] == "kulla-conty"
+    fields = {f["path"]: f for f in m["fields"]}
+    assert fields["base.alpha"] == {"name": "base_alpha", "path": "base.alpha", "type": "vec2", "value": [0.3, 0.1]}
+    assert fields["base.rotation"]["value"] == pytest.approx([np.cos(0.5), np.sin(0.5)])
+    assert [t["name"] for t in m["terms"]] == ["D", "G", "F", "single", "multi"] and all(t["doc"] for t in m["terms"])
+    kinds = {p["path"]: p["kind"] for p in m["parameters"]}
+    assert kinds["base.alpha"] == "alpha" and kinds["base.masking"] == "choice" and kinds["color"] == "choice"
+    assert not m["transmits"] and not m["isotropic"] and m["delta"] == "never"
+    for texture in m["textures"]:
+        assert made.tables[texture["uniform"]].size == np.prod(texture["size"]) * texture["channels"]
+    assert all(function in made.text for function in m["functions"].values())
+
+
+def test_tables_lie_in_the_order_of_upload() -> None:
+    table = curves.isotropic("ggx", "smith-correlated")
+    texture = pixels(table)  # x: roughness, y: groups of four channels
+    assert texture.shape == (3, table.shape[0], 4)
+    assert texture[1, 7, 2] == np.float32(table.values[7, 6])
+    deep = Table("deep", np.random.default_rng(1).random((3, 4, 5, 1)))
+    assert pixels(deep).ravel()[(2 * 4 + 1) * 5 + 3] == np.float32(deep.values[2, 1, 3, 0])
+    assert lookup(deep, 0.5 / 3 + 2 / 3, 1.5 / 4, 3.5 / 5)[0] == pytest.approx(deep.values[2, 1, 3, 0])
+
+
+def test_literals_are_short_and_the_same_float32() -> None:
+    assert [literal(x) for x in (0.5, 2.0, 1e-30, 0.1, 1e8)] == ["0.5", "2.0", "1.0e-30", "0.1", "1.0e8"]
+    for x in np.random.default_rng(2).normal(size=500) * 10.0 ** np.random.default_rng(3).uniform(-30, 30, 500):
+        text = literal(float(x))
+        assert np.float32(text) == np.float32(x) and ("." in text)
+
+
+def test_bundle_writes_shader_manifest_and_raw_tables(tmp_path: Path) -> None:
+    made = bundle(go.KullaConty(GOLD), "wgsl")
+    names = {path.name for path in made.write(tmp_path / "out")}
+    assert {"kulla-conty.wgsl", "manifest.json"} < names
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text()) == made.manifest
+    texture = made.manifest["textures"][0]
+    raw = np.fromfile(tmp_path / "out" / texture["file"], "<f4")
+    assert np.array_equal(raw, made.tables[texture["uniform"]].ravel())
+
+
+def test_unknown_languages_functions_and_things_are_refused() -> None:
+    with pytest.raises(go.InputError, match=r"unknown language 'glls'(?s:.*)did you mean 'glsl'"):
+        go.emit(GOLD, "glls")
+    with pytest.raises(go.InputError, match="unknown function 'evil'"):
+        go.emit(GOLD, functions=("evil",))
+    with pytest.raises(go.InputError, match="str given, a material expected"):
+        go.emit("conductor")  # type: ignore[arg-type]
+    with pytest.raises(go.InputError, match="one value a ray given"):
+        go.emit(go.Lambert(np.full((5, 3), 0.5)))
+
+
+def test_command_line_prints_writes_and_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(*arguments: str) -> int:
+        with pytest.raises(SystemExit) as done:
+            cli.main(["emit", *arguments])
+        return int(done.value.code or 0)
+
+    assert run("lambert", "--functions", "eval") == 0
+    printed = capsys.readouterr().out
+    assert "Lambert_eval" in printed and "Lambert_pdf" not in printed
+    assert run("conductor", "--preset", "Au", "--lang", "hlsl", "-o", str(tmp_path / "gold.hlsl")) == 0
+    assert "float3 Conductor_eval" in (tmp_path / "gold.hlsl").read_text()
+    assert run("lambert", "--lang", "cg") == 2
+    assert run("random-walk", "-p", "base=conductor", "-o", str(tmp_path / "no.glsl")) == 2
+    assert not (tmp_path / "no.glsl").exists()
