@@ -19,7 +19,7 @@ from . import messages, page
 from .reference import Reference
 from .stage import Stage
 
-PICTURES = 4  # environments kept a session
+PICTURES = 2  # environments kept a session: the one that is shown, and the one that comes
 MOST_WAITING = 64  # messages to a page that does not take them: answers to what it sends, and one frame
 
 
