@@ -68,6 +68,7 @@ export class PageApp implements App {
       this.environment = environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
     attachCamera(canvas, this.store, (x, y) => this.pick(x, y));
     this.store.subscribe((change) => this.respond(change));
+    canvas.addEventListener("webglcontextlost", () => this.say("The graphics driver has dropped the page's pictures: load it again.", "error"));
     new ResizeObserver(() => this.resized()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.themeChanged());
     addEventListener("hashchange", () => {

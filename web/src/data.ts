@@ -76,6 +76,8 @@ export interface Variant {
 export interface Preset {
   name: string;
   set: Values;
+  /** Reflectance at normal incidence, linear. */
+  f0?: Rgb;
 }
 
 export interface Material {
@@ -147,6 +149,8 @@ export interface PageData {
   materials: Material[];
   scene: { rows: Row[]; lights: SceneLight[]; camera: Camera; spacing: number; mesh: string };
   display: { tone: Tone; exposure: number };
+  /** What the reader should know of this scene, a line each. */
+  notes?: string[];
   dfg: null | { size: [number, number]; channels: 2; data: string };
 }
 

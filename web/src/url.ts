@@ -47,9 +47,12 @@ function bounded(state: State, initial: State, known: (material: string) => bool
   state.view.spacing = clamp(state.view.spacing, 2, 20);
   state.display.exposure = clamp(state.display.exposure, -30, 30);
   state.dock.height = clamp(state.dock.height, 100, 4000);
+  // A dropped file, be it shape or picture, is not in the link.
+  const pictured = initial.lights.some((light) => light.type === "environment" && light.image);
+  for (const light of state.lights) if (light.type === "environment" && !pictured) light.image = null;
   const named: [holder: object, key: string, values: string[]][] = [
     [state, "environment", ["sampled", "split-sum", "dfg"]],
-    [state.view, "mesh", ["sphere", "shaderball", "torus", "file"]],
+    [state.view, "mesh", ["sphere", "shaderball", "torus"]],
     [state.view, "term", ["full", "D", "G", "F", "single", "multi", "compensated", "difference", "rows"]],
     [state.view, "background", ["theme", "environment"]],
     [state.display, "tone", ["none", "reinhard", "filmic"]],

@@ -165,14 +165,18 @@ export class TripleControl extends Base<number[]> {
 
 export class ChoiceControl extends Base<string> {
   private readonly select = element("select");
+  private readonly patch = element("span", { class: "patch" });
   private shown = "";
 
   constructor(
     gui: GUI,
     field: Field<string>,
     private readonly settings: () => { value: string; label: string; doc?: string; disabled?: boolean }[],
+    /** Linear RGB of what is chosen, shown beside it. */
+    private readonly color: (() => readonly number[] | null) | null = null,
   ) {
     super(gui, field, "g-choice");
+    if (color) this.$widget.append(this.patch);
     this.select.setAttribute("aria-labelledby", this.$name.id);
     this.select.addEventListener("change", () => {
       field.set(this.select.value);
@@ -193,6 +197,9 @@ export class ChoiceControl extends Base<string> {
       );
     }
     this.select.value = this.field.get();
+    const shade = this.color?.();
+    this.patch.hidden = !shade;
+    if (shade) this.patch.style.background = hexOf(shade);
     return this;
   }
 }

@@ -14,7 +14,7 @@ interface Key {
   keys: string[];
   name: string;
   doc: string;
-  act(app: PageApp, actions: Actions): void;
+  act(app: PageApp, actions: Actions, key: string): void;
 }
 
 const STEP = Math.PI / 36;
@@ -41,6 +41,15 @@ const KEYS: Key[] = [
   { keys: ["t"], name: "T", doc: "light or dark theme", act: (_, actions) => actions.theme() },
   { keys: ["c"], name: "C", doc: "copy a link with the whole state", act: (_, actions) => actions.copyLink() },
   { keys: ["s"], name: "S", doc: "save the picture as PNG", act: (_, actions) => actions.screenshot() },
+  {
+    keys: ["1", "2", "3", "4", "5", "6"],
+    name: "1 … 6",
+    doc: "row A … F alone",
+    act: (app, _, key) => {
+      const slot = Number(key) - 1;
+      if (app.state.slots[slot]) app.store.set("solo", app.state.solo === slot ? null : slot);
+    },
+  },
   { keys: ["Escape"], name: "Esc", doc: "all rows again", act: (app) => app.store.set("solo", null) },
 ];
 
@@ -59,7 +68,7 @@ export function attachKeys(app: PageApp, actions: Actions, help: HTMLDialogEleme
     const key = KEYS.find((k) => k.keys.includes(name));
     if (!key) return;
     event.preventDefault();
-    key.act(app, actions);
+    key.act(app, actions, name);
   });
 }
 

@@ -1,6 +1,6 @@
 /** Names over the picture: what each row is, and under every ball what sets it apart. */
 import type { PageApp } from "../app";
-import { cameraFrame, toPixel } from "../vectors";
+import { cameraFrame, sphereBounds, toPixel } from "../vectors";
 import { element } from "./dom";
 
 export class Labels {
@@ -31,7 +31,9 @@ export class Labels {
     for (const { slot, ball, center } of balls) {
       const row = state.slots[slot];
       if (!row) continue;
-      const below = toPixel(frame, [center[0], center[1] - 1.04, center[2]], width, height);
+      const middle = toPixel(frame, center, width, height);
+      const bounds = sphereBounds(frame, center, 1, width / height);
+      const below = middle && bounds ? [middle[0], ((1 - bounds[1]) / 2) * height + 2] as [number, number] : null;
       if (below) {
         if (ball > 0 && last) gap = Math.min(gap, Math.abs(below[0] - last[0]));
         last = below;
@@ -41,7 +43,10 @@ export class Labels {
       if (ball === 0) {
         const [top, bottom] = [1, -1].map((y) => toPixel(frame, [center[0] - 1.08, center[1] + y, center[2]], width, height));
         const beside = toPixel(frame, [center[0] - 1.08, center[1], center[2]], width, height);
-        if (beside) wanted.push({ text: `${minuend}${letter(slot)}  ${row.label}`, x: Math.max(16, beside[0]), y: beside[1], kind: "rowname", color: app.slotColor(slot), long: Math.max(60, top && bottom ? bottom[1] - top[1] : 0) });
+        const name = `${minuend}${letter(slot)}  ${row.label}`;
+        // What does not fit beside the ball would run into the next row's name; the side panel has it in full.
+        const room = Math.floor(Math.max(60, top && bottom ? bottom[1] - top[1] : 0) / 6);
+        if (beside) wanted.push({ text: name.length > room ? `${name.slice(0, room - 1)}…` : name, x: Math.max(16, beside[0]), y: beside[1], kind: "rowname", color: app.slotColor(slot), long: Math.max(60, top && bottom ? bottom[1] - top[1] : 0) });
       }
     }
     while (this.spans.length < wanted.length) {

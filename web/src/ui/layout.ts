@@ -49,7 +49,7 @@ export class Layout {
     panels: readonly Panel[],
   ) {
     const actions: Actions = { copyLink: () => void this.copyLink(), screenshot: () => void this.screenshot(), theme: () => this.theme() };
-    const help = helpCard((app.data as { notes?: string[] }).notes ?? []);
+    const help = helpCard(app.data.notes ?? []);
     this.furnace = button("Furnace", "White furnace: radiance 1 from everywhere (F)", () => app.store.set("furnace", !app.state.furnace));
     this.furnace.dataset["act"] = "furnace";
     this.solo = button("All rows", "Show all rows again (Esc)", () => app.store.set("solo", null), "solo-note");

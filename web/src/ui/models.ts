@@ -64,6 +64,7 @@ export class ModelsSection {
           ...(edits.currentPreset(app, slot, material) ? [] : [{ value: "", label: "own values" }]),
           ...material.presets.map((p) => ({ value: p.name, label: p.name })),
         ],
+        () => material.presets.find((p) => p.name === edits.currentPreset(app, slot, material))?.f0 ?? null,
       );
     const numeric = manifest.parameters.filter((p) => p.field !== null);
     const row = app.state.slots[slot];
