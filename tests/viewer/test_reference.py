@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.ops.backend import drjit
+from gonio.render import integrators
 from gonio.viewer import messages, stage
 from gonio.viewer.reference import Reference
 
@@ -119,6 +120,18 @@ def test_two_balls_neither_shadow_nor_light_each_other() -> None:
     shadowed = picture(reference, scene(two, [side], size=(96, 48), transport="path", max_depth=2,
                                         camera={"distance": 400.0, "fov": 1.0}))  # fmt: skip
     assert shadowed[:, :48, :3].sum() < 0.05 * left
+
+
+def test_with_transport_path_it_is_the_renderers_own_picture() -> None:
+    what = stage.homework()
+    area = {"type": "area", "center": [0, 6, 6], "u": [2, 0, 0], "v": [0, 1.4, -1.4], "radiance": [5, 5, 5]}
+    reference = Reference(what)
+    found = picture(reference, scene(what, [WHITE, area], spp=16, transport="path", max_depth=5))
+    own = integrators.Render(reference._whole[1], integrators.Settings("path", max_depth=5), reference._render.sensor)
+    own.advance(16)
+    inside = found[..., 3] == 1.0
+    assert inside.sum() > 800
+    assert np.array_equal(found[inside][:, :3], own.image()[inside])
 
 
 def test_a_white_furnace_gives_back_the_coverage() -> None:
