@@ -104,7 +104,7 @@ export function shaderBall(): Mesh {
     const r = radius - groove;
     return [r * Math.sin(polar), middle + r * Math.cos(polar)];
   }, 120);
-  const collar: [number, number][] = [[0.001, -0.98], [0.62, -0.98], [0.67, -0.95], [0.67, -0.88], [0.62, -0.85], [0.4, -0.83], [0.3, -0.74], [0.27, -0.6], [0.27, -0.4]];
+  const collar: [number, number][] = [[0.001, -0.84], [0.46, -0.84], [0.5, -0.82], [0.5, -0.76], [0.46, -0.73], [0.34, -0.71], [0.27, -0.64], [0.25, -0.52], [0.25, -0.4]];
   turned((v) => smooth(collar, v), 64);
   return finish(grid);
 }
