@@ -1,3 +1,80 @@
+/*!
+three
+
+The MIT License
+
+Copyright © 2010-2026 three.js authors
+
+Permission is hereby granted, free of charge, to any person obtaining a copy
+of this software and associated documentation files (the "Software"), to deal
+in the Software without restriction, including without limitation the rights
+to use, copy, modify, merge, publish, distribute, sublicense, and/or sell
+copies of the Software, and to permit persons to whom the Software is
+furnished to do so, subject to the following conditions:
+
+The above copyright notice and this permission notice shall be included in
+all copies or substantial portions of the Software.
+
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR
+IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY,
+FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE
+AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN
+THE SOFTWARE.
+
+----
+
+lil-gui
+
+MIT License
+
+Copyright (c) 2019 George Michael Brower
+
+Permission is hereby granted, free of charge, to any person obtaining a copy
+of this software and associated documentation files (the "Software"), to deal
+in the Software without restriction, including without limitation the rights
+to use, copy, modify, merge, publish, distribute, sublicense, and/or sell
+copies of the Software, and to permit persons to whom the Software is
+furnished to do so, subject to the following conditions:
+
+The above copyright notice and this permission notice shall be included in all
+copies or substantial portions of the Software.
+
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR
+IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY,
+FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE
+AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE
+SOFTWARE.
+
+----
+
+uplot
+
+The MIT License (MIT)
+
+Copyright (c) 2022 Leon Sorokin
+
+Permission is hereby granted, free of charge, to any person obtaining a copy
+of this software and associated documentation files (the "Software"), to deal
+in the Software without restriction, including without limitation the rights
+to use, copy, modify, merge, publish, distribute, sublicense, and/or sell
+copies of the Software, and to permit persons to whom the Software is
+furnished to do so, subject to the following conditions:
+
+The above copyright notice and this permission notice shall be included in
+all copies or substantial portions of the Software.
+
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR
+IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY,
+FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE
+AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN
+THE SOFTWARE.
+*/
 (function(){var e=Object.defineProperty,t=(e,t,n)=>()=>{if(n)throw n[0];try{return e&&(t=e(e=0)),t}catch(e){throw n=[e],e}},n=(t,n)=>{let r={};for(var i in t)e(r,i,{get:t[i],enumerable:!0});return n||e(r,Symbol.toStringTag,{value:`Module`}),r},r=(e,t)=>[e[0]+t[0],e[1]+t[1],e[2]+t[2]],i=(e,t)=>[e[0]-t[0],e[1]-t[1],e[2]-t[2]],a=(e,t)=>[e[0]*t,e[1]*t,e[2]*t],o=(e,t)=>e[0]*t[0]+e[1]*t[1]+e[2]*t[2],s=(e,t)=>[e[1]*t[2]-e[2]*t[1],e[2]*t[0]-e[0]*t[2],e[0]*t[1]-e[1]*t[0]],c=e=>Math.hypot(e[0],e[1],e[2]),l=e=>a(e,1/(c(e)||1));function u(e){let t=Math.hypot(e[0],e[2]);return t>1e-9?[e[2]/t,0,-e[0]/t]:[1,0,0]}function d(e){let{azimuth:t,elevation:n}=e,i=[Math.sin(t)*Math.cos(n),Math.sin(n),Math.cos(t)*Math.cos(n)],o=[Math.cos(t),0,-Math.sin(t)];return{eye:r(e.target,a(i,e.distance)),right:o,up:s(i,o),back:i,half:Math.tan(e.fov*Math.PI/360)}}var f=(e,t)=>e*Math.max(1,16/9/t);function p(e,t){let n=i(t,e.eye);return[o(n,e.right),o(n,e.up),o(n,e.back)]}function m(e,t,n,r){let[i,a,o]=p(e,t);if(o>-1e-6)return null;let s=r/2/f(e.half,n/r);return[n/2+i/-o*s,r/2-a/-o*s]}function h(e,t,n,i,o){let s=f(e.half,i/o),c=(2*t-i)/o*s,u=(o-2*n)/o*s;return l(r(r(a(e.right,c),a(e.up,u)),a(e.back,-1)))}function g(e,t,n,r){let[i,a,o]=p(e,t);if(o-n>-.001)return null;let s=(e,t)=>{let r=Math.atan2(e,-o),i=Math.asin(Math.min(1,n/Math.hypot(e,o))),a=Math.PI/2-.001;return[Math.tan(Math.max(r-i,-a))/t,Math.tan(Math.min(r+i,a))/t]},c=f(e.half,r),[l,u]=s(i,c*r),[d,m]=s(a,c);return l>1||u<-1||d>1||m<-1?null:[Math.max(l,-1),Math.max(d,-1),Math.min(u,1),Math.min(m,1)]}var _=Math.PI/2-.02;function v(e,t,n){e.update(`camera`,({camera:e})=>{let r=e.azimuth-t;e.azimuth=Math.atan2(Math.sin(r),Math.cos(r)),e.elevation=Math.min(_,Math.max(-_,e.elevation+n))})}function y(e,t){e.update(`camera`,({camera:e})=>{e.distance=Math.min(200,Math.max(1.3,e.distance*t))})}function b(e,t,n){e.update(`camera`,({camera:e})=>{let i=d(e),o=2*i.half*e.distance;e.target=r(e.target,r(a(i.right,-t*o),a(i.up,n*o)))})}function x(e){e.update(`camera`,t=>{t.camera=structuredClone(e.initial.camera)})}function S(e,t,n){let r=new Map,i=0,a=0;e.addEventListener(`pointerdown`,t=>{e.setPointerCapture(t.pointerId),r.set(t.pointerId,{x:t.clientX,y:t.clientY}),r.size===1&&(i=0),a=0}),e.addEventListener(`pointermove`,n=>{let o=r.get(n.pointerId);if(!o)return;let[s,c]=[n.clientX-o.x,n.clientY-o.y];if(r.set(n.pointerId,{x:n.clientX,y:n.clientY}),i+=Math.abs(s)+Math.abs(c),i<4)return;let l=e.clientHeight||1;if(r.size===2){let[e,n]=[...r.values()],i=Math.hypot(e.x-n.x,e.y-n.y);a>0&&i>0&&y(t,a/i),a=i,b(t,s/l/2,c/l/2)}else n.buttons&6||n.shiftKey?b(t,s/l,c/l):v(t,s/l*Math.PI,c/l*Math.PI)});let o=t=>{if(r.delete(t.pointerId)&&(a=0,t.type===`pointerup`&&r.size===0&&i<4&&t.button===0)){let r=e.getBoundingClientRect();n(t.clientX-r.left,t.clientY-r.top)}};e.addEventListener(`pointerup`,o),e.addEventListener(`pointercancel`,o),e.addEventListener(`contextmenu`,e=>e.preventDefault()),e.addEventListener(`dblclick`,()=>x(t)),e.addEventListener(`wheel`,e=>{e.preventDefault();let n=e.deltaMode===1?16:1;y(t,Math.exp(Math.max(-60,Math.min(60,e.deltaY*n))*.002))},{passive:!1})}function C(){let e=document.getElementById(`gonio-data`);if(!e?.textContent)throw Error(`This page holds no data: it is the template. Make one with: gonio view MODEL --export page.html`);let t=JSON.parse(e.textContent);if(t.version!==1)throw Error(`The page data has version ${t.version}; this script reads version 1.`);return t}function w(e){let t=atob(e),n=new Uint8Array(t.length);for(let e=0;e<t.length;e++)n[e]=t.charCodeAt(e);return n}function T(e){return new Float32Array(w(e).buffer)}var E=`#version 300 es
 precision highp float;
 precision highp int;
