@@ -63,6 +63,8 @@ def test_what_follows_from_parameters_alone_is_a_function_of_its_own(name: str) 
     functions = _functions(made.text)
     derive = functions.pop(made.manifest["functions"]["derive"])
     # the table of M is read there, and nowhere else
+    for field in made.manifest["derived"]["fields"]:
+        assert any(re.search(rf"\bderived\.{field['name']}\b", body) for body in functions.values()), field
     assert "lookup_missing" in derive and not any("lookup_missing" in body for body in functions.values())
 
 
