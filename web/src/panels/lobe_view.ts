@@ -231,7 +231,7 @@ export class LobeView {
 
 /** Arrows end outside the unit ring, so that a lobe does not hide them. */
 const ARROW = 1.12;
-const HOME = { azimuth: -1.15, elevation: 0.42, distance: 2.7 };
+const HOME = { azimuth: -1.15, elevation: 0.42, distance: 2.9 };
 
 /** Column-major, z up, a vertical field of view of 40 degrees that grows where the view is taller than wide. */
 function viewProjection(eye: Vec3, target: Vec3, aspect: number): Float32Array {
