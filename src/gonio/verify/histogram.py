@@ -26,7 +26,7 @@ COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which
 PILOT = 1 << 15
 LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
-_NODES = {n: np.polynomial.legendre.leggauss(n) for n in (2, 4)}
+_NODES = {n: np.polynomial.legendre.leggauss(n) for n in (2, 3, 4)}
 
 
 class Grid(NamedTuple):
@@ -159,14 +159,13 @@ def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
     for depth in range(9):
-        four = _gauss(subject, grid.wo[row[owner]], side[owner], box, 4)
-        two = _gauss(subject, grid.wo[row[owner]], side[owner], box, 2)
-        # the error of four nodes is far below the difference: for smooth cells its square, over the value
-        off = np.abs(four - two) * 0.3
+        place = subject, grid.wo[row[owner]], side[owner], box
+        (two, *_), (three, *_), (four, low, high) = (_gauss(*place, order) for order in (2, 3, 4))
+        # the error of four nodes is far below the difference from two: for smooth cells its square, over the value.
+        # Where a step runs through the middle, two and four agree by chance, and three does not.
+        off = np.maximum(0.3 * np.abs(four - two), np.abs(four - three))
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
-        divide = off > allowed
-        dark = np.flatnonzero(four <= 0.0)
-        divide[dark] = _rim_is_lit(subject, grid.wo[row[owner[dark]]], side[owner[dark]], box[dark])
+        divide = (off > allowed) | _has_a_step_aside(*place, low, high, allowed)
         divide &= depth < 8
         np.add.at(cells, owner[~divide], four[~divide])
         if not divide.any():
@@ -181,19 +180,32 @@ def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
 
 
 # just inside a cell's corners and the middles of its sides, as shares of its width
+_OUTSIDE = 0.07  # the share of a cell's width beyond the first of four nodes
 _RIM = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.9999) if (a, b) != (0.5, 0.5)])
 
 
-def _rim_is_lit(subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """Whether the pdf is positive somewhere on the rim of cells that are dark at all nodes.
+def _has_a_step_aside(
+    subject: Subject,
+    wo: np.ndarray,
+    side: np.ndarray,
+    box: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    allowed: np.ndarray,
+) -> np.ndarray:
+    """Whether the pdf on the rim of cells is quite another than at all their nodes, whose values span [low, high].
 
     Total reflection and the horizon end a density with a step; what lies between a cell's rim and its nodes would be
-    lost.
+    lost, or taken for lit. A dark cell is divided at any light; others where what may be wrong is not allowed.
     """
-    if not len(box):
-        return np.zeros(0, bool)
     value = subject.pdf(np.repeat(wo, len(_RIM), axis=0), _directions(side, box, _RIM[:, 0], _RIM[:, 1]))
-    return np.any(value.reshape(len(box), -1) > 0.0, axis=1)
+    value = value.reshape(len(box), -1)
+    most, least = value.max(1), value.min(1)
+    a, b, c, d = box.T
+    strip = _OUTSIDE * (b - a) * (d - c)
+    above, below = most > 4.0 * high, 4.0 * least < low
+    matters = (above & (strip * (most - high) > allowed)) | (below & (strip * (low - least) > allowed))
+    return np.where(high <= 0.0, most > 0.0, matters)
 
 
 def _directions(side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -204,21 +216,24 @@ def _directions(side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray)
     return np.stack([r * np.cos(phi), r * np.sin(phi), (1.0 - height) * side[:, None]], -1).reshape(-1, 3)
 
 
-def _gauss(subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int) -> np.ndarray:
-    """int pdf over boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere."""
+def _gauss(
+    subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """int pdf over boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere; least and most pdf."""
     x, w = _NODES[order]
     x, w = 0.5 * (x + 1.0), 0.5 * w
     s, t = np.meshgrid(x, x, indexing="ij")
     weights = np.outer(w, w).ravel()
-    result = np.empty(len(box))
+    result, low, high = (np.empty(len(box)) for _ in range(3))
     chunk = (1 << 22) // order**2
     for start in range(0, len(box), chunk):
         part = slice(start, start + chunk)
         wi = _directions(side[part], box[part], s.ravel(), t.ravel())
-        value = subject.pdf(np.repeat(wo[part], order**2, axis=0), wi).reshape(-1, order**2) @ weights
+        value = subject.pdf(np.repeat(wo[part], order**2, axis=0), wi).reshape(-1, order**2)
         a, b, c, d = box[part].T
-        result[part] = value * (b - a) * (d - c)
-    return result
+        result[part] = value @ weights * (b - a) * (d - c)
+        low[part], high[part] = value.min(1), value.max(1)
+    return result, low, high
 
 
 # --------------------------------------------------------------------------- what the samples say

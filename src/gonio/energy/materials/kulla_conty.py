@@ -41,7 +41,12 @@ class KullaConty(_Added):
             "a measured base is drawn from anew for each value, and samples that change lobes shift E by 1e-4",
             lambda model: 2.0 if model.measured else 0.0,
             certain=False,
-        )
+        ),
+        "energy": Breach(
+            "tables of rough glass, and of two widths, are met to so much (benchmarks/energy.py)",
+            lambda model: 0.007 if model.base.transmits else 0.008 if model.turned else 0.0,
+            certain=False,
+        ),
     }
     color: str = choice(default="bounce", doc="colour of the light that is given back", choices=COLORS)
     average: str = choice(
