@@ -14,7 +14,6 @@ from gonio.emit import bundle
 from gonio.emit.dialect import literal, pixels
 from gonio.energy import curves
 from gonio.ops import Table, lookup
-
 from variants import COMPENSATED, FEW, GOLD
 
 LANGS = ("glsl", "wgsl", "hlsl")

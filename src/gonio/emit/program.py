@@ -132,7 +132,8 @@ class Program:
             if routine in wanted:
                 wanted |= {v.static for v in routine.values() if v.op == "call"}
         for routine in found:
-            if routine in wanted and not routine.single and routine.record is None and routine.name != f"{type(self.model).__name__}_derive":
+            unnamed = routine.record is None and not routine.single
+            if routine in wanted and unnamed and routine.name != f"{type(self.model).__name__}_derive":
                 self._name_result(routine)
         return [routine for routine in found if routine in wanted]
 
