@@ -54,3 +54,10 @@ def _break(text: str, limit: int) -> int | None:
             if best is None or rank <= best[0]:
                 best = (rank, place_)
     return best[1] if best else None
+
+
+def common_head(parts: list[str]) -> str:
+    """The inner material whose fields these are: "base" for self.base_eta, self.base_k, ..."""
+    paths = [part.partition(".")[2] for part in parts if "." in part and "(" not in part]
+    heads = {path.partition("_")[0] for path in paths if "_" in path}
+    return heads.pop() if len(heads) == 1 and len(paths) == len(parts) and all("_" in p for p in paths) else ""

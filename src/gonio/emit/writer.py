@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from .dialect import AND, ATOM, CHOICE, NATIVE, OPERATORS, OR, SIGN, Dialect, literal
-from .layout import INDENT, comment, wrap
+from .layout import INDENT, comment, common_head, wrap
 from .program import Program, Struct, flat, place
 from .simplify import Record, Routine, Value, check_single, module_constant, needed
 
@@ -465,7 +465,7 @@ class _RoutineWriter:
                 parts.append("0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM)))
         key = (name, tuple(parts))
         if key not in self.built:
-            local = self.fresh(_common(parts) or name[0].lower() + name[1:])
+            local = self.fresh(common_head(parts) or name[0].lower() + name[1:])
             type_name = self.writer.note(struct.record)
             if self.dialect.struct_literal:
                 line = self.dialect.local(type_name, local, f"{type_name}({', '.join(parts)})")
@@ -483,13 +483,6 @@ class _RoutineWriter:
         if struct is not None and struct.record.name in self.objects and path in struct.paths:
             own = self.objects[struct.record.name][1]
             self.parameter_names[parameter.order] = f"{own}.{self.dialect.word(flat(path))}"
-
-
-def _common(parts: list[str]) -> str:
-    """The inner material whose fields these are: "base" for self.base_eta, self.base_k, ..."""
-    paths = [part.partition(".")[2] for part in parts if "." in part and "(" not in part]
-    heads = {path.partition("_")[0] for path in paths if "_" in path}
-    return heads.pop() if len(heads) == 1 and len(paths) == len(parts) and all("_" in p for p in paths) else ""
 
 
 def stem_of(routine: Routine) -> str:
