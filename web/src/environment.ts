@@ -4,6 +4,7 @@
  */
 import { type Values, decodeBase64 } from "./data";
 import { albedoText, prefilterText } from "./glsl";
+import { distribution } from "./importance";
 import type { Shader, ShaderLibrary } from "./shaders";
 import { createTarget, floatToHalf, sequence, type Target } from "./targets";
 import { FULLSCREEN_VERTEX } from "./display";
@@ -14,6 +15,8 @@ export interface EnvironmentPicture {
   width: number;
   height: number;
   texture: WebGLTexture;
+  /** Where it is bright: see importance.ts. */
+  sums: WebGLTexture;
   /** Float16 RGBA, top row first, as a live server wants it. */
   half: Uint16Array;
 }
@@ -29,9 +32,15 @@ export function createEnvironment(gl: WebGL2RenderingContext, width: number, hei
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.REPEAT);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+  const bright = distribution(half, width, height);
+  const sums = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, sums);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, bright.width + 1, bright.height, 0, gl.RED, gl.FLOAT, bright.sums);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
   made += 1;
   // Unlike any other page's: a server may know several.
-  return { key: `environment${made}-${Math.random().toString(36).slice(2)}`, width, height, texture, half };
+  return { key: `environment${made}-${Math.random().toString(36).slice(2)}`, width, height, texture, sums, half };
 }
 
 export function environmentFromData(gl: WebGL2RenderingContext, width: number, height: number, data: string): EnvironmentPicture {

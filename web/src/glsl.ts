@@ -4,13 +4,14 @@
  * How the surface scatters is never written here; it is called by the names that the manifest gives.
  */
 import type { Manifest } from "./data";
+import { IMPORTANCE_GLSL } from "./importance";
 import { HEADER, type Shader } from "./shaders";
 import type { Term } from "./state";
 
 export const MAX_LIGHTS = 8;
 
-/** How an environment acts on the surface. */
-export type EnvironmentUse = "none" | "sampled" | "albedo" | "split-sum" | "dfg";
+/** How an environment acts on the surface; "mapped" is "sampled" where there is a picture to sample too. */
+export type EnvironmentUse = "none" | "sampled" | "mapped" | "albedo" | "split-sum" | "dfg";
 
 export interface ShadingKey {
   geometry: "sphere" | "mesh";
@@ -275,7 +276,9 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
   }`);
     }
     if (key.environment !== "none") parts.push(ENVIRONMENT);
-    if (key.environment === "sampled") {
+    if (key.environment === "sampled" || key.environment === "mapped") {
+      const mapped = key.environment === "mapped";
+      if (mapped) parts.push(IMPORTANCE_GLSL);
       const whole = key.term === "full" || key.term === "compensated" || key.term === "rows";
       body.push("  vec3 u = fract(random_point + page_shift(uvec2(gl_FragCoord.xy), 3u));");
       body.push(`  Sample s = ${call("sample", "wo, u")};`);
@@ -283,7 +286,17 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
       const weight = whole ? "s.weight" : `s.pdf > 0.0 && !s.delta ? (${scattered(shader, key.term)}) / s.pdf : vec3(0.0)`;
       body.push(`  vec3 weight = ${weight};`);
       // A sample that goes nowhere has weight 0 and may have any direction.
-      body.push("  if (any(notEqual(weight, vec3(0.0)))) radiance += weight * environment_radiance(normalize(frame * wi));");
+      body.push("  if (any(notEqual(weight, vec3(0.0)))) {");
+      body.push("    vec3 d = normalize(frame * wi);");
+      // Both ways to find a direction are weighed by their densities (balance heuristic, Veach1997): the sun by its own, gloss by its own.
+      if (mapped) body.push("    if (!s.delta) weight *= s.pdf / (s.pdf + page_bright_density(d));");
+      body.push("    radiance += weight * environment_radiance(d);", "  }");
+      if (mapped)
+        body.push(`  float density;
+  vec3 bright = page_bright_direction(fract(area_point + page_shift(uvec2(gl_FragCoord.xy), 5u).xy), density);
+  wi = bright * frame;
+  vec3 value = ${scattered(shader, key.term)};
+  if (any(greaterThan(abs(value), vec3(0.0)))) radiance += value * environment_radiance(bright) / (density + ${call("pdf", "wo, wi")});`);
     } else if (key.environment === "albedo") {
       parts.push(ALBEDO);
       body.push("  radiance += page_albedo(wo.z) * environment_constant * environment_scale;");

@@ -194,7 +194,7 @@ export class Renderer {
     const key: ShadingKey = {
       geometry: scene.mesh ? "mesh" : "sphere",
       lights: localLights(lights).length > 0,
-      environment: use,
+      environment: use === "sampled" && scene.environment && environmentOf(lights)?.image ? "mapped" : use,
       term: scene.state.view.term,
     };
     let row = 0;
@@ -212,7 +212,7 @@ export class Renderer {
       if (made.finished) this.restart = true;
       if (!made.complete) this.settled = false;
     }
-    const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${use} ${key.term}`;
+    const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${key.environment} ${key.term}`;
     return { program: this.shaders.program(name, vertexText(draw.shader, key.geometry), fragmentText(draw.shader, key)), row, level };
   }
 
@@ -295,6 +295,7 @@ export class Renderer {
     const light = environmentOf(actingLights(scene.state));
     const mapped = Boolean(light?.image && scene.environment);
     texture("environment_map", mapped ? (scene.environment?.texture ?? null) : null);
+    if (program.uniform("environment_sums")) texture("environment_sums", scene.environment?.sums ?? null);
     gl.uniform1f(program.uniform("has_map"), mapped ? 1 : 0);
     gl.uniform3fv(program.uniform("environment_constant"), light?.constant ?? [0, 0, 0]);
     gl.uniform1f(program.uniform("environment_scale"), light?.scale ?? 0);
