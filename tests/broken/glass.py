@@ -20,8 +20,11 @@ class WrongScaling(Dielectric):
 
     caught_by: ClassVar[str] = "reciprocity"
 
-    def _carried(self, reflects: Any, eta: Any, mode: str) -> Any:
-        return self._squeeze(reflects, eta) if mode == "radiance" else 1.0
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return super().eval(wo, wi, "importance" if mode == "radiance" else "radiance")
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        return super().sample(wo, u, "importance" if mode == "radiance" else "radiance")
 
 
 class FresnelInsideOut(Dielectric):

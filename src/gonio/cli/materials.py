@@ -104,9 +104,10 @@ def verify(
                 terminal.show_pair(subject, *parse(at), Console())
         return
     if report is not None:
+        from .. import files
         from ..verify import page
 
-        page.check_writable(report)
+        files.check_folder(report)
     effort = "quick" if quick else "deep" if deep else "default"
     with Bar(target) as bar:
         found = run.verify(subjects, effort=effort, seed=seed, laws=law, progress=bar.step)
@@ -155,9 +156,9 @@ def emit(
     made = make_bundle(plots.make(model, param or [], preset)[0], lang, functions)
     written = [str(path) for path in made.write(bundle)] if bundle is not None else []
     if output is not None:
-        from ..render import images
+        from .. import files
 
-        images.write_whole(output, made.text.encode())
+        files.write_whole(output, made.text.encode())
         written.append(str(output))
     if as_json:
         print(json.dumps({"text": made.text, "manifest": made.manifest, "written": written}))

@@ -37,9 +37,9 @@ def schema(
     if output is None:
         sys.stdout.write(text)
         return
-    from ..render import images
+    from .. import files
 
-    images.write_whole(output, text.encode())
+    files.write_whole(output, text.encode())
     print(output)
 
 

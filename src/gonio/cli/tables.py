@@ -129,10 +129,10 @@ def compensation(
     from ..energy import comparison
 
     if output is not None:
-        from ..render import tables
+        from .. import files
         from ..viewer import energy_figures
 
-        output = tables.check_folder(output)
+        output = files.check_folder(output)
     found = comparison.compare(walks=walks)
     if output is not None:
         energy_figures.plot_comparison(found, output)

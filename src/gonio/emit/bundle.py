@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, MachineError, did_you_mean
+from .. import files
+from ..errors import InputError, did_you_mean
 from ..models import BSDF
 from . import program as programs
 from .dialect import Dialect, axes, literal, pixels, reader, width
@@ -53,20 +54,13 @@ class Bundle:
 
     def write(self, folder: Path | str) -> list[Path]:
         """Write shader, manifest.json and one raw little-endian float32 file a table; the paths written."""
-        folder = Path(folder)
-        written = []
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            name = self.manifest["model"] + self.dialect.suffix
-            contents = {name: self.text.encode(), "manifest.json": json.dumps(self.manifest, indent=2).encode()}
-            for texture in self.manifest["textures"]:
-                contents[texture["file"]] = self.tables[texture["uniform"]].astype("<f4").tobytes()
-            for file, content in contents.items():
-                (folder / file).write_bytes(content)
-                written.append(folder / file)
-        except OSError as error:
-            raise MachineError(f"cannot write: {error.strerror}", str(folder)) from error
-        return written
+        folder = files.check_folder(folder)
+        name = self.manifest["model"] + self.dialect.suffix
+        contents = {name: self.text.encode(), "manifest.json": json.dumps(self.manifest, indent=2).encode()}
+        for texture in self.manifest["textures"]:
+            contents[texture["file"]] = self.tables[texture["uniform"]].astype("<f4").tobytes()
+        files.write_all(folder, contents)
+        return [folder / file for file in contents]
 
 
 def emit(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:

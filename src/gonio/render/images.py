@@ -7,20 +7,19 @@ of the Radiance header, or an array named `metadata` in an .npz.
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, MachineError, did_you_mean
+from .. import files
+from ..errors import InputError, did_you_mean
 from . import engine
 
 Value = str | int | float
@@ -54,53 +53,7 @@ def check_writable(path: str | Path) -> Path:
     if target.suffix.lower() not in SUFFIXES:
         hint = did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
         raise InputError(f"unknown picture format '{target.suffix}'", str(path), hint)
-    return check_folder(target)
-
-
-def check_folder(path: str | Path) -> Path:
-    """As `check_writable`, whatever the format."""
-    target = Path(path).expanduser()
-    if target.is_symlink():
-        target = target.resolve()
-    folder = target.parent
-    if not folder.is_dir():
-        hint = f"mkdir -p '{folder}', or choose another"
-        raise InputError(f"the folder '{folder}' does not exist", str(path), hint)
-    if target.is_dir():
-        raise InputError("this is a folder, expected a file name", str(path), "name a file, such as a.exr")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"no permission to write in '{folder}'", str(path), "choose another folder with -o")
-    return target
-
-
-def write_whole(path: str | Path, content: bytes | Callable[[Path], None]) -> Path:
-    """Write a file so that at every moment `path` is the old one or the whole new one.
-
-    content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
-    Raises MachineError where the disk is full; nothing of the new file is left then.
-    """
-    target = check_folder(path)
-    # In the same folder, hence on the same file system, where a rename is one step.
-    temporary = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
-    try:
-        if callable(content):
-            content(temporary)
-            with open(temporary, "rb") as file:
-                os.fsync(file.fileno())
-        else:
-            with open(temporary, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())  # a full disk can show itself as late as here
-        os.replace(temporary, target)
-    except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
-        hint = "free some space, or choose another folder with -o; nothing was written"
-        raise MachineError(what, str(path), hint) from error
-    finally:
-        temporary.unlink(missing_ok=True)
-    return target
+    return files.check_file(target)
 
 
 def write(path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
@@ -122,7 +75,7 @@ def write(path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None
         content = _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
     else:
         content = _bitmap_bytes(picture, settings, "OpenEXR")
-    return write_whole(path, content)
+    return files.write_whole(path, content)
 
 
 def to_screen(pixels: np.ndarray, exposure: float = 0.0) -> np.ndarray:

@@ -9,18 +9,16 @@ With layout "homework": E.png and E_avg.png exactly as the homework has them (`g
 
 from __future__ import annotations
 
-import errno
 import json
-import os
-import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import files
 from ..energy import bake as baking
 from ..energy.baked import Baked, homework_pictures, load
-from ..errors import InputError, MachineError
+from ..errors import InputError
 from ..models import BSDF
 from . import images
 
@@ -41,7 +39,7 @@ def bake(
     layout  "linear", "stretched" or "homework" (linear axes, and the homework's pictures by `store` and `flip`)
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
-    folder = check_folder(folder)
+    folder = files.check_folder(folder)
     homework = layout == "homework"
     if homework:
         options["lut"] = options.get("lut") or ("E", "Eavg")
@@ -50,27 +48,15 @@ def bake(
             raise InputError(what, "--layout", "give a distribution such as ggx, with one width")
     baked = baking.cached(target, size=size, layout="linear" if homework else layout, **options)
     if homework:
-        files = {f"{name}.png": images.png_bytes(p) for name, p in homework_pictures(baked, store, flip).items()}
+        contents = {f"{name}.png": images.png_bytes(p) for name, p in homework_pictures(baked, store, flip).items()}
         baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
     else:
-        files = _pictures(baked)
-    baked.manifest["files"] = ["tables.npz", "manifest.json", *files]
-    files["tables.npz"] = baked.npz()
-    files["manifest.json"] = (json.dumps(baked.manifest, indent=2) + "\n").encode()
-    write_all(folder, files)
+        contents = _pictures(baked)
+    baked.manifest["files"] = ["tables.npz", "manifest.json", *contents]
+    contents["tables.npz"] = baked.npz()
+    contents["manifest.json"] = (json.dumps(baked.manifest, indent=2) + "\n").encode()
+    files.write_all(folder, contents)
     return baked
-
-
-def check_folder(folder: str | Path) -> Path:
-    """The folder, if it exists or can be made where it is named; InputError before anything is computed where not."""
-    folder = Path(folder).expanduser()
-    if not folder.is_dir():
-        if folder.exists():
-            raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
-        return images.check_folder(folder)
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"no permission to write in '{folder}'", str(folder), "choose another folder with -o")
-    return folder
 
 
 def _pictures(baked: Baked) -> dict[str, bytes]:
@@ -90,30 +76,6 @@ def _pictures(baked: Baked) -> dict[str, bytes]:
         files[f"{name}.exr"] = images._bitmap_bytes(pixels, {}, "OpenEXR")
         files[f"{name}.png"] = images.png_bytes(np.round(np.clip(pixels, 0.0, 1.0) * 255.0).astype(np.uint8))
     return files
-
-
-def write_all(folder: Path, files: dict[str, bytes]) -> None:
-    """Write to a folder beside, then move: a new folder appears whole, an old one keeps its other files."""
-    part = folder.absolute().with_name(f".{folder.name}.{os.getpid()}.part")
-    try:
-        part.mkdir()
-        for name, content in files.items():
-            with open(part / name, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-        if not folder.exists():
-            os.replace(part, folder)
-        else:
-            for name in files:
-                os.replace(part / name, folder / name)
-    except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-        what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
-        kind = MachineError if full else InputError
-        raise kind(what, str(folder), "nothing was written; choose another folder with -o") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def describe(path: str | Path) -> dict[str, Any]:

@@ -8,11 +8,9 @@ from __future__ import annotations
 import base64
 import html
 import json
-import os
 from pathlib import Path
-from typing import Any
 
-from ..errors import InputError
+from .. import files
 from . import figures
 from .report import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, Report, Verdict
 
@@ -52,33 +50,11 @@ figcaption { font-size: 13.5px; color: var(--soft); margin-top: 4px }
 """
 
 
-def check_writable(folder: Path) -> None:
-    """Raise InputError where the folder cannot be made or written to."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".gonio-{os.getpid()}"
-        probe.write_bytes(b"")
-        probe.unlink()
-    except OSError as error:
-        raise InputError(f"{error.strerror or error}", str(folder), "give a folder that can be written to") from None
-
-
 def write(report: Report, folder: Path) -> Path:
-    """Write report.json and report.html into a folder, each whole or not at all; returns the page's path."""
-    check_writable(folder)
-    _whole(folder / "report.json", json.dumps(report.as_dict(), indent=2) + "\n")
-    _whole(folder / "report.html", page(report))
+    """Write report.json and report.html into a folder, all or none; returns the page's path."""
+    contents = {"report.json": json.dumps(report.as_dict(), indent=2) + "\n", "report.html": page(report)}
+    files.write_all(files.check_folder(folder), {name: text.encode() for name, text in contents.items()})
     return folder / "report.html"
-
-
-def _whole(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{error.strerror or error}", str(path)) from None
 
 
 def page(report: Report) -> str:
@@ -168,4 +144,4 @@ def _detail(v: Verdict, anchor: str) -> str:
     return f"<section id='{anchor}'>{head}<dl>{text}</dl>{drawn}</section>"
 
 
-__all__: list[Any] = ["check_writable", "page", "write"]
+__all__ = ["page", "write"]

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import files
 from ..energy import comparison
 from ..energy.baked import Baked, load
-from ..render import tables
 from . import figures
 
 SLICES = 4  # of a table with three axes, at most
@@ -123,7 +123,7 @@ def plot_comparison(found: dict[str, Any], folder: Path) -> None:
         _compare(found, figure.subplots(2, len(comparison.MATERIALS)))
         picture = io.BytesIO()
         figure.savefig(picture, dpi=120, format="png", facecolor="white")
-    tables.write_all(folder, {"compensation.png": picture.getvalue(), "compensation.json": json.dumps(found).encode()})
+    files.write_all(folder, {"compensation.png": picture.getvalue(), "compensation.json": json.dumps(found).encode()})
 
 
 def _compare(found: dict[str, Any], axes: Any) -> None:

@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import files
 from ..errors import InputError, did_you_mean
-from ..render import images
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,7 @@ def check_output(path: Path) -> Path:
     if path.suffix.lower() not in SUFFIXES:
         hint = did_you_mean(path.suffix.lower(), SUFFIXES) if path.suffix else "add " + " or ".join(SUFFIXES)
         raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
-    images.check_folder(path)
+    files.check_file(path)
     return path
 
 
@@ -50,7 +50,7 @@ def save(figure: Figure, path: Path, dpi: float, about: str) -> Path:
     def fill(temporary: Path) -> None:
         figure.savefig(temporary, dpi=dpi, metadata=metadata, facecolor="white")
 
-    return images.write_whole(path, fill)
+    return files.write_whole(path, fill)
 
 
 def parse_value(text: str) -> Any:

@@ -174,12 +174,12 @@ def _static(name: str) -> str:
 
 def export(what: Stage, path: Path) -> Path:
     """Write the page as one file that needs no server and no network; whole or not at all."""
-    from ..render import images
+    from .. import files
 
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"unknown page format '{path.suffix}'", "--export", "give a name that ends in .html")
-    target = images.check_folder(path)
-    images.write_whole(target, html(page_data(what)).encode())
+    target = files.check_file(path)
+    files.write_whole(target, html(page_data(what)).encode())
     return target
 
 
