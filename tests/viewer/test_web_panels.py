@@ -384,8 +384,8 @@ def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int,
     shown = ink(fresh.tab.screenshot(clip=stage_))
     h, w = shown.shape[:2]
     halves = (shown[: h // 2], shown[h - h // 2 :]) if h > w else (shown[:, : w // 2], shown[:, w - w // 2 :])
-    # the words on the pictures differ, a few per cent of the pixels
-    assert np.mean(np.abs(halves[0] - halves[1]).max(axis=2) > 24) < 0.08
+    # the words on the pictures differ: on a phone 8 per cent of the pixels, where other places would differ in 30
+    assert np.mean(np.abs(halves[0] - halves[1]).max(axis=2) > 24) < 0.12
     assert halves[0].std() > 10
 
 
