@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from .. import ops
-from ..ops import fma, function, rsqrt, safe_sqrt, sqr, sqrt
+from ..ops import fma, function, rsqrt, safe_sqrt, sqr
 
 KINDS = {
     "exact": "the Fresnel equations (Born1999)",
@@ -58,8 +58,8 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     sin2 = 1.0 - cos2
     t = sqr(eta) - sqr(k) - sin2
     eta_k = eta * k
-    a2_b2 = sqrt(fma(t, t, 4.0 * sqr(eta_k)))
-    larger = ops.maximum(0.5 * (a2_b2 + ops.abs(t)), 1e-30)
+    a2_b2 = safe_sqrt(fma(t, t, 4.0 * sqr(eta_k)))
+    larger = ops.maximum(0.5 * (a2_b2 + ops.abs(t)), 1e-24)  # the gradient of rsqrt, its cube, must stay in float32
     a = rsqrt(larger) * ops.where(t > 0.0, larger, eta_k)
     sum2 = fma(2.0 * cos_i, a, a2_b2 + cos2)
     contrast = fma(eta - 1.0, eta - 1.0, sqr(k)) * fma(eta + 1.0, eta + 1.0, sqr(k))
@@ -69,7 +69,9 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     return fma(contrast, p1, VANISHING) / fma(sqr(sum2), p1 + p2, VANISHING)
 
 
-VANISHING = 1e-36  # makes 0/0 a 1, and is lost beside any other value
+# Makes 0/0 a 1. Index 1e-4 has 1e-8 below, so it is lost beside any other value; its inverse squared, in the gradient,
+# stays in float32 times the peak of D.
+VANISHING = 1e-15
 
 
 @function
