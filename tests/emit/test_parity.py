@@ -22,6 +22,7 @@ RUN = {"glsl": parity.run_glsl, "wgsl": parity.run_wgsl}
 # M of a compensated material crosses 0 near grazing, within the error of its fit, and float32 loses digits of the
 # difference: of 65,536 draws so many may pass the bar, and by so much
 NEAR_ZERO = {name: (5e-4, 20.0) for name in EVERY if any(word in name for word in (*COMPENSATED, "compensated"))}
+NEAR_ZERO["kulla-conty-sheet"] = (5e-3, 20.0)  # Beckmann's rational masking has a kink, whose fit errs most
 # a sampled direction is found by Newton's method in float32 (Beckmann), or on a grazing pair sees its facet from behind
 SAMPLED = 3e-4
 

@@ -14,7 +14,7 @@ from gonio.emit import bundle
 from gonio.emit.dialect import literal, pixels
 from gonio.energy import curves
 from gonio.ops import Table, lookup
-from variants import COMPENSATED, FEW, GOLD
+from variants import COMPENSATED, EVERY, FEW, GOLD
 
 LANGS = ("glsl", "wgsl", "hlsl")
 
@@ -137,3 +137,13 @@ def test_command_line_prints_writes_and_refuses(tmp_path: Path, capsys: pytest.C
     assert run("lambert", "--lang", "cg") == 2
     assert run("random-walk", "-p", "base=conductor", "-o", str(tmp_path / "no.glsl")) == 2
     assert not (tmp_path / "no.glsl").exists()
+
+
+@pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])
+@pytest.mark.parametrize("name", ["oren-nayar", "kulla-conty", "mix-of-mixes"])
+def test_the_manifest_names_functions_of_its_own_struct(name: str, lang: str) -> None:
+    made = bundle(EVERY[name], lang)
+    struct = made.manifest["struct"]
+    for function in made.manifest["functions"].values():
+        first = rf"\w+: {struct}\b" if lang == "wgsl" else rf"{struct} \w+"
+        assert re.search(rf"\b{function} ?\({first}", made.text), f"{function} of {struct}"

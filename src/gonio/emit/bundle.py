@@ -87,16 +87,17 @@ def bundle(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", 
         functions = tuple(f for f in functions if f != "terms")
     dialect = DIALECTS[lang]
     made = Program(model, functions)
-    text = _text(made, dialect)
+    writer = Writer(made, dialect)
+    text = _text(made, writer)
     tables = {f"table_{t.name}": pixels(t) for t in made.tables}
-    return Bundle(text, _manifest(made, dialect), tables, dialect)
+    return Bundle(text, _manifest(made, writer), tables, dialect)
 
 
 # ---------------------------------------------------------------------- text
 
 
-def _text(made: Program, dialect: Dialect) -> str:
-    writer = Writer(made, dialect)
+def _text(made: Program, writer: Writer) -> str:
+    dialect = writer.dialect
     bodies = [writer.routine(routine) for routine in made.routines]
     parts: list[list[str]] = [_head(made)]
     constants = []
@@ -167,7 +168,8 @@ def _struct(record: Record, writer: Writer) -> list[str]:
 # ---------------------------------------------------------------------- manifest
 
 
-def _manifest(made: Program, dialect: Dialect) -> dict[str, Any]:
+def _manifest(made: Program, writer: Writer) -> dict[str, Any]:
+    dialect = writer.dialect
     model = made.model
     cls = type(model)
     struct = made.struct_of(made.bound)
@@ -192,7 +194,7 @@ def _manifest(made: Program, dialect: Dialect) -> dict[str, Any]:
             "struct": derived.record.name,
             "fields": [{"name": name, "type": type_} for name, type_ in derived.record.fields],
         },
-        "functions": {method: routine.name for method, routine in made.entries.items()},
+        "functions": {method: writer.names[routine] for method, routine in made.entries.items()},
         "terms": [
             {"name": name, "type": type_, "doc": _term_doc(name)}
             for name, type_ in (terms.record.fields if terms and terms.record else [])

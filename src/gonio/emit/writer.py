@@ -37,7 +37,8 @@ class Writer:
 
     def _routine_name(self, routine: Routine, taken: set[str]) -> str:
         name = self.dialect.word(stem_of(routine))
-        if name in taken and routine.type == "vec3" and not self.dialect.overloads:
+        of_floats = any(n == name and r.type == "float" for r, n in self.names.items())
+        if of_floats and routine.type == "vec3" and not self.dialect.overloads:
             name = f"{name}_rgb"
         if stem_of(routine) in NATIVE:
             return stem_of(routine)
