@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from .. import ops
-from ..ops import fma, function, rsqrt, safe_sqrt, sqr
+from ..ops import fma, function, rsqrt, safe_sqrt, sqr, sqrt
 
 KINDS = {
     "exact": "the Fresnel equations (Born1999)",
@@ -58,7 +58,7 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     sin2 = 1.0 - cos2
     t = sqr(eta) - sqr(k) - sin2
     eta_k = eta * k
-    a2_b2 = safe_sqrt(fma(t, t, 4.0 * sqr(eta_k)))
+    a2_b2 = sqrt(ops.maximum(fma(t, t, 4.0 * sqr(eta_k)), 1e-30))
     larger = ops.maximum(0.5 * (a2_b2 + ops.abs(t)), 1e-24)  # the gradient of rsqrt, its cube, must stay in float32
     a = rsqrt(larger) * ops.where(t > 0.0, larger, eta_k)
     sum2 = fma(2.0 * cos_i, a, a2_b2 + cos2)
