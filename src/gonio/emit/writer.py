@@ -273,8 +273,9 @@ class _RoutineWriter:
                     return other.name.rpartition(".")[0].rpartition(".")[2]
             return {"sample": "sampled"}.get(stem_of(value.static).rpartition("_")[2], "found")
         if value.name:
-            root, _, last = value.name.rpartition(".")
-            return last if not last.isdigit() else f"{root.rpartition('.')[2]}_{last}"
+            parts = value.name.split(".")
+            places = [part for part in parts if part.isdigit()]
+            return "_".join([next(part for part in reversed(parts) if not part.isdigit()), *places])
         if value.op == "call" and stem_of(value.static) != "sqr":
             return stem_of(value.static).rpartition("_")[2].lower()
         if value.type == "bool":

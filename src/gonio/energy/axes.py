@@ -2,7 +2,7 @@
 
     linear     nodes at texel centres, (j + 1/2) / N of roughness, mu and, with two widths, phi over a quarter turn:
                what shaders and the homework use
-    stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1) (`gonio.energy.curves`), in which E is
+    stretched  nodes at both ends, j / (N - 1), of roughness and of s(mu) / s(1), see `stretch`, in which E is
                smooth: bilinear interpolation then errs by a hundredth of what it does on a linear axis
 
 Two widths: the larger is roughness^2, and their ratio is the table's. E is even in phi about both axes of the surface,
@@ -104,11 +104,7 @@ class Axes:
         if self.layout == "linear":
             text = {"roughness": "row j at (j + 1/2) / N", "mu": "column j at (j + 1/2) / N"}
             return {**text, "phi": "slice j at (j + 1/2) / N of 90 degrees from x"} if self.azimuths else text
-        form = {
-            "hypot": "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))",
-            "wide": "sqrt(mu / (mu + 4 alpha))",
-            "root": "sqrt(mu / (mu + 4 k)), k the masking's",
-        }[curves.form_of(self.ndf, self.masking)]
+        _, form = stretch(self.ndf, self.masking)
         text = {"roughness": "row j at j / (N - 1)", "mu": f"column j at s(mu) / s(1) = j / (N - 1), s = {form}"}
         if self.azimuths:
             text["mu"] += ", alpha = |(alpha_x cos phi, alpha_y sin phi)|"
@@ -121,9 +117,17 @@ class Axes:
         return np.asarray(index) / (count - 1) if count > 1 else np.asarray(index) * 0.0 + 1.0
 
 
+def stretch(ndf: str, masking: str) -> tuple[curves.Form, str]:
+    """How the stretched axis bends mu into s, and the same in words."""
+    if masking.startswith("schlick"):
+        return curves.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
+    if ndf == "ggx":
+        return curves.Form(0, 1, 4.0), "sqrt(mu / (mu + 4 alpha))"
+    return curves.Form(1, 2, 4.0), "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))"
+
+
 def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
     """The cosine at a place x in [0, 1] of the stretched axis of a width."""
-    form = curves.form_of(ndf, masking)
+    form, _ = stretch(ndf, masking)
     bend = curves.numpy_knee(form, masking, np.maximum(alpha, quadrature.SMALLEST_ALPHA))
-    top = curves.numpy_squeeze(form, np.ones(1), bend)
-    return np.clip(curves.unsqueeze(form, x * top, bend), 0.0, 1.0)
+    return curves.cosine(form, x, bend)

@@ -2,28 +2,30 @@
 
 A compensated material needs M at both directions for every pair. Two bilinear lookups are eight gathers, dearer than
 the whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right
-variable makes one possible. Masking changes where mu is a few alpha, so with
+variable makes one possible. Masking changes where mu is a few alpha, so with a bend b of a few alpha and
 
-    s(mu) = sqrt(mu / (mu + 4 alpha))        (GGX with Smith's masking; for others see `form_of`)
-    x(mu) = 2 s(mu) / s(1) - 1  in [-1, 1]
+    u(mu) = mu^p (1 + b^p) / (mu^p + b^p),   r = u^(1 / 2^n),   z = 1 - r        (p, n, b: see `FORMS`)
 
-M is a smooth function of x whatever the width, down to a limit at alpha -> 0. It all but vanishes at both ends, toward
-the normal like a square, and the terms of a plain polynomial would take its digits with them in float32. So it is kept
-as
+M is a smooth function of z in [0, 1] whatever the width, down to a limit at alpha -> 0. It all but vanishes toward the
+normal (z = 0), often toward grazing too, and a polynomial in powers of z would lose its digits there in float32. So it
+is kept in the basis of Bernstein, with no coefficient below 0:
 
-    M = (1 - z) (a + z (c + z Q(x))) + z^2 b,   z = (1 - x) / 2,
+    M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   r = 1 / (1 + z / r),   c_k >= 0.
 
-with z and 1 - z found without cancellation (`descent`). Rows of a table hold a, c, b and the coefficients of Q at equal
-steps of roughness and are interpolated linearly, M_avg beside them; M_avg is the integral of the polynomial itself, so
-that what the table has, energy has exactly. Anisotropic widths add two axes, see `anisotropic`.
+Every term is positive and z / r is found without cancellation (`descent`): M keeps its digits where it is all but
+nothing. Rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, M_avg beside them;
+M_avg is the integral of the polynomial itself, so that what the table has, energy has exactly. Anisotropic widths add
+two axes, see `anisotropic`.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from math import comb
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import nnls
 
 from .. import ops
 from ..ops import Table, sqr, sqrt
@@ -31,116 +33,132 @@ from . import cache, quadrature
 from .quadrature import gauss
 
 ROWS = 129  # roughness 0 to 1; linear interpolation between them errs by 3e-5
-DEGREE = 10  # errs by 1e-4 (GGX, Beckmann), 5e-4 (Beckmann's rational fit, which jumps by 5e-5)
+DEGREE = 10  # errs by 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, with its jump)
 CHANNELS = DEGREE + 2  # the last is M_avg
 LOBE_NODES = 256  # the density between them is off by 1e-4; with 64 a furnace by sampling was 4e-4 short
 NODES_OF_FIT = 64
+STEPS_OF_FIT = 12
+SMALLEST = 5e-4
 
 
-# How mu is bent into s, by form:   s(mu)                              bend
-#   "wide"   metals, Smith, GGX       sqrt(mu / (mu + bend))             8 k = 4 alpha
-#   "hypot"  metals, Smith, others    sqrt(mu / sqrt(mu^2 + bend^2))     8 k = 4 alpha
-#   "root"   Schlick; glass, thin     sqrt(mu / (mu + bend))             4 k
-#   "ratio"  glass, dense             mu / (mu + bend)                   8 k
-# with k = alpha / 2, or that of schlick-direct. Chosen, like the factors, for the smallest error of the fit.
+class Form(NamedTuple):
+    """How mu is bent: p is 2^squarings, n is roots, b = factor w / (1 + hold w).
+
+    w is alpha, or for schlick-direct 2 k.
+    """
+
+    squarings: int
+    roots: int
+    factor: float
+    hold: float = 0.0
 
 
-def form_of(ndf: str, masking: str, side: str = "") -> str:
+# Chosen for the smallest error of the fit.
+FORMS = {
+    "schlick": Form(0, 0, 2.0),
+    "ggx": Form(0, 0, 2.0, 6.0),
+    "narrow": Form(2, 2, 4.0),  # other distributions end, and a few alpha from grazing nothing is missing
+    "thin-ggx": Form(0, 1, 2.0),
+    "thin-narrow": Form(1, 2, 4.0),
+    "dense-ggx": Form(0, 0, 4.0),
+    "dense-narrow": Form(1, 1, 2.0),
+}
+
+
+def form_of(ndf: str, masking: str, side: str = "") -> Form:
     """The form of a table: of a metal, or of a side of glass."""
-    if side:
-        return "root" if side == "thin" else "ratio"
     if masking.startswith("schlick"):
-        return "root"
-    return "wide" if ndf == "ggx" else "hypot"
+        return FORMS["schlick"]
+    kind = "ggx" if ndf == "ggx" else "narrow"
+    return FORMS[f"{side}-{kind}" if side else kind]
 
 
-def knee(form: str, masking: str, alpha: Any) -> Any:
+def knee(form: Form, masking: str, alpha: Any) -> Any:
     """The bend: the cosine about which masking sets in."""
-    factor = 4.0 if form == "root" else 8.0
-    if masking == "schlick-direct":
-        return sqr(sqrt(alpha) + 1.0) * (factor / 8.0)
-    return alpha * (factor / 2.0)
+    return _bend(form, 0.25 * sqr(sqrt(alpha) + 1.0) if masking == "schlick-direct" else alpha)
 
 
-def descent(form: str, mu: Any, bend: Any) -> tuple[Any, Any]:
-    """(z, 1 - z), z = 1 - s(mu) / s(1): 0 at the normal, 1 at grazing; neither as a difference of near values."""
-    if form == "hypot":
-        bend2 = sqr(bend)
-        far, near = sqrt(sqr(mu) + bend2), mu * sqrt(1.0 + bend2)
-        middle = sqrt(far * near)
-        product = (far + near) * (far + middle)
-        over = 1.0 / (product * far)
-        return bend2 * ((1.0 - mu) * (1.0 + mu)) * far * over, middle * product * over
-    below, above = mu + bend, mu * (1.0 + bend)
-    if form == "ratio":
-        over = 1.0 / below
-        return bend * (1.0 - mu) * over, above * over
-    root = sqrt(below * above)
-    over = 1.0 / (below + root)
-    return bend * (1.0 - mu) * over, (above + root) * over
+def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
+    return _bend(form, 0.25 * (np.sqrt(alpha) + 1.0) ** 2 if masking == "schlick-direct" else alpha)
 
 
-def numpy_knee(form: str, masking: str, alpha: np.ndarray) -> np.ndarray:
-    k = (np.sqrt(alpha) + 1.0) ** 2 / 8.0 if masking == "schlick-direct" else alpha / 2.0
-    return k * (4.0 if form == "root" else 8.0)
+def _bend(form: Form, width: Any) -> Any:
+    return form.factor * width / (1.0 + form.hold * width) if form.hold else form.factor * width
 
 
-def numpy_squeeze(form: str, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    ratio = mu / (np.hypot(mu, bend) if form == "hypot" else mu + bend)
-    return ratio if form == "ratio" else np.sqrt(ratio)
+@ops.function
+def descent(form: Form, mu: Any, bend: Any) -> Any:
+    """z / r: 0 at the normal; nothing here is a difference of near values."""
+    mu = ops.maximum(mu, bend * _smallest(form))
+    fall = 1.0 - mu
+    for _ in range(form.squarings):
+        fall = fall * (1.0 + mu)
+        mu, bend = sqr(mu), sqr(bend)
+    ratio = bend * fall / (mu * (1.0 + bend))  # (1 - u) / u
+    for _ in range(form.roots):
+        ratio = ratio / (1.0 + sqrt(1.0 + ratio))  # the same of the root of u
+    return ratio
 
 
-def unsqueeze(form: str, s: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    ratio = s if form == "ratio" else s**2
-    return bend * ratio / (np.sqrt(1.0 - ratio**2) if form == "hypot" else 1.0 - ratio)
+def _smallest(form: Form) -> float:
+    """mu / b where r is about SMALLEST: beyond, M is held, as r^10 and (z / r)^10 would leave what float32 holds."""
+    return SMALLEST ** (2.0 ** (form.roots - form.squarings))
 
 
-def fit(form: str, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -> np.ndarray:
-    """a, c, b and the coefficients of Q, lowest power first, at each bend: nearly minimax, by reweighted least squares.
+def numpy_rise(form: Form, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    """r, as `descent` has it."""
+    mu, power = np.maximum(mu, bend * _smallest(form)), 2**form.squarings
+    return (mu**power * (1.0 + bend**power) / (mu**power + bend**power)) ** 0.5**form.roots
+
+
+def cosine(form: Form, rise: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    """mu at r: the inverse of `numpy_rise`."""
+    power = 2**form.squarings
+    bent, u = np.maximum(bend**power, 1e-300), rise**2**form.roots
+    return np.clip(bent * u / ((1.0 - u) + bent), 0.0, 1.0) ** (1.0 / power)
+
+
+def bernstein(x: np.ndarray, degree: int) -> np.ndarray:
+    """x^k (1 - x)^(degree - k), without binomials, k = 0 to degree along the last axis."""
+    k = np.arange(degree + 1)
+    return x[..., None] ** k * (1.0 - x[..., None]) ** (degree - k)
+
+
+def fit(form: Form, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -> np.ndarray:
+    """c_k >= 0 at each bend: nearly minimax, by non-negative least squares, reweighted.
 
     missing  a function of mu (rows, nodes) to M
-    Returns (rows, CHANNELS); the last channel is M_avg, of the polynomial where that is not negative.
+    Returns (rows, CHANNELS); the last channel is M_avg.
     """
-    x = -np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
-    top = numpy_squeeze(form, np.ones(1), bend[:, None])
-    mu = unsqueeze(form, 0.5 * (x + 1.0) * top, bend[:, None])
-    value = missing(np.clip(mu, 0.0, 1.0))
-    basis = np.polynomial.chebyshev.chebvander(x, DEGREE)
-    rows = []
-    for target, at in zip(value, mu, strict=True):
-        # below mu = .02 albedo hardly matters, and that of glass has a cusp
-        start = np.minimum(at / 0.02, 1.0) + 0.02
-        weight = np.ones_like(x) * start
-        for _ in range(12):
-            found, *_rest = np.linalg.lstsq(basis * weight[:, None], target * weight, rcond=None)
-            error = np.abs(basis @ found - target)
-            error = error * start
-            weight *= np.sqrt(error / max(error.max(), 1e-300) + 0.02)
-        powers = np.zeros(DEGREE + 1)
-        plain = np.polynomial.chebyshev.cheb2poly(found)
-        powers[: len(plain)] = plain
-        # M = (1 - z) a + z b + z (1 - z) P, with z (1 - z) = (1 - x^2) / 4; the rest of the division is what is linear
-        p, rest = map(np.asarray, np.polynomial.polynomial.polydiv(powers, [0.25, 0.0, -0.25]))
-        a, b = rest[0] + rest[1], rest[0] - rest[1]
-        q, at_normal = map(np.asarray, np.polynomial.polynomial.polydiv(p, [0.5, -0.5]))  # P = P(1) + z Q
-        rows.append(np.concatenate([[a, at_normal[0] + b, b], q]))
-    coefficients = np.zeros((len(bend), DEGREE + 1))
-    for row, found in zip(coefficients, rows, strict=True):
-        row[: len(found)] = found
+    rise = 0.5 - 0.5 * np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
+    mu = cosine(form, rise, bend[:, None])
+    value = missing(mu)
+    basis = bernstein(1.0 - rise, DEGREE)
+    # below mu = .02 albedo hardly matters, and that of glass has a cusp
+    start = np.minimum(mu / 0.02, 1.0) + 0.02
+    found = np.array([_nearly_minimax(basis, *row) for row in zip(value, start, strict=True)])
     node, w = gauss(96)
-    average = evaluate(form, coefficients, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
-    return np.concatenate([coefficients, average[:, None]], axis=1)
+    average = evaluate(form, found, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
+    return np.concatenate([found, average[:, None]], axis=1)
 
 
-def evaluate(form: str, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
+def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
+    """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
+    size = np.array([comb(basis.shape[1] - 1, k) for k in range(basis.shape[1])], float)
+    weight, best, least = importance, np.zeros(len(size)), np.inf
+    for _ in range(STEPS_OF_FIT):
+        found = nnls(basis * size * weight[:, None], target * weight)[0] * size
+        error = np.abs(basis @ found - target) * importance
+        if error.max() < least:
+            best, least = found, error.max()
+        weight = weight * np.sqrt(error / max(error.max(), 1e-300) + 0.02)
+    return best
+
+
+def evaluate(form: Form, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """M of rows of coefficients at mu (rows, nodes), as `missing` computes it."""
-    rise = numpy_squeeze(form, mu, bend[:, None]) / numpy_squeeze(form, np.ones(1), bend[:, None])
-    fall = 1.0 - rise
-    total = np.zeros(np.broadcast_shapes(rise.shape, (len(bend), 1)))
-    for place in range(DEGREE, 2, -1):
-        total = total * (rise - fall) + coefficients[:, place, None]
-    a, c, b = (coefficients[:, place, None] for place in range(3))
-    return np.maximum((a + fall * (c + fall * total)) * rise + fall**2 * b, 0.0)
+    fall = 1.0 - numpy_rise(form, mu, bend[:, None])
+    return np.einsum("rnk,rk->rn", bernstein(fall, DEGREE), coefficients)
 
 
 @lru_cache
@@ -172,9 +190,9 @@ def lobe(ndf: str, masking: str) -> Table:
 
 ASPECTS = 17  # sqrt(alpha_min / alpha_max), 0 to 1: a furnace errs by 1e-3 up to a ratio of 9, 1e-2 at 40
 ASPECT_ROWS = 33  # sqrt(alpha_max), 0 to 1
-HARMONICS = 6  # powers 0 to 5 of y
+HARMONICS = 6  # terms of a polynomial in y
 AZIMUTHS = 9  # nodes to fit them
-TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: powers of x by powers of y, M_avg, padding
+TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by terms in y, M_avg, padding
 
 
 @lru_cache
@@ -183,8 +201,8 @@ def anisotropic(ndf: str, masking: str) -> Table:
 
     About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from
     the axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 +
-    alpha_min^2 sin^2. Channel k HARMONICS + j holds the coefficient of y^j in the k-th
-    number of a row.
+    alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(5 - j), Y = (1 + y) / 2, in c_k, none
+    below 0 either.
     """
 
     def build() -> np.ndarray:
@@ -195,7 +213,6 @@ def anisotropic(ndf: str, masking: str) -> Table:
         big = np.tile(larger, ASPECTS)
         small = np.repeat(aspect**2, ASPECT_ROWS) * big
         y = np.cos(np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS)
-        to_powers = np.linalg.pinv(np.vander(y, HARMONICS, increasing=True))
         by_azimuth = []
         for value in y:
             cos2, sin2, seen = _azimuth(value, big, small)
@@ -206,7 +223,9 @@ def anisotropic(ndf: str, masking: str) -> Table:
                 return 1.0 - at.whole
 
             by_azimuth.append(fit(form, numpy_knee(form, masking, seen), missing, nodes=24)[:, :-1])
-        found = np.einsum("jy,yrk->rkj", to_powers, np.array(by_azimuth))
+        basis = bernstein(0.5 + 0.5 * y, HARMONICS - 1)
+        columns = np.array(by_azimuth).reshape(AZIMUTHS, -1).T
+        found = np.array([nnls(basis, column)[0] for column in columns]).reshape(len(big), DEGREE + 1, HARMONICS)
         # M_avg: over azimuth and cosine, of the fit itself
         turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
         node, weight = gauss(64)
@@ -215,7 +234,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
             cos2, sin2 = np.cos(phi) ** 2, np.sin(phi) ** 2
             seen = np.sqrt(big**2 * cos2 + small**2 * sin2)
             here = (big * cos2 - small * sin2) / (big * cos2 + small * sin2)
-            rows = np.einsum("rkj,rj->rk", found, here[:, None] ** np.arange(HARMONICS))
+            rows = np.einsum("rkj,rj->rk", found, bernstein(0.5 + 0.5 * here, HARMONICS - 1))
             values = evaluate(form, rows, numpy_knee(form, masking, seen), node[None, :] ** 2)
             average += values @ (4.0 * weight * node**3) / len(turns)
         table = np.zeros((len(big), TURNED))
@@ -281,7 +300,7 @@ def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     return tables
 
 
-def _inverse(form: str, rows: np.ndarray, bend: np.ndarray, count: int) -> np.ndarray:
+def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.ndarray:
     """mu^2 below which lie the shares 0 to 1 of M mu, for each row."""
     grid = np.linspace(0.0, 1.0, 2049)  # of mu^2, in which the density is M / M_avg
     density = evaluate(form, rows, bend, np.sqrt(np.maximum(grid, 1e-12))[None, :]) + 1e-9
@@ -291,20 +310,53 @@ def _inverse(form: str, rows: np.ndarray, bend: np.ndarray, count: int) -> np.nd
 
 
 def coefficients(ndf: str, masking: str, alpha: Any) -> tuple[Any, ...]:
-    """a, c, b, the coefficients of Q, lowest power first, and M_avg, at an isotropic width."""
+    """c_0 to c_10 and M_avg, at an isotropic width."""
     return ops.lookup(isotropic(ndf, masking), ops.inset(sqrt(alpha), ROWS))
 
 
-def missing(form: str, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
-    """M(mu), at least 0.
+def turn(found: tuple[Any, ...], along: Any, across: Any) -> tuple[Any, ...]:
+    """c_0 to c_10 of a direction from the channels of `anisotropic`.
+
+    along, across  (1 + y) / 2 and (1 - y) / 2
+    """
+    along_to, across_to = [1.0, along], [1.0, across]
+    for _ in range(HARMONICS - 2):
+        along_to.append(along_to[-1] * along)
+        across_to.append(across_to[-1] * across)
+    terms = tuple(along_to[j] * across_to[HARMONICS - 1 - j] for j in range(HARMONICS))
+    count = (DEGREE + 1) * HARMONICS
+    return tuple(_weigh(found[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
+
+
+@ops.function
+def _weigh(factors: tuple[Any, ...], terms: tuple[Any, ...]) -> Any:
+    """Sum of the terms, each times its factor."""
+    total = factors[0] * terms[0]
+    for factor, term in zip(factors[1:], terms[1:], strict=True):
+        total = ops.fma(factor, term, total)
+    return total
+
+
+def missing(form: Form, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
+    """M(mu), not below 0.
 
     found  from `coefficients`;  bend  `knee` at this width
     """
-    fall, rise = descent(form, mu, bend)
-    x = rise - fall
-    total = found[DEGREE]
-    for place in range(DEGREE - 1, 2, -1):
-        total = ops.fma(total, x, found[place])
-    a, c, b = found[:3]
-    total = ops.fma(ops.fma(total, fall, c), fall, a)
-    return ops.maximum(ops.fma(total, rise, b * sqr(fall)), 0.0)
+    ratio = descent(form, mu, bend)
+    return _polynomial(found[: DEGREE + 1], ratio) * _tenth(1.0 / (1.0 + ratio))
+
+
+@ops.function
+def _polynomial(found: tuple[Any, ...], x: Any) -> Any:
+    """Lowest power first."""
+    total = found[-1]
+    for c in reversed(found[:-1]):
+        total = ops.fma(total, x, c)
+    return total
+
+
+@ops.function
+def _tenth(x: Any) -> Any:
+    """x^10."""
+    x2 = sqr(x)
+    return sqr(sqr(x2)) * x2

@@ -6,7 +6,7 @@ one for any other base (`gonio.energy.measured`). All values are of the vocabula
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from .. import ops
 from ..errors import InputError
@@ -103,7 +103,7 @@ class Metal:
             at = (inset(sqrt(small / big), curves.ASPECTS), inset(sqrt(big), curves.ASPECT_ROWS))
             channels = lookup(curves.anisotropic(base.ndf, base.masking), *at)
             average = maximum(channels[-1], 0.0)
-            more = {"turned": channels[:-1], "along": where(alpha.x >= alpha.y, 1.0, -1.0), "alpha": alpha}
+            more = {"turned": channels[:-1], "alpha": alpha}
         f_avg, albedo = _reflectance_average(material)
         added = _bounces(getattr(material, "color", "bounce"), f_avg, 1.0 - average) * albedo
         return {
@@ -121,7 +121,7 @@ class Metal:
     def _isotropic(material: Any, found: dict[str, Any], w: Any) -> Any:
         """M at a direction above the surface, of the mean of the widths."""
         form = curves.form_of(material.base.ndf, material.base.masking)
-        return curves.missing(form, found["missing"], found["bend"], maximum(w.z, 1e-6))
+        return curves.missing(form, found["missing"], found["bend"], w.z)
 
     @staticmethod
     @function
@@ -129,21 +129,11 @@ class Metal:
         """M at a direction above the surface."""
         if not material.turned:
             return Metal._isotropic(material, found, w)
-        base, alpha = material.base, found["alpha"]
-        w = frame.rotate(w, base.rotation)
-        sin2 = maximum(frame.sin2(w), 1e-12)
-        along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
-        y = (alpha.x * along_x - alpha.y * along_y) / (alpha.x * along_x + alpha.y * along_y) * found["along"]
-        # at the normal itself there is no azimuth: any will do
-        y = where(frame.sin2(w) > 1e-12, y, 0.0)
-        seen = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, sqr(microfacet.SMOOTH)))
-        rows = []
-        for power in range(curves.DEGREE + 1):
-            first = power * curves.HARMONICS
-            rows.append(_polynomial(y, found["turned"][first : first + curves.HARMONICS]))
+        base = material.base
+        at = _azimuth(frame.rotate(w, base.rotation), found["alpha"])
         form = curves.form_of(base.ndf, base.masking)
-        bend = curves.knee(form, base.masking, seen)
-        return curves.missing(form, tuple(rows), bend, maximum(w.z, 1e-6))
+        rows = curves.turn(found["turned"], at.along, at.across)
+        return curves.missing(form, rows, curves.knee(form, base.masking, at.seen), w.z)
 
     @staticmethod
     @function
@@ -182,13 +172,24 @@ class Metal:
         return 1.0 + 0.0 * wo.z
 
 
+class Azimuth(NamedTuple):
+    """Where a direction stands between the axes of the larger and the smaller width, and the width it sees."""
+
+    along: Any
+    across: Any
+    seen: Any
+
+
 @function
-def _polynomial(y: Any, coefficients: tuple[Any, ...]) -> Any:
-    """A polynomial in y, lowest power first."""
-    value = coefficients[-1]
-    for c in reversed(coefficients[:-1]):
-        value = ops.fma(value, y, c)
-    return value
+def _azimuth(w: Any, alpha: Any) -> Azimuth:
+    """(1 + y) / 2, (1 - y) / 2 and alpha_phi of `curves.anisotropic`; at the normal itself any azimuth will do."""
+    sin2 = maximum(frame.sin2(w), 1e-12)
+    along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
+    seen = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, sqr(microfacet.SMOOTH)))
+    turned = frame.sin2(w) > 1e-12
+    x, y = where(turned, alpha.x * along_x, 1.0), where(turned, alpha.y * along_y, 1.0)
+    larger_x = alpha.x >= alpha.y
+    return Azimuth(where(larger_x, x, y) / (x + y), where(larger_x, y, x) / (x + y), seen)
 
 
 def _scale(average: Any) -> Any:
@@ -279,7 +280,7 @@ class Glass:
     @function
     def missing(material: Any, found: dict[str, Any], w: Any, thin: Any) -> Any:
         """M at a direction, from its own side."""
-        mu = maximum(abs(w.z), 1e-6)
+        mu = abs(w.z)
         sides = []
         for side in curves.SIDES:
             form = curves.form_of(material.base.ndf, material.base.masking, side)
