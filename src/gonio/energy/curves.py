@@ -21,7 +21,6 @@ two axes, see `anisotropic`.
 from __future__ import annotations
 
 from functools import lru_cache
-from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,15 +33,14 @@ from .quadrature import gauss
 
 ROWS = 129  # roughness 0 to 1; linear interpolation between them errs by 3e-5
 DEGREE = 10  # errs by 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, with its jump)
-CHANNELS = DEGREE + 2  # the last is M_avg
 LOBE_NODES = 256  # the density between them is off by 1e-4; with 64 a furnace by sampling was 4e-4 short
 NODES_OF_FIT = 64
-STEPS_OF_FIT = 12
-SMALLEST = 5e-4
+STEPS_OF_FIT = 8
+LEAST_POWER = 1e-33  # of r, and its inverse of z / r: float32 ends at 1e-38 and 3e38
 
 
 class Form(NamedTuple):
-    """How mu is bent: p is 2^squarings, n is roots, b = factor w / (1 + hold w).
+    """How mu is bent: p is 2^squarings, n is roots, b = factor w / (1 + hold w); and the degree of the polynomial.
 
     w is alpha, or for schlick-direct 2 k.
     """
@@ -51,6 +49,12 @@ class Form(NamedTuple):
     roots: int
     factor: float
     hold: float = 0.0
+    degree: int = DEGREE
+
+    @property
+    def least(self) -> float:
+        """mu / b below which M is held, as powers of r and z / r would leave what float32 holds."""
+        return LEAST_POWER ** (2.0 ** (self.roots - self.squarings) / self.degree)
 
 
 # Chosen for the smallest error of the fit.
@@ -58,17 +62,19 @@ FORMS = {
     "schlick": Form(0, 0, 2.0),
     "ggx": Form(0, 0, 2.0, 6.0),
     "narrow": Form(2, 2, 4.0),  # other distributions end, and a few alpha from grazing nothing is missing
-    "thin-ggx": Form(0, 1, 2.0),
-    "thin-narrow": Form(1, 2, 4.0),
-    "dense-ggx": Form(0, 0, 4.0),
-    "dense-narrow": Form(1, 1, 2.0),
+    # glass has more to show: a knee at the critical angle
+    "schlick-glass": Form(0, 0, 2.0, degree=14),
+    "thin-ggx": Form(0, 1, 2.0, degree=14),
+    "thin-narrow": Form(1, 2, 4.0, degree=14),
+    "dense-ggx": Form(0, 0, 4.0, degree=14),
+    "dense-narrow": Form(1, 1, 4.0, degree=14),
 }
 
 
 def form_of(ndf: str, masking: str, side: str = "") -> Form:
     """The form of a table: of a metal, or of a side of glass."""
     if masking.startswith("schlick"):
-        return FORMS["schlick"]
+        return FORMS["schlick-glass" if side else "schlick"]
     kind = "ggx" if ndf == "ggx" else "narrow"
     return FORMS[f"{side}-{kind}" if side else kind]
 
@@ -89,7 +95,7 @@ def _bend(form: Form, width: Any) -> Any:
 @ops.function
 def descent(form: Form, mu: Any, bend: Any) -> Any:
     """z / r: 0 at the normal; nothing here is a difference of near values."""
-    mu = ops.maximum(mu, bend * _smallest(form))
+    mu = ops.maximum(mu, bend * form.least)
     fall = 1.0 - mu
     for _ in range(form.squarings):
         fall = fall * (1.0 + mu)
@@ -100,14 +106,9 @@ def descent(form: Form, mu: Any, bend: Any) -> Any:
     return ratio
 
 
-def _smallest(form: Form) -> float:
-    """mu / b where r is about SMALLEST: beyond, M is held, as r^10 and (z / r)^10 would leave what float32 holds."""
-    return SMALLEST ** (2.0 ** (form.roots - form.squarings))
-
-
 def numpy_rise(form: Form, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
     """r, as `descent` has it."""
-    mu, power = np.maximum(mu, bend * _smallest(form)), 2**form.squarings
+    mu, power = np.maximum(mu, bend * form.least), 2**form.squarings
     return (mu**power * (1.0 + bend**power) / (mu**power + bend**power)) ** 0.5**form.roots
 
 
@@ -128,26 +129,33 @@ def fit(form: Form, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -
     """c_k >= 0 at each bend: nearly minimax, by non-negative least squares, reweighted.
 
     missing  a function of mu (rows, nodes) to M
-    Returns (rows, CHANNELS); the last channel is M_avg.
+    Returns (rows, degree + 2); the last channel is M_avg.
     """
-    rise = 0.5 - 0.5 * np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
+    rise = _nodes(nodes)
     mu = cosine(form, rise, bend[:, None])
-    value = missing(mu)
-    basis = bernstein(1.0 - rise, DEGREE)
-    # below mu = .02 albedo hardly matters, and that of glass has a cusp
-    start = np.minimum(mu / 0.02, 1.0) + 0.02
-    found = np.array([_nearly_minimax(basis, *row) for row in zip(value, start, strict=True)])
+    basis = bernstein(1.0 - rise, form.degree)
+    found = np.array([_nearly_minimax(basis, *row) for row in zip(missing(mu), _importance(mu), strict=True)])
     node, w = gauss(96)
     average = evaluate(form, found, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
     return np.concatenate([found, average[:, None]], axis=1)
 
 
+def _nodes(count: int) -> np.ndarray:
+    """Chebyshev nodes in [0, 1]."""
+    return 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def _importance(mu: np.ndarray) -> np.ndarray:
+    """Below mu = .02 albedo hardly matters, and that of glass has a cusp."""
+    return np.minimum(mu / 0.02, 1.0) + 0.02
+
+
 def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
     """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
-    size = np.array([comb(basis.shape[1] - 1, k) for k in range(basis.shape[1])], float)
+    size = 1.0 / basis.max(axis=0)  # terms of one size: else the small are never chosen
     weight, best, least = importance, np.zeros(len(size)), np.inf
     for _ in range(STEPS_OF_FIT):
-        found = nnls(basis * size * weight[:, None], target * weight)[0] * size
+        found = nnls(basis * size * weight[:, None], target * weight, maxiter=10000)[0] * size
         error = np.abs(basis @ found - target) * importance
         if error.max() < least:
             best, least = found, error.max()
@@ -158,7 +166,7 @@ def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarra
 def evaluate(form: Form, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """M of rows of coefficients at mu (rows, nodes), as `missing` computes it."""
     fall = 1.0 - numpy_rise(form, mu, bend[:, None])
-    return np.einsum("rnk,rk->rn", bernstein(fall, DEGREE), coefficients)
+    return np.einsum("rnk,rk->rn", bernstein(fall, form.degree), coefficients)
 
 
 @lru_cache
@@ -190,8 +198,8 @@ def lobe(ndf: str, masking: str) -> Table:
 
 ASPECTS = 17  # sqrt(alpha_min / alpha_max), 0 to 1: a furnace errs by 1e-3 up to a ratio of 9, 1e-2 at 40
 ASPECT_ROWS = 33  # sqrt(alpha_max), 0 to 1
-HARMONICS = 6  # terms of a polynomial in y
-AZIMUTHS = 9  # nodes to fit them
+HARMONICS = 7  # terms of a polynomial in y
+AZIMUTHS = 13  # nodes to fit them
 TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by terms in y, M_avg, padding
 
 
@@ -201,7 +209,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
 
     About the normal M depends on y = cos(2 phi'), tan(phi') = sqrt(alpha_min / alpha_max) tan(phi), phi counted from
     the axis of the larger width; the bend is that of the width seen along w, alpha_phi^2 = alpha_max^2 cos^2 +
-    alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(5 - j), Y = (1 + y) / 2, in c_k, none
+    alpha_min^2 sin^2. Channel k HARMONICS + j holds the factor of Y^j (1 - Y)^(6 - j), Y = (1 + y) / 2, in c_k, none
     below 0 either.
     """
 
@@ -213,19 +221,19 @@ def anisotropic(ndf: str, masking: str) -> Table:
         big = np.tile(larger, ASPECTS)
         small = np.repeat(aspect**2, ASPECT_ROWS) * big
         y = np.cos(np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS)
-        by_azimuth = []
+        rise, target, importance = _nodes(20), [], []
         for value in y:
             cos2, sin2, seen = _azimuth(value, big, small)
-            phi = np.arctan2(np.sqrt(sin2), np.sqrt(cos2))
-
-            def missing(mu: np.ndarray, phi: np.ndarray = phi) -> np.ndarray:
-                at = quadrature.moments(ndf, masking, mu, big[:, None], small[:, None], phi[:, None], nodes=(28, 28))
-                return 1.0 - at.whole
-
-            by_azimuth.append(fit(form, numpy_knee(form, masking, seen), missing, nodes=24)[:, :-1])
-        basis = bernstein(0.5 + 0.5 * y, HARMONICS - 1)
-        columns = np.array(by_azimuth).reshape(AZIMUTHS, -1).T
-        found = np.array([nnls(basis, column)[0] for column in columns]).reshape(len(big), DEGREE + 1, HARMONICS)
+            phi = np.arctan2(np.sqrt(sin2), np.sqrt(cos2))[:, None]
+            mu = cosine(form, rise, numpy_knee(form, masking, seen)[:, None])
+            at = quadrature.moments(ndf, masking, mu, big[:, None], small[:, None], phi, nodes=(28, 28))
+            target.append(1.0 - at.whole)
+            importance.append(_importance(mu))
+        in_z, in_y = bernstein(1.0 - rise, DEGREE), bernstein(0.5 + 0.5 * y, HARMONICS - 1)
+        basis = np.einsum("nk,yj->ynkj", in_z, in_y).reshape(AZIMUTHS * len(rise), -1)
+        by_cell = (np.stack(part, axis=1).reshape(len(big), -1) for part in (target, importance))
+        found = np.array([_nearly_minimax(basis, *cell) for cell in zip(*by_cell, strict=True)])
+        found = found.reshape(len(big), DEGREE + 1, HARMONICS)
         # M_avg: over azimuth and cosine, of the fit itself
         turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
         node, weight = gauss(64)
@@ -278,9 +286,9 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
                 return 1.0 - power.reflected - power.transmitted
 
             sides.append(fit(form, numpy_knee(form, masking, alphas), missing, nodes=36))
-        return np.array(sides).reshape(2, GLASS_ETAS, GLASS_ROWS, CHANNELS)
+        return np.array(sides).reshape(2, GLASS_ETAS, GLASS_ROWS, -1)
 
-    key = ("glass", ndf, masking, fresnel, GLASS_ETAS, GLASS_ROWS, DEGREE)
+    key = ("glass", ndf, masking, fresnel, GLASS_ETAS, GLASS_ROWS)
     values = cache.remember(key, build)
     stem = f"missing_glass_{ndf}_{masking}_{fresnel}".replace("-", "_")
     return {side: Table(f"{stem}_{side}", v) for side, v in zip(SIDES, values, strict=True)}
@@ -294,7 +302,7 @@ def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     for side, table in glass(ndf, masking, fresnel).items():
         form = form_of(ndf, masking, side)
         bend = numpy_knee(form, masking, np.tile(alpha, GLASS_ETAS))
-        inverse = _inverse(form, table.values.reshape(-1, CHANNELS)[:, :-1], bend, GLASS_LOBE_NODES)
+        inverse = _inverse(form, table.values.reshape(GLASS_ETAS * GLASS_ROWS, -1)[:, :-1], bend, GLASS_LOBE_NODES)
         name = table.name.replace("missing", "lobe")
         tables[side] = Table(name, inverse.reshape(GLASS_ETAS, GLASS_ROWS, GLASS_LOBE_NODES, 1))
     return tables
@@ -340,10 +348,10 @@ def _weigh(factors: tuple[Any, ...], terms: tuple[Any, ...]) -> Any:
 def missing(form: Form, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
     """M(mu), not below 0.
 
-    found  from `coefficients`;  bend  `knee` at this width
+    found  from `coefficients`, the c_k first;  bend  `knee` at this width
     """
     ratio = descent(form, mu, bend)
-    return _polynomial(found[: DEGREE + 1], ratio) * _tenth(1.0 / (1.0 + ratio))
+    return _polynomial(found[: form.degree + 1], ratio) * _power(1.0 / (1.0 + ratio), form.degree)
 
 
 @ops.function
@@ -355,8 +363,9 @@ def _polynomial(found: tuple[Any, ...], x: Any) -> Any:
     return total
 
 
-@ops.function
-def _tenth(x: Any) -> Any:
-    """x^10."""
-    x2 = sqr(x)
-    return sqr(sqr(x2)) * x2
+def _power(x: Any, exponent: int) -> Any:
+    """x^exponent, by squaring."""
+    if exponent == 1:
+        return x
+    even = sqr(_power(x, exponent // 2))
+    return even * x if exponent % 2 else even
