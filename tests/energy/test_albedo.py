@@ -51,3 +51,11 @@ def test_bad_input_is_one_clear_error():
         go.albedo(go.Conductor(alpha=np.array([0.1, 0.2])), 0.5)
     with pytest.raises(go.InputError, match="no closed form"):
         go.albedo(go.OrenNayar(), 0.5, method="closed-form")
+
+
+def test_the_rim_of_a_narrow_lobe_is_not_missed():
+    # a hundredth of this lobe lay in one large cell, between whose nodes it fell
+    narrow = go.KullaConty(go.Conductor(alpha=(0.05, 0.02), fresnel="one", ndf="beckmann"))
+    found = go.albedo(narrow, mu=[0.2, 0.25], phi=0.3)
+    assert found.method == "quadrature"
+    assert found.value == pytest.approx(1.0, abs=2e-4)

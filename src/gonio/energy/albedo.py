@@ -256,8 +256,12 @@ def _cubature(model: BSDF, wo: np.ndarray, seed: int) -> tuple[np.ndarray, np.nd
     wi = np.asarray(drawn.wi)[np.asarray(drawn.pdf) > 0]
     spots = np.stack([np.arccos(np.clip(wi[:, 2], -1, 1)), np.arctan2(wi[:, 1], wi[:, 0]) % (2 * np.pi)], -1)
     for _ in range(10):
-        inside = [np.sum(np.all((spots >= a) & (spots < a + b), axis=1)) for a, b in zip(low, size, strict=True)]
-        low, size = _split(low, size, np.asarray(inside) > 16)
+        low, size = _split(low, size, _inside(spots, low, size) > 16)
+    # the rim of a narrow lobe may fall into a large cell: where any sample fell, cells are of nearly one size
+    for _ in range(10):
+        hit = _inside(spots, low, size) > 0
+        area = np.prod(size, -1)
+        low, size = _split(low, size, hit & (area > 16.0 * np.min(area, initial=np.inf, where=hit)))
     done_value: Any = 0.0
     done_error: Any = 0.0
     for _ in range(ROUNDS):
@@ -270,6 +274,11 @@ def _cubature(model: BSDF, wo: np.ndarray, seed: int) -> tuple[np.ndarray, np.nd
         done_value, done_error = done_value + value[~open_].sum(0), done_error + error[~open_].sum(0)
         low, size = _split(low[open_], size[open_], np.ones(int(open_.sum()), bool))
     return total, done_error + error.sum(0)
+
+
+def _inside(spots: np.ndarray, low: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """How many of the spots lie in each cell."""
+    return np.array([np.sum(np.all((spots >= a) & (spots < a + b), axis=1)) for a, b in zip(low, size, strict=True)])
 
 
 def _split(low: np.ndarray, size: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
