@@ -6,9 +6,11 @@ import asyncio
 import contextlib
 import json
 import math
+import os
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -258,6 +260,7 @@ class Renderer:
             limits = {"upload": messages.UPLOAD_BYTES, "pixels": messages.MOST_PIXELS}
             ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
             session.send_from_thread(json.dumps(ready))
+            _give_way()
         if reference.scene is not scene:
             reference.pictures = pictures
             reference.show(scene)
@@ -280,6 +283,14 @@ class Renderer:
             "done": reference.done,
         }
         session.send_from_thread(messages.frame(header, reference.image()))
+
+
+def _give_way() -> None:
+    """Let the browser's own drawing come first: lower priority for this thread and Dr.Jit's workers (Linux only)."""
+    with contextlib.suppress(OSError):
+        for task in Path("/proc/self/task").iterdir():
+            if (task / "comm").read_text().startswith("nt [") or int(task.name) == threading.get_native_id():
+                os.setpriority(os.PRIO_PROCESS, int(task.name), 10)
 
 
 def _worth_showing(reference: Reference, shown: int) -> bool:
