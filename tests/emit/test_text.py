@@ -123,6 +123,26 @@ def test_unknown_languages_functions_and_things_are_refused() -> None:
         go.emit(go.Lambert(np.full((5, 3), 0.5)))
 
 
+def test_what_cannot_be_a_shader_is_refused_with_one_clear_error() -> None:
+    for refused, words in [
+        (lambda: go.emit(GOLD, functions=3), "3 given, names of functions expected"),  # type: ignore[arg-type]
+        (lambda: go.emit(GOLD, functions=()), "no function named"),
+        (lambda: go.emit(GOLD, functions=" , "), "no function named"),
+        (lambda: go.emit(GOLD, ["glsl"]), "unknown language"),  # type: ignore[arg-type]
+        (lambda: go.emit(go.Lambert(), functions=["terms"]), "Lambert has no terms"),
+        (lambda: go.emit(go.Conductor(alpha=np.array([0.1, 0.2, 0.3]))), "one value a ray given"),
+        (lambda: go.emit(go.Conductor(eta=1e39)), r"1e\+39 given, at most 3\.4e38"),
+        (lambda: go.emit(go.KullaConty(go.OrenNayar())), "no shader code for it: .* found by sampling"),
+    ]:
+        with pytest.raises(go.InputError, match=words):
+            refused()
+
+
+def test_functions_are_named_in_any_spelling_of_a_list() -> None:
+    text = go.emit(GOLD, functions=["pdf", "eval"])
+    assert go.emit(GOLD, functions=" pdf, eval,pdf") == text
+
+
 def test_command_line_prints_writes_and_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def run(*arguments: str) -> int:
         with pytest.raises(SystemExit) as done:
@@ -137,6 +157,8 @@ def test_command_line_prints_writes_and_refuses(tmp_path: Path, capsys: pytest.C
     assert run("lambert", "--lang", "cg") == 2
     assert run("random-walk", "-p", "base=conductor", "-o", str(tmp_path / "no.glsl")) == 2
     assert not (tmp_path / "no.glsl").exists()
+    assert run("lambert", "--bundle", str(tmp_path / "half"), "-o", str(tmp_path)) == 2
+    assert not (tmp_path / "half").exists()  # neither of both, where one cannot be
 
 
 @pytest.mark.parametrize("lang", ["glsl", "wgsl", "hlsl"])

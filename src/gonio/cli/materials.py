@@ -150,14 +150,17 @@ def emit(
       gonio emit dielectric --lang wgsl --functions eval -o glass.wgsl
       gonio emit kulla-conty -p base=conductor --bundle shaders
     """
+    from .. import files
     from ..emit import bundle as make_bundle
     from ..viewer import plots
 
+    if output is not None:  # before anything is computed or written
+        files.check_file(output)
+    if bundle is not None:
+        files.check_folder(bundle)
     made = make_bundle(plots.make(model, param or [], preset)[0], lang, functions)
     written = [str(path) for path in made.write(bundle)] if bundle is not None else []
     if output is not None:
-        from .. import files
-
         files.write_whole(output, made.text.encode())
         written.append(str(output))
     if as_json:

@@ -15,6 +15,7 @@ import numpy as np
 from .. import files
 from ..errors import InputError, did_you_mean
 from ..models import BSDF
+from ..ops import graph
 from . import program as programs
 from .dialect import Dialect, axes, literal, pixels, reader, width
 from .glsl import GLSL
@@ -79,18 +80,19 @@ def emit(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "p
 
 def bundle(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")) -> Bundle:
     """Shader, manifest and tables of a material; arguments as in `emit`."""
-    if lang not in DIALECTS:
+    if str(lang) not in DIALECTS:
         raise InputError(f"unknown language '{lang}'", "emit: lang", did_you_mean(str(lang), list(DIALECTS)))
-    functions = tuple(functions.split(",")) if isinstance(functions, str) else tuple(functions)
-    programs.check(model, functions, "emit")
-    if not hasattr(model, "terms"):
-        functions = tuple(f for f in functions if f != "terms")
-    dialect = DIALECTS[lang]
-    made = Program(model, functions)
+    functions = programs.check(model, functions, "emit")
+    dialect = DIALECTS[str(lang)]
+    numbers = dict(_numbers(model))  # raises where there is more than one material's worth
+    try:
+        made = Program(model, functions)
+    except graph.RecordingError as error:
+        raise InputError(f"no shader code for it: {error.what}", error.where, error.hint) from error
     writer = Writer(made, dialect)
     text = _text(made, writer)
     tables = {f"table_{t.name}": pixels(t) for t in made.tables}
-    return Bundle(text, _manifest(made, writer), tables, dialect)
+    return Bundle(text, _manifest(made, writer, numbers), tables, dialect)
 
 
 # ---------------------------------------------------------------------- text
@@ -168,13 +170,12 @@ def _struct(record: Record, writer: Writer) -> list[str]:
 # ---------------------------------------------------------------------- manifest
 
 
-def _manifest(made: Program, writer: Writer) -> dict[str, Any]:
+def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[str, Any]:
     dialect = writer.dialect
     model = made.model
     cls = type(model)
     struct = made.struct_of(made.bound)
     assert struct is not None
-    numbers = dict(_numbers(model))
     fields = [
         {"name": name, "path": path, "type": type_, "value": numbers[path]}
         for (name, type_), path in zip(struct.record.fields, struct.paths, strict=True)
@@ -268,9 +269,15 @@ def _numbers(model: Any, path: str = "") -> Any:
             yield from _numbers(value, f"{path}{name}.")
         elif parameter.numeric and value is not None:
             array = np.asarray(value, dtype=float)
-            if array.ndim > 1 or (array.ndim == 1 and parameter.kind not in ("spectrum", "alpha")):
+            where = f"emit: {type(model).__name__}.{name}"
+            widest = {"spectrum": 3, "alpha": 2}.get(parameter.kind, 1)
+            if array.ndim > 1 or array.size not in (1, widest) or (array.ndim == 1 and widest == 1):
                 what = "one value a ray given, one value expected"
-                raise InputError(what, f"emit: {type(model).__name__}.{name}", "the shader's struct holds one material")
+                raise InputError(what, where, "the shader's struct holds one material")
+            if np.any(np.abs(array) > np.finfo(np.float32).max):
+                raise InputError(
+                    f"{np.abs(array).max():g} given, at most 3.4e38 expected", where, "shaders have float32"
+                )
             if parameter.kind == "spectrum":
                 array = np.broadcast_to(array, (3,))
             elif parameter.kind == "alpha":

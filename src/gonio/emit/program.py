@@ -262,19 +262,35 @@ def _free(name: str, taken: list[str]) -> str:
     return found
 
 
-def check(model: Any, functions: tuple[str, ...], where: str) -> None:
-    """Raise InputError where there can be no shader code."""
+def check(model: Any, functions: Any, where: str) -> tuple[str, ...]:
+    """The functions asked for that the model has, each once; InputError where there can be no shader code.
+
+    functions  names in a sequence, or in one string with commas between them
+    """
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", where)
-    for function in functions:
-        if function not in FUNCTIONS:
-            raise InputError(f"unknown function '{function}'", where, did_you_mean(function, FUNCTIONS))
-    if not functions:
-        raise InputError("no function named", where, "known: " + ", ".join(FUNCTIONS))
+    if isinstance(functions, str):
+        functions = [name.strip() for name in functions.split(",") if name.strip()]
+    try:
+        asked = tuple(dict.fromkeys(str(name) for name in functions))
+    except TypeError:
+        raise InputError(f"{functions!r} given, names of functions expected", where, _KNOWN) from None
+    for name in asked:
+        if name not in FUNCTIONS:
+            raise InputError(f"unknown function '{name}'", where, did_you_mean(name, FUNCTIONS))
+    if not asked:
+        raise InputError("no function named", where, _KNOWN)
     random = stochastic(model)
     if random is not None:
         what = f"{type(random).__name__} is estimated by random walks and cannot be written as shader code"
         raise InputError(what, where, "KullaConty is its closed form")
+    found = tuple(name for name in asked if name != "terms" or hasattr(model, "terms"))
+    if not found:
+        raise InputError(f"{type(model).__name__} has no terms D, G, F", where, "name eval, pdf or sample")
+    return found
+
+
+_KNOWN = "known: " + ", ".join(FUNCTIONS)
 
 
 def stochastic(model: Any) -> Any:
