@@ -6,19 +6,14 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ..errors import InputError
 from .app import MATERIALS, app
-from .options import (
-    Json,
-)
+from .options import Json
 from .output import Bar, listing, print_rich
-
-if TYPE_CHECKING:
-    pass
 
 
 @app.command(rich_help_panel=MATERIALS)
@@ -152,13 +147,13 @@ def emit(
     """
     from .. import files
     from ..emit import bundle as make_bundle
-    from ..viewer import plots
+    from ..models import notation
 
     if output is not None:  # before anything is computed or written
         files.check_file(output)
     if bundle is not None:
         files.check_folder(bundle)
-    made = make_bundle(plots.make(model, param or [], preset)[0], lang, functions)
+    made = make_bundle(notation.named(model, param or [], preset)[0], lang, functions)
     written = [str(path) for path in made.write(bundle)] if bundle is not None else []
     if output is not None:
         files.write_whole(output, made.text.encode())

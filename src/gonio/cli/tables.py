@@ -58,9 +58,9 @@ def bake(
       gonio bake conductor --preset Au --lut E,Eavg -o gold
     """
     from ..models import models as known_models
+    from ..models import notation
     from ..optics.ndf import distributions
     from ..render import tables
-    from ..viewer import plots
 
     if target in distributions():
         what: Any = target
@@ -71,7 +71,7 @@ def bake(
         known = [*distributions(), *known_models()]
         if target.replace("_", "-") not in known:
             raise InputError(f"unknown distribution or material '{target}'", "TARGET", did_you_mean(target, known))
-        what = plots.make(target, param or [], preset)[0]
+        what = notation.named(target, param or [], preset)[0]
     options: dict[str, Any] = {"lut": lut.split(",")} if lut else {}
     options |= {"size": size, "method": method, "masking": masking, "spp": spp, "points": points, "seed": seed}
     options |= {"aspect": aspect, "azimuths": azimuths}

@@ -24,7 +24,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
 
 from .. import ops
 from ..ops import Table, sqr, sqrt
@@ -152,6 +151,8 @@ def _importance(mu: np.ndarray) -> np.ndarray:
 
 def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
     """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
+    from scipy.optimize import nnls  # here, as it takes longer to load than a picture that has its tables takes to begin
+
     size = 1.0 / basis.max(axis=0)  # terms of one size: else the small are never chosen
     weight, best, least = importance, np.zeros(len(size)), np.inf
     for _ in range(STEPS_OF_FIT):
@@ -355,11 +356,11 @@ def missing(form: Form, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
 
 
 @ops.function
-def _polynomial(found: tuple[Any, ...], x: Any) -> Any:
-    """Lowest power first."""
-    total = found[-1]
-    for c in reversed(found[:-1]):
-        total = ops.fma(total, x, c)
+def _polynomial(c: tuple[Any, ...], x: Any) -> Any:
+    """c_0 + c_1 x + c_2 x^2 + ..., by Horner's rule."""
+    total = c[-1]
+    for factor in reversed(c[:-1]):
+        total = ops.fma(total, x, factor)
     return total
 
 

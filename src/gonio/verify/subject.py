@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import GonioError, InputError
-from ..models import BSDF, Parameter, Sample, models
+from ..models import BSDF, Parameter, Sample, models, notation
 from ..models.base import Breach, converter
 from ..ops import backend
 from . import directions
@@ -51,7 +51,9 @@ class Subject:
     @property
     def title(self) -> str:
         """The target with its settings: "conductor, alpha = 0.3"."""
-        return ", ".join([self.target, *(f"{name} = {_short(value)}" for name, value in self.settings.items())])
+        return ", ".join(
+            [self.target, *(f"{name} = {notation.written(value)}" for name, value in self.settings.items())]
+        )
 
     @property
     def transmits(self) -> bool:
@@ -124,7 +126,7 @@ class Subject:
         """A command line that puts this BSDF on trial again."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
-            parts += ["--param", f"{name}={_short(value)}"]
+            parts += ["--param", f"{name}={notation.written(value)}"]
         return " ".join(part if part == "verify" else shlex.quote(part) for part in [*parts, *more])
 
     # ------------------------------------------------------------------ the protocol
@@ -222,12 +224,7 @@ def of(model: Any) -> Subject:
         return model
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", "verify", "give a gonio.BSDF")
-    settings = {}
-    for name, parameter in model.parameters().items():
-        value = getattr(model, name)
-        if parameter.required or not _same(value, parameter.default):
-            settings[name] = value
-    return Subject(model, _name(type(model)), settings)
+    return Subject(model, _name(type(model)), notation.settings(model))
 
 
 def _name(cls: type) -> str:
@@ -238,24 +235,3 @@ def _name(cls: type) -> str:
         return f"{inspect.getsourcefile(cls)}:{cls.__qualname__}"
     except (TypeError, OSError):
         return cls.__qualname__
-
-
-def _same(a: Any, b: Any) -> bool:
-    try:
-        return bool(np.all(np.asarray(a) == np.asarray(b)))
-    except (TypeError, ValueError):
-        return False
-
-
-def _short(value: Any) -> str:
-    """A value as --param takes it."""
-    if isinstance(value, BSDF):
-        inner = ",".join(f"{k}={_short(v)}" for k, v in of(value).settings.items())
-        return f"{value.name}({inner})" if inner else value.name
-    if isinstance(value, bool | np.bool_):
-        return str(bool(value)).lower()
-    if np.ndim(value):
-        return ",".join(f"{v:.6g}" for v in np.asarray(value).ravel())
-    if isinstance(value, float | int | np.floating | np.integer):
-        return f"{value:.6g}"
-    return str(value)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, Parameter, model, models
+from ..models import BSDF, notation
 from . import subject as subjects
 from .subject import Subject
 
@@ -34,22 +34,15 @@ def resolve(target: str, settings: Sequence[str] = (), sweep: str = "") -> list[
     sweep     "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
     Raises InputError with the nearest known spelling.
     """
-    given = dict(_split(text) for text in settings)
+    given = dict(map(notation.assignment, settings))
     if not sweep:
         return [_build(target, given)]
     name, values = _sweep(sweep)
     return [_build(target, {**given, name: value}) for value in values]
 
 
-def _split(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip():
-        raise InputError(f"'{text}' given, NAME=VALUE expected", "--param", "such as --param alpha=0.3")
-    return name.strip(), value.strip()
-
-
 def _sweep(text: str) -> tuple[str, list[str]]:
-    name, value = _split(text)
+    name, value = notation.assignment(text, "--sweep")
     ends = re.fullmatch(r"(.+?)\.\.(.+)", value)
     if not ends:
         return name, value.split(",")
@@ -71,8 +64,8 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         values = {key: _property(value) for key, value in given.items()}
         return Subject(foreign.plugin(target.removeprefix("mitsuba:"), values), target, values)
     if path.endswith(".py"):
-        cls = _class_in(Path(path), name)
-        return _of_class(cls, target, given)
+        bsdf, values = notation.made(_class_in(Path(path), name), given)
+        return Subject(bsdf, target, values)
     if target.endswith(".py"):
         raise InputError(f"'{target}' names a file, but no class in it", "TARGET", f"give {target}:CLASS")
     if target.lstrip().startswith("{") or target.lower().endswith((".json", ".xml", ".bsdf")):
@@ -80,65 +73,11 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     if Path(target).suffix in (".binary", ".merl", ".csv", ".txt") or Path(target).is_file():
         hint = "measurements in the RGL's .bsdf format can be verified"
         raise InputError(f"'{target}' is in no format that can be verified", "TARGET", hint)
-    if target not in models() and ":" in target:
+    if ":" in target.partition("(")[0]:
         raise InputError(f"'{target}' is no target", "TARGET", "give MODEL, FILE.py:CLASS or mitsuba:PLUGIN")
-    return _of_class(model(target), target, given)
-
-
-# --------------------------------------------------------------------------- Gonio's own
-
-
-def _of_class(cls: type[BSDF], target: str, given: dict[str, str]) -> Subject:
-    known = cls.parameters()
-    values: dict[str, Any] = {}
-    preset = given.pop("preset", None) if "preset" not in known and hasattr(cls, "preset") else None
-    for name, text in given.items():
-        if name not in known:
-            raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, list(known)))
-        values[name] = parse(known[name], text)
-    for name, parameter in known.items():
-        if parameter.kind == "bsdf" and parameter.required and name not in values:
-            values[name] = model("conductor")(alpha=0.3) if name != "a" else model("lambert")()  # type: ignore[call-arg]
-    if preset is not None:
-        return Subject(cls.preset(preset, **values), target, {"preset": preset, **values})  # type: ignore[attr-defined]
-    return Subject(_constructed(cls, values), target, values)
-
-
-def _constructed(cls: type[BSDF], values: dict[str, Any]) -> BSDF:
-    try:
-        return cls(**values)
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(f"{cls.__name__} cannot be made: {type(error).__name__}: {error}", "TARGET") from None
-
-
-def parse(parameter: Parameter, text: str) -> Any:
-    """A parameter's value from the command line: "0.3", "0.1,0.4", "true", "ggx", "lambert", "lambert(albedo=0.3)"."""
-    where = f"--param {parameter.name}"
-    if parameter.kind == "choice":
-        return text
-    if parameter.kind == "flag":
-        if text.lower() not in ("true", "false"):
-            raise InputError(f"'{text}' given, true or false expected", where)
-        return text.lower() == "true"
-    if parameter.kind == "bsdf":
-        return _inner(text)
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"'{text}' given, a number expected", where, parameter.range) from None
-    return numbers[0] if len(numbers) == 1 else tuple(numbers)
-
-
-def _inner(text: str) -> BSDF:
-    """A material inside a material: NAME or NAME(parameter=value,...)."""
-    match = re.fullmatch(r"([\w-]+)(?:\((.*)\))?", text)
-    if not match:
-        raise InputError(f"'{text}' is no material", "--param", "such as a=lambert, or 'a=lambert(albedo=0.3)'")
-    # a comma separates parameters only where a name and = follow; else it is part of a colour
-    parts = re.split(r",(?=[A-Za-z_]\w*=)", match[2]) if match[2] else []
-    return _of_class(model(match[1]), match[1], dict(_split(part) for part in parts)).model
+    cls, own = notation.taken_apart(target)
+    bsdf, values = notation.made(cls, {**own, **given})
+    return Subject(bsdf, cls.name, values)
 
 
 # --------------------------------------------------------------------------- the user's own
@@ -246,4 +185,4 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     return Subject(foreign.load({**description, **values}), target, values)
 
 
-__all__ = ["adopt", "parse", "resolve"]
+__all__ = ["adopt", "resolve"]

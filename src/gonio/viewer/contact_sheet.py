@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..models import notation
 from ..render import images, passes, run
 from . import figures
 
@@ -73,7 +74,7 @@ class Sheet:
 
 def parse_variation(text: str) -> Variation:
     """A `Variation` of "shapes.0.material.p=4,16,64"; values are JSON, commas in brackets do not separate."""
-    path, values = figures.parse_assignment(text, "--vary")
+    path, values = notation.assignment(text, "--vary")
     return Variation(path, tuple(figures.split_values(values)))
 
 

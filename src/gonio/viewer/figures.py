@@ -63,14 +63,6 @@ def parse_value(text: str) -> Any:
         return stripped
 
 
-def parse_assignment(text: str, option: str) -> tuple[str, str]:
-    """("alpha", ".3") of "alpha=.3"."""
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise InputError(f"'{text}' sets nothing", option, "write NAME=VALUE, such as alpha=0.3")
-    return name.strip(), value.strip()
-
-
 def split_values(text: str) -> list[Any]:
     """The values of "1,[2,3],gold": split at commas outside of brackets, braces and quotes."""
     pieces, depth, quoted, start = [], 0, False, 0

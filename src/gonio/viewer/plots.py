@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, model
+from ..models import BSDF, notation
 from . import figures
 
 KINDS = ("lobe", "slice", "albedo")
@@ -44,10 +44,11 @@ def plot(
     """
     if kind not in KINDS:
         raise InputError(f"unknown kind of plot '{kind}'", "--kind", did_you_mean(kind, KINDS))
-    path = figures.check_output(output or Path(f"{name.lower().replace('_', '-')}-{kind}.png"))
+    bsdf, values = notation.named(name, parameters, preset)
+    path = figures.check_output(output or Path(f"{bsdf.name}-{kind}.png"))
     views = parse_angles(angles) if angles else ANGLES[kind]
-    bsdf, title = make(name, parameters, preset)
-    draw(bsdf, title, kind, views, path)
+    shown = ", ".join(f"{key} = {notation.written(value)}" for key, value in values.items())
+    draw(bsdf, bsdf.name + (f": {shown}" if shown else ""), kind, views, path)
     return path
 
 
@@ -60,60 +61,6 @@ def parse_angles(text: str) -> tuple[float, ...]:
     if len(angles) > 8:
         raise InputError(f"{len(angles)} angles are too many to tell apart", "--angles", "give up to 8")
     return tuple(float(angle) for angle in angles)
-
-
-def make(name: str, assignments: list[str], preset: str = "") -> tuple[BSDF, str]:
-    """The material, and its name with the parameters given."""
-    cls = model(name)
-    values = {}
-    for text in assignments:
-        key, value = figures.parse_assignment(text, "--param")
-        values[key] = figures.parse_value(value)
-    shown = [preset] * bool(preset) + [f"{key} = {figures.show_value(value)}" for key, value in values.items()]
-    given = {key: _parameter(cls, key, value) for key, value in values.items()}
-    if preset:
-        if not hasattr(cls, "preset"):
-            raise InputError(f"{cls.name} has no presets", "--preset", "give its parameters by --param")
-        bsdf: BSDF = cls.preset(preset, **given)
-    else:
-        _check_complete(cls, given)
-        bsdf = cls(**given)
-    return bsdf, cls.name + (": " + ", ".join(shown) if shown else "")
-
-
-def _check_complete(cls: type[BSDF], given: dict[str, Any]) -> None:
-    missing = [name for name, parameter in cls.parameters().items() if parameter.required and name not in given]
-    if missing:
-        hint = "give --preset, such as Au, or " if hasattr(cls, "preset") else "give "
-        hint += " ".join(f"--param {name}=..." for name in missing)
-        raise InputError(f"{cls.name} needs {', '.join(missing)}", "--param", hint)
-
-
-def _parameter(cls: type[BSDF], name: str, value: Any) -> Any:
-    """A typed value as the parameter wants it: two widths are a tuple, a material is an object with a type."""
-    known = cls.parameters()
-    if name not in known:
-        raise InputError(f"{cls.name} has no parameter '{name}'", "--param", did_you_mean(name, list(known)))
-    kind = known[name].kind
-    if kind == "alpha" and isinstance(value, list):
-        return tuple(value)
-    if kind == "bsdf":
-        return _inner(name, value)
-    return value
-
-
-def _inner(name: str, value: Any) -> BSDF:
-    fields = dict(value) if isinstance(value, dict) else {"type": value}
-    if not isinstance(fields.get("type"), str):
-        hint = f'write {name}=lambert, or {name}={{"type": "conductor", "preset": "Au"}}'
-        raise InputError(f"'{value}' is no material", f"--param {name}", hint)
-    cls = model(fields.pop("type"))
-    preset = fields.pop("preset", "")
-    given = {key: _parameter(cls, key, inner) for key, inner in fields.items()}
-    if preset and hasattr(cls, "preset"):
-        return cls.preset(preset, **given)
-    _check_complete(cls, given)
-    return cls(**given)
 
 
 # --- numbers -------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ Values of nested materials are named by a path: "base.alpha" is the alpha of the
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, Parameter, model
+from ..models import BSDF, Parameter, model, notation
 from ..optics import fresnel, indices
 
 ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # of the homework's balls; alpha is its square
@@ -199,43 +198,36 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
     parameters  "name=value" each, for every model that has it; InputError where none has
     """
-    from ..verify import targets as verify_targets
-
-    bsdfs, given, used = [], [], set()
+    wished = dict(map(notation.assignment, parameters))
+    bsdfs, given, known = [], [], set()
     for target in targets:
-        own = re.fullmatch(r"([\w-]+)\((.*)\)", target)
-        if own:
-            made = verify_targets.parse(Parameter("MODEL", "bsdf", None, ""), target)
-            names = {part.partition("=")[0].strip() for part in re.split(r",(?=[A-Za-z_]\w*=)", own[2]) if part}
-        else:
-            known = _known(target)
-            fitting = [text for text in parameters if text.partition("=")[0].strip() in known]
-            used.update(fitting)
-            made = verify_targets.resolve(target, fitting)[0].model
-            names = {text.partition("=")[0].strip() for text in fitting}
+        made, names, fits = _named(target, wished)
         if not isinstance(made, BSDF):
             hint = "the page's shader code is written from Gonio's models only"
             raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
         bsdfs.append(made)
         given.append(names)
-    for text in parameters:
-        if text not in used:
-            name = text.partition("=")[0].strip()
-            known = {n for target in targets for n in _known(target)}
+        known |= fits
+    for name in wished:
+        if name not in known:
             raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, sorted(known)))
     return of_models(bsdfs, given)
 
 
-def _known(target: str) -> set[str]:
-    """The names that --param may use for a target; for a class in a file only running it tells."""
-    if ":" in target or "(" in target:
+def _named(target: str, wished: dict[str, str]) -> tuple[Any, set[str], set[str]]:
+    """A target's material, the parameters set, and those that it knows; its own settings come before the wished."""
+    if ":" in target.partition("(")[0]:
         from ..verify import targets as verify_targets
 
-        if "(" in target:
-            return set()
-        return {*verify_targets.resolve(target)[0].model.parameters(), "preset"}
-    cls = model(target)
-    return {*cls.parameters(), *(["preset"] if hasattr(cls, "preset") else [])}
+        # for a class in a file only running it tells
+        known = {*verify_targets.resolve(target)[0].model.parameters(), "preset"}
+        fitting = {name: value for name, value in wished.items() if name in known}
+        (subject,) = verify_targets.resolve(target, [f"{name}={value}" for name, value in fitting.items()])
+        return subject.model, {*fitting}, known
+    cls, own = notation.taken_apart(target)
+    known = {*cls.parameters(), *(["preset"] if hasattr(cls, "preset") else [])}
+    given = {**{name: value for name, value in wished.items() if name in known}, **own}
+    return notation.made(cls, given)[0], {*given}, known
 
 
 def of_models(bsdfs: Sequence[BSDF], given: Sequence[set[str]] | None = None) -> Stage:

@@ -1,0 +1,159 @@
+"""Materials as text: how the command line names one, with its parameters, and a material in a material.
+
+    conductor                                   its name; parameters follow as NAME=VALUE
+    conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
+    {"type": "conductor", "alpha": [.1, .4]}    as in a scene
+
+Values are numbers, "0.9,0.8,0.7" or [.9, .8, .7] for several, names, true or false, and materials again. A material
+inside that is not given is metal of alpha .3, and the first of a mix Lambert's.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from . import model
+from .base import BSDF, Parameter
+
+_CALL = re.compile(r"\s*([\w-]+)\s*(?:\((.*)\))?\s*", re.DOTALL)
+
+
+def assignment(text: str, option: str = "--param") -> tuple[str, str]:
+    """("alpha", ".3") of "alpha=.3"."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", option, "such as alpha=0.3")
+    return name.strip(), value.strip()
+
+
+def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple[BSDF, dict[str, Any]]:
+    """A material as the command line names it, and what was set: values by parameter, "preset" among them.
+
+    assignments  "name=value" each
+    Raises InputError, with the nearest known spelling, for what is unknown or out of range.
+    """
+    cls, own = taken_apart(text)
+    given = {**own, **dict(map(assignment, assignments))}
+    return made(cls, {**given, "preset": preset} if preset else given)
+
+
+def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any]]:
+    """As `named`, of a class; a value is text, or what JSON has for it."""
+    known = cls.parameters()
+    values: dict[str, Any] = {}
+    preset = "" if "preset" in known else given.get("preset", "")
+    if preset and not hasattr(cls, "preset"):
+        raise InputError(f"{cls.name} has no presets", "--preset", "give its parameters by --param")
+    for name, value in given.items():
+        if name in known:
+            values[name] = typed(known[name], value)
+        elif name != "preset":
+            hint = did_you_mean(name, [*known, *(["preset"] if hasattr(cls, "preset") else [])])
+            raise InputError(f"{cls.name} has no parameter '{name}'", f"--param {name}", hint)
+    for name, parameter in known.items():
+        if parameter.kind == "bsdf" and parameter.required and name not in values:
+            values[name] = model("lambert")() if name == "a" else model("conductor")(alpha=0.3)  # type: ignore[call-arg]
+    if preset:
+        return cls.preset(preset, **values), {"preset": preset, **values}  # type: ignore[attr-defined]
+    missing = [name for name, parameter in known.items() if parameter.required and name not in values]
+    if missing:
+        hint = "give --preset, such as Au, or " if hasattr(cls, "preset") else "give "
+        hint += " ".join(f"--param {name}=..." for name in missing)
+        raise InputError(f"{cls.name} needs {', '.join(missing)}", "--param", hint)
+    try:
+        return cls(**values), values
+    except InputError:
+        raise
+    except Exception as error:  # a user's own class
+        raise InputError(f"{cls.__name__} cannot be made: {type(error).__name__}: {error}", "TARGET") from None
+
+
+def typed(parameter: Parameter, value: Any) -> Any:
+    """A parameter's value from text, or from what JSON has for it."""
+    where = f"--param {parameter.name}"
+    if parameter.kind == "bsdf":
+        return _inner(value, where)
+    if parameter.kind == "choice":
+        return value.strip().strip('"') if isinstance(value, str) else value
+    if parameter.kind == "flag":
+        if str(value).lower() not in ("true", "false"):
+            raise InputError(f"'{value}' given, true or false expected", where)
+        return str(value).lower() == "true"
+    try:
+        parts = value.strip(" []()").split(",") if isinstance(value, str) else value
+        numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]
+    except (TypeError, ValueError):
+        raise InputError(f"'{value}' given, a number expected", where, parameter.range) from None
+    return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+
+def written(value: Any) -> str:
+    """A value as `typed` takes it, a material with the parameters that are not the default."""
+    if isinstance(value, BSDF):
+        inner = ",".join(f"{name}={written(v)}" for name, v in settings(value).items())
+        return f"{value.name}({inner})" if inner else value.name
+    if isinstance(value, bool | np.bool_):
+        return str(bool(value)).lower()
+    if np.ndim(value):
+        return ",".join(f"{v:.6g}" for v in np.asarray(value).ravel())
+    if isinstance(value, float | int | np.floating | np.integer):
+        return f"{value:.6g}"
+    return str(value)
+
+
+def settings(material: BSDF) -> dict[str, Any]:
+    """The parameters that are not the default, by name."""
+    found = {}
+    for name, parameter in material.parameters().items():
+        value = getattr(material, name)
+        if parameter.required or not _same(value, parameter.default):
+            found[name] = value
+    return found
+
+
+def _same(a: Any, b: Any) -> bool:
+    try:
+        return bool(np.all(np.asarray(a) == np.asarray(b)))
+    except (TypeError, ValueError):
+        return False
+
+
+def _inner(value: Any, where: str) -> BSDF:
+    if isinstance(value, str) and not value.lstrip().startswith("{"):
+        return made(*taken_apart(value.strip().strip('"'), where))[0]
+    try:
+        fields = dict(json.loads(re.sub(r"(?<![\w.])\.(?=\d)", "0.", value)) if isinstance(value, str) else value)
+        cls = model(fields.pop("type"))
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
+        raise _no_material(value, where) from None
+    return made(cls, fields)[0]
+
+
+def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
+    """The class and the text of each parameter of NAME or NAME(parameter=value,...)."""
+    match = _CALL.fullmatch(text)
+    if not match or re.fullmatch(r"[\d.-]+", match[1]):
+        raise _no_material(text, where)
+    return model(match[1]), dict(assignment(part, where) for part in _parts(match[2] or ""))
+
+
+def _parts(text: str) -> list[str]:
+    """At commas outside of brackets, where a name and = follow; any other comma is part of a colour."""
+    parts, depth, start = [], 0, 0
+    for at, letter in enumerate(text):
+        depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and depth == 0 and re.match(r",\s*[A-Za-z_]\w*\s*=", text[at:]):
+            parts.append(text[start:at])
+            start = at + 1
+    return [part for part in [*parts, text[start:]] if part.strip()]
+
+
+def _no_material(value: Any, where: str) -> InputError:
+    hint = 'such as lambert, \'conductor(alpha=.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
+    return InputError(f"'{value}' is no material", where, hint)
