@@ -151,7 +151,7 @@ def _importance(mu: np.ndarray) -> np.ndarray:
 
 def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarray) -> np.ndarray:
     """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
-    from scipy.optimize import nnls  # here, as it takes longer to load than a picture that has its tables takes to begin
+    from scipy.optimize import nnls  # late: a picture whose tables are there shall not wait for it
 
     size = 1.0 / basis.max(axis=0)  # terms of one size: else the small are never chosen
     weight, best, least = importance, np.zeros(len(size)), np.inf
