@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import gonio as go
@@ -169,3 +172,97 @@ def test_the_manifest_names_functions_of_its_own_struct(name: str, lang: str) ->
     for function in made.manifest["functions"].values():
         first = rf"\w+: {struct}\b" if lang == "wgsl" else rf"{struct} \w+"
         assert re.search(rf"\b{function} ?\({first}", made.text), f"{function} of {struct}"
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_locals_have_names_of_the_source_and_a_digit_is_a_power(name: str) -> None:
+    """Two values of one name are x, x_2: x2 is the square of x. None is named for its operation."""
+    for function, body in _functions(go.emit(FEW[name])).items():
+        named = re.findall(r"^    \w+ (\w+) = (.*)", body, re.M)
+        for local, value in named:
+            assert not local.endswith("_") and local not in ("product", "difference", "sum", "holds"), (function, local)
+            root = re.fullmatch(r"([a-z]+)2", local)
+            if root and root[1] in [other for other, _ in named] and "_" not in local:
+                assert value.startswith((f"sqr({root[1]})", f"dot({root[1]}, {root[1]})")), (function, local, value)
+
+
+def test_copies_for_a_flag_are_named_for_it() -> None:
+    functions = _functions(go.emit(go.Dielectric(1.5, 0.3)))
+    assert "beta(" in functions["masking_shadowing_transmits"] and "beta(" not in functions["masking_shadowing"]
+
+
+def test_vectors_stay_vectors() -> None:
+    functions = _functions(go.emit(go.KullaConty(go.Conductor.preset("Au", alpha=(0.3, 0.1), rotation=0.5))))
+    assert "vec2 slant = alpha * v.xy;" in functions["slant2"]
+    assert "m * vec3(alpha.yx, area)" in functions["GGX_D"]
+    assert all(body.count("max(self.alpha") <= 1 for body in functions.values())
+    # a parameter that Python gives a new value is given one, and read no more as it was
+    turned = functions["Conductor_eval"]
+    assert turned.index("half_vector(wo, wi)") < turned.index("wo = rotate(wo, self.rotation);")
+
+
+def test_values_made_by_small_functions_of_the_source_bear_their_names() -> None:
+    assert "bool above = wo.z > 0.0 && wi.z > 0.0;" in _functions(go.emit(GOLD))["Conductor_sample"]
+
+
+@pytest.mark.parametrize("lang", LANGS)
+def test_the_head_tells_how_to_call_it_and_structs_what_their_fields_are(lang: str) -> None:
+    text = go.emit(go.KullaConty(GOLD), lang)
+    head = text.partition("\n\n")[0]
+    own = "material" if lang == "wgsl" else "self"
+    assert f"// KullaConty_eval({own}, derived, wo, wi)   the BSDF times |cos theta_i|, RGB, 1/sr" in head
+    assert f"// KullaConty_derive({own})" in head and "KullaConty_terms" not in head and "will not do." in head
+    assert re.search(r"base_k\b.*// imaginary part of the refractive index, over the outside's; >= 0", text)
+    assert "// width of the microfacet distribution; along x, along y; >= 0 and <= 1" in text
+    assert re.search(r"pdf\b.*// density of wi, 1/sr", text)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_comments_speak_of_the_shader_not_of_python(name: str) -> None:
+    comments = "\n".join(re.findall("//.*", bundle(FEW[name]).text))
+    for word in (
+        "None",
+        "NumPy",
+        "array",
+        "tuple",
+        "gonio.",
+        "KINDS",
+        "recorded",
+        "transmits  wi lies",
+        "one entry a ray",
+    ):
+        assert word not in comments, word
+
+
+def test_every_constant_that_is_no_multiple_of_pi_says_what_it_is() -> None:
+    text = go.emit(go.KullaConty(GOLD))
+    assert "NOTHING = 1.0e-5;  // M_avg below this" in text
+
+
+@pytest.mark.parametrize("name", ["kulla-conty-glass", "mix-compensated", "glass-turned"])
+def test_the_text_is_the_same_in_every_process_and_for_every_value(name: str) -> None:
+    code = (
+        "import sys; sys.path[:0] = ['tests', 'tests/emit']; import gonio as go; from variants import EVERY;"
+        f"sys.stdout.write(''.join(go.emit(EVERY[{name!r}], lang) for lang in ('glsl', 'wgsl', 'hlsl')))"
+    )
+    texts = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=Path(__file__).parents[2],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=True,
+            capture_output=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(texts) == 1
+
+
+def test_numbers_do_not_shape_the_code() -> None:
+    def texts(*materials: go.BSDF) -> set[str]:
+        return {go.emit(m) for m in materials}
+
+    assert len(texts(*(go.Conductor(eta=e, k=k, alpha=a) for e, k, a in [(0, 0, 0), (1, 1, 1), (0.2, 3, 1e-4)]))) == 1
+    assert len(texts(*(go.Dielectric(eta, a) for eta, a in [(1, 0), (0.5, 0.2), (1.5, 1)]))) == 1
+    assert len(texts(*(go.mix(go.Lambert(), go.Phong(), w) for w in (0, 0.5, 1)))) == 1
+    assert len(texts(*(go.KullaConty(go.Conductor(alpha=a)) for a in (0, 0.5, 1)))) == 1

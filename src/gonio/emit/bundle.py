@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,7 +21,7 @@ from . import program as programs
 from .dialect import Dialect, axes, literal, pixels, reader, width
 from .glsl import GLSL
 from .hlsl import HLSL
-from .layout import comment
+from .layout import COLUMNS, INDENT, comment
 from .program import Program
 from .simplify import Record
 from .wgsl import WGSL
@@ -101,7 +102,7 @@ def bundle(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", 
 def _text(made: Program, writer: Writer) -> str:
     dialect = writer.dialect
     bodies = [writer.routine(routine) for routine in made.routines]
-    parts: list[list[str]] = [_head(made)]
+    parts: list[list[str]] = [_head(made, writer)]
     constants = []
     for name, (value, about) in writer.constants.items():
         line = dialect.constant(name, literal(value))
@@ -124,20 +125,43 @@ def _text(made: Program, writer: Writer) -> str:
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 
 
-def _head(made: Program) -> list[str]:
-    model = made.model
+def _head(made: Program, writer: Writer) -> list[str]:
+    model, dialect = made.model, writer.dialect
+    entries = sorted(made.entries.items(), key=lambda entry: list(ENTRIES).index(entry[0]))
     from .. import __version__
 
     choices = [f"{path} = {value}" for path, value in _choices(model)]
     lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
-    lines += comment(inspect.cleandoc(type(model).__doc__ or ""))
+    lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
     if choices:
         lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(choices) + ".", 105))]
+    lines += ["//"]
+    names = [f"{writer.names[routine]}({', '.join(_arguments(made, method, dialect))})" for method, routine in entries]
+    for name, (method, _) in zip(names, entries, strict=True):
+        lines.append(f"// {name:{max(map(len, names))}}  {ENTRIES[method]}")
     lines += [
         "//",
-        "// Directions are unit vectors of the local frame, away from the surface; +z is the shading normal.",
+        "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
+        f"// the shading normal. Colours are linear RGB. {dialect.floats}",
     ]
     return lines
+
+
+# what the functions that a program calls give
+ENTRIES = {
+    "derive": "what follows from the parameters alone: call it once a draw",
+    "eval": "the BSDF times |cos theta_i|, RGB, 1/sr",
+    "pdf": "density with which `sample` chooses wi, 1/sr",
+    "sample": "wi, its weight eval / pdf, its pdf; u: three random numbers in [0, 1)",
+    "terms": "what eval is made of, to be looked at one by one",
+}
+
+
+def _arguments(made: Program, method: str, dialect: Dialect) -> list[str]:
+    first = [dialect.word("self")]
+    if method == "derive":
+        return first
+    return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
 
 
 def _choices(model: Any, path: str = "") -> list[tuple[str, Any]]:
@@ -164,7 +188,14 @@ def _struct(record: Record, writer: Writer) -> list[str]:
     fields = [(writer.dialect.type(type_), writer.dialect.word(name)) for name, type_ in record.fields]
     if not fields:  # a struct must have a member
         fields = [(writer.dialect.type("float"), "nothing")]
-    return writer.dialect.struct(writer.dialect.word(record.name), fields)
+    lines = writer.dialect.struct(writer.dialect.word(record.name), fields)
+    for place, (name, _) in zip(range(len(lines) - 2, 0, -1), reversed(record.fields), strict=False):
+        about = record.docs.get(name) or (_term_doc(name) if record.name.endswith("Terms") else "")
+        if about and len(lines[place]) + len(about) + 5 <= COLUMNS + 10:
+            lines[place] += f"  // {about}"
+        elif about:
+            lines[place:place] = [f"{INDENT}// {text}" for text in textwrap.wrap(about, COLUMNS)]
+    return lines
 
 
 # ---------------------------------------------------------------------- manifest

@@ -44,6 +44,9 @@ class Dialect:
     spread           template of a float, {1}, spread over a vector type, {0}
     splat            whether min, max, where and comparisons want floats spread to vectors
     overloads        whether functions of one name may differ in their types
+    floats           what is said of precision in the head of a shader
+    parameters_change
+                     whether a function may give a parameter a new value
     struct_literal   whether `Name(a, b)` makes a struct inside an expression
     signature, local, constant, struct, binding, fetch, mix
                      how a function's head, a local value, a constant, a struct, a table's declaration, one of its
@@ -59,6 +62,8 @@ class Dialect:
     spread: str
     splat: bool
     overloads: bool
+    floats: str
+    parameters_change: bool
     struct_literal: bool
     reserved: frozenset[str]
     signature: Callable[[str, str, list[tuple[str, str]]], str]

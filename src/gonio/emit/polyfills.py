@@ -35,9 +35,9 @@ def max_component(c: Any) -> Any:
     return maximum(maximum(r, g), b)
 
 
-def copysign(size: Any, sign: Any) -> Any:
+def copysign(size: Any, other: Any) -> Any:
     """|size| with the sign of the other."""
-    return where(sign < 0.0, -abs(size), abs(size))
+    return where(other < 0.0, -abs(size), abs(size))
 
 
 def isfinite(x: Any) -> Any:
@@ -66,16 +66,17 @@ def _horner(x: Any, coefficients: tuple[float, ...]) -> Any:
     return total
 
 
-def turned(x: Any, quarters: Any) -> Any:
+def sine_quarters(x: Any, quarters: Any) -> Any:
     """sin(x + quarters pi / 2): Taylor's series within an eighth of a turn, error 1e-7; a GPU's own errs by 5e-4."""
-    count = floor(x * (2.0 / ops.pi) + 0.5)
+    count = floor(x * (2.0 / ops.pi) + 0.5)  # whole quarter turns
     r = (x - count * QUARTER_TURN) - count * QUARTER_REST
     r2 = sqr(r)
-    sine = r + r * r2 * (-1 / 6 + r2 * (1 / 120 + r2 * (-1 / 5040 + r2 * (1 / 362880))))
-    cosine = 1.0 + r2 * (-1 / 2 + r2 * (1 / 24 + r2 * (-1 / 720 + r2 * (1 / 40320))))
-    quadrant = (count + quarters) - 4.0 * floor(0.25 * (count + quarters))
+    odd_series = r + r * r2 * (-1 / 6 + r2 * (1 / 120 + r2 * (-1 / 5040 + r2 * (1 / 362880))))
+    even_series = 1.0 + r2 * (-1 / 2 + r2 * (1 / 24 + r2 * (-1 / 720 + r2 * (1 / 40320))))
+    turns = count + quarters
+    quadrant = turns - 4.0 * floor(0.25 * turns)
     odd = (quadrant == 1.0) | (quadrant == 3.0)
-    value = where(odd, cosine, sine)
+    value = where(odd, even_series, odd_series)
     return where(quadrant >= 2.0, -value, value)
 
 
@@ -108,17 +109,17 @@ SQRT_2 = 1.4142135
 LOG_2 = 0.693359375  # with so few bits that e LOG_2 is exact
 LOG_2_REST = -0.00021219444
 
-_TURNED = ops.function(turned)
+_SINE_QUARTERS = ops.function(sine_quarters)
 
 
 def sin(x: Any) -> Any:
     """Sine of an angle in radians."""
-    return _TURNED(x, 0.0)
+    return _SINE_QUARTERS(x, 0.0)
 
 
 def cos(x: Any) -> Any:
     """Cosine of an angle in radians."""
-    return _TURNED(x, 1.0)
+    return _SINE_QUARTERS(x, 1.0)
 
 
 POLYFILLS: dict[str, Callable] = {

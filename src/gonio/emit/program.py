@@ -7,6 +7,9 @@ computes it once a draw, not once a pixel.
 
 from __future__ import annotations
 
+import inspect
+import re
+from collections.abc import Iterator
 from typing import Any
 
 from .. import ops
@@ -23,8 +26,10 @@ FUNCTIONS = ("eval", "pdf", "sample", "terms")
 class Struct:
     """An argument made of fields: a model's parameters, or what was derived from them."""
 
-    def __init__(self, name: str, fields: list[tuple[str, str]], doc: str = "") -> None:
-        self.record = Record(name, [(flat(path), type_) for path, type_ in fields], doc)
+    def __init__(
+        self, name: str, fields: list[tuple[str, str]], doc: str = "", docs: dict[str, str] | None = None
+    ) -> None:
+        self.record = Record(name, [(flat(path), type_) for path, type_ in fields], doc, docs)
         self.paths = [path for path, _ in fields]
 
 
@@ -68,7 +73,7 @@ class Program:
         if key not in self._parameters:
             name = _free(type(value).__name__, [s.record.name for s in self._parameters.values()])
             doc = (type(value).__doc__ or "").strip().splitlines()[0]
-            self._parameters[key] = Struct(name, list(fields), doc)
+            self._parameters[key] = Struct(name, list(fields), doc, dict(parameter_docs(value)))
         return self._parameters[key]
 
     def derived_of(self, value: Any) -> Struct | None:
@@ -146,7 +151,8 @@ class Program:
         else:
             name = "".join(part[:1].upper() + part[1:] for part in routine.name.split("_")) + "Result"
         fields = [(_result_name(path, value), value.type) for path, value in routine.results]
-        routine.record = Record(name, fields, _first_line(type(result)) if hasattr(result, "_fields") else "")
+        doc = inspect.getdoc(type(result)) or "" if hasattr(result, "_fields") else ""
+        routine.record = Record(name, fields, doc.partition("\n")[0], dict(listed(doc)))
 
     def _tables(self) -> list[Table]:
         found: dict[int, Table] = {}
@@ -250,8 +256,33 @@ def _result_name(path: str, value: Value) -> str:
     return value.name.rpartition(".")[2] or f"value_{path}"
 
 
-def _first_line(cls: type) -> str:
-    return (cls.__doc__ or "").strip().splitlines()[0]
+def parameter_docs(model: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    """(field, what it is, with unit and range) of a model's numeric parameters."""
+    for name, parameter in model.parameters().items():
+        here = f"{path}{name}"
+        if parameter.kind == "bsdf":
+            yield from parameter_docs(getattr(model, name), f"{here}.")
+        elif parameter.numeric:
+            doc = parameter.doc.partition(";")[0] if parameter.kind == "alpha" else parameter.doc
+            form = {"alpha": "along x, along y", "angle": "as (cos, sin)"}.get(parameter.kind, parameter.unit)
+            range_ = parameter.range if parameter.range != "any number" else ""
+            yield flat(here), "; ".join(part for part in (doc, form, range_) if part)
+
+
+def listed(doc: str) -> Iterator[tuple[str, str]]:
+    """(name, what is said of it) in a docstring's list, "name  what it is" a line, continued by indented lines."""
+    name, said = "", ""
+    for line in doc.splitlines():
+        found = re.match(r"(\w+)  +(\S.*)", line)
+        if name and (found or not line.startswith("  ")):
+            yield name, said
+            name = ""
+        if found:
+            name, said = found[1], found[2]
+        elif name:
+            said += " " + line.strip()
+    if name:
+        yield name, said
 
 
 def _free(name: str, taken: list[str]) -> str:

@@ -7,13 +7,9 @@ a / where(b == 0, 1, b))` is a quotient that is looked at only where b is not 0.
 
 from __future__ import annotations
 
-import functools
-import linecache
 import math
 import struct
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,19 +17,22 @@ import numpy as np
 from ..errors import GonioError
 from ..ops import graph
 from ..ops.table import Table
+from .source import module_constant
 
 SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
 COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
 LOGIC = {"and", "or", "not"}
+ELEMENTWISE = {"add", "sub", "mul", "div", "neg", "abs", "minimum", "maximum"}
 
 
 class Value:
     """One thing that a function computes.
 
-    op      as in a recording, or "constant", "parameter", "texel" (up to four channels of a table)
+    op      as in a recording, or "constant", "parameter", "swizzle", "texel" (up to four channels of a table)
     type    "float", "bool", "vec2", "vec3", "vec4", "bvec3", or the result of a call: a `Record`
     args    Values
-    static  the constant, the parameter's place, the callee, the component, (table, group of channels)
+    static  the constant, the parameter's place, the callee, the component or the letters of several, (table, group of
+            channels)
     name    of the Python variable, where known; `source` the line that wrote it
     """
 
@@ -48,10 +47,15 @@ class Value:
 
 
 class Record:
-    """The type of several values returned together: a struct of the shader."""
+    """The type of several values returned together: a struct of the shader.
 
-    def __init__(self, name: str, fields: list[tuple[str, str]], doc: str = "") -> None:
-        self.name, self.fields, self.doc = name, fields, doc
+    docs  field -> what it is, with unit and range
+    """
+
+    def __init__(
+        self, name: str, fields: list[tuple[str, str]], doc: str = "", docs: dict[str, str] | None = None
+    ) -> None:
+        self.name, self.fields, self.doc, self.docs = name, fields, doc, docs or {}
 
     @property
     def key(self) -> tuple:
@@ -98,6 +102,12 @@ def needed(value: Value) -> list[Value]:
     return list(value.args)
 
 
+def stem_of(routine: Routine) -> str:
+    """A routine's name without the number that tells copies apart."""
+    stem, _, count = routine.name.rpartition("_")
+    return stem if stem and count.isdigit() else routine.name
+
+
 def routines(recorded: graph.Graph) -> list[Routine]:
     """Every function of a recording, simplified, callees first."""
     known: dict[graph.Function, Routine] = {}
@@ -117,6 +127,7 @@ class _Simplifier:
         self.table: dict[tuple, Value] = {}
         self.count = 0
         self.assumed: dict[tuple, Value] = {}
+        self.parts: dict[int, tuple[Value, ...]] = {}  # of a vector, as Python put it together
         self.routine = Routine(function)
         self.values: dict[graph.Node, Value] = {}
         for node in function.nodes:
@@ -178,6 +189,8 @@ class _Simplifier:
             return self.lookup(args, *node.static)
         if op == "component":
             return self.component(args[0], node.static)
+        if op == "vector":
+            return self.vector(args)
         return self.build(op, args, shape(node.type))
 
     def element(self, called: Value, place: int) -> Value:
@@ -194,13 +207,53 @@ class _Simplifier:
         return self.component(self.make("texel", "vec4", args, (table, channel // 4)), channel % 4)
 
     def component(self, vector: Value, place: int) -> Value:
+        if vector.order in self.parts:
+            part = self.parts[vector.order][place]
+            if part.op in ("component", "parameter", "constant"):
+                return part
         if vector.op == "vector":
-            return vector.args[place]
+            pair = len(vector.args) < SIZES[vector.type]
+            return self.component(vector.args[0], place) if pair and place < 2 else vector.args[place - pair]
         if vector.op == "constant":
             return self.constant(vector.static)
         if vector.op == "neg" and vector.args[0].op in ("vector", "parameter"):
             return self.build("neg", (self.component(vector.args[0], place),), "float")
         return self.make("component", "float", (vector,), place)
+
+    def vector(self, parts: tuple[Value, ...]) -> Value:
+        """Floats put together; what is the same in each component, or in x and y, is written once for all of them."""
+        type_ = f"vec{len(parts)}"
+        made = self.joined(parts)
+        if made is None:
+            pair = self.joined(parts[:2]) if len(parts) == 3 else None
+            made = self.make("vector", type_, (pair, parts[2]) if pair is not None else parts)
+        self.parts.setdefault(made.order, parts)
+        return made
+
+    def joined(self, parts: tuple[Value, ...]) -> Value | None:
+        """One operation on vectors that gives these components, by the same arithmetic; None where there is none."""
+        type_, first = f"vec{len(parts)}", parts[0]
+        if all(p.op == "component" and p.args == first.args for p in parts):
+            places = "".join("xyzw"[p.static] for p in parts)
+            base = first.args[0]
+            return base if base.type == type_ and places == "xyz"[: len(parts)] else self.swizzle(base, places)
+        if first.op not in ELEMENTWISE or any(p.op != first.op or p.name for p in parts):
+            return None
+        columns = list(zip(*(p.args for p in parts), strict=True))
+        same = [column[0] if all(p is column[0] for p in column) else None for column in columns]
+        found = [same[i] or self.joined(column) for i, column in enumerate(columns)]
+        if all(same) or not any(found):
+            return None
+        args = tuple(x if x is not None else self.vector(c) for x, c in zip(found, columns, strict=True))
+        return self.build(first.op, args, type_)
+
+    def swizzle(self, vector: Value, places: str) -> Value | None:
+        """Components by their letters, each once: `v.xy`."""
+        if len(set(places)) < len(places):
+            return None
+        if places == "xy" and vector.op == "vector" and vector.args[0].type == "vec2":
+            return vector.args[0]
+        return self.make("swizzle", f"vec{len(places)}", (vector,), places)
 
     def build(self, op: str, args: tuple, declared: str) -> Value:
         """An operation on values: folded where its arguments allow, else made."""
@@ -231,6 +284,8 @@ class _Simplifier:
             found = _compute(op, [a.static for a in args])
             if found is not None:
                 return self.constant(found, type_)
+        if op == "sub" and args[0] is args[1]:
+            return self.constant(0.0, type_)
         if op in ("add", "sub", "mul", "div"):
             return self.fold_arithmetic(op, args, type_)
         if op == "neg" and args[0].op == "neg":
@@ -293,14 +348,32 @@ class _Simplifier:
         if mask.op == "not":
             return self.build("where", (mask.args[0], b, a), type_)
         if type_ == "bool":
-            if a.op == "constant":
-                return self.build("or", (mask, b), "bool") if a.static else None
+            if a.op == "constant" and a.static:
+                return self.build("or", (mask, b), "bool")
             if b.op == "constant" and not b.static:
                 return self.build("and", (mask, a), "bool")
+            if a.op == "constant" or b.op == "constant":  # m ? false : b, m ? a : true
+                other, not_mask = (b if a.op == "constant" else a), self.build("not", (mask,), "bool")
+                return self.build("and" if a.op == "constant" else "or", (not_mask, other), "bool")
+        shifted = self._same_but_for_a_number(mask, a, b)
+        if shifted is not None:
+            return shifted
         a2, b2 = self.assume(a, mask, True), self.assume(b, mask, False)
         if a2 is not a or b2 is not b:
             return self.build("where", (mask, a2, b2), type_)
         return None
+
+    def _same_but_for_a_number(self, mask: Value, a: Value, b: Value) -> Value | None:
+        """mask ? x + 1 : x + 2, as x + (mask ? 1 : 2)."""
+        numbers = []
+        for value in (a, b):
+            if value.op not in ("add", "sub") or value.name or value.args[1].op != "constant":
+                return None
+            number = value.args[1]
+            numbers.append(number if value.op == "add" else self.constant(-number.static, number.type))
+        if a.args[0] is not b.args[0] or mask.type != "bool":
+            return None
+        return self.build("add", (a.args[0], self.build("where", (mask, *numbers), numbers[0].type)), a.type)
 
     def assume(self, value: Value, mask: Value, holds: bool) -> Value:
         """The value where it is known that `mask` holds, or that it does not."""
@@ -324,6 +397,8 @@ class _Simplifier:
             return value
         if value.op == "component":
             return self.component(args[0], value.static)
+        if value.op == "swizzle":
+            return self.make("swizzle", value.type, args, value.static)
         return self.build(value.op, args, value.type)
 
 
@@ -376,36 +451,3 @@ def check_single(number: float, where: str) -> None:
     size = abs(number)
     if math.isnan(number) or size > 3.4028234e38 or 0.0 < size < 1.17549435e-38:
         raise GonioError(f"the constant {number!r} is no float32", where, "shader code computes in 32 bits")
-
-
-@functools.cache
-def module_constant(number: float, source: str) -> tuple[str, str]:
-    """(name, what is said of it) of a constant of a module, where the line of the source uses it; else ("", "")."""
-    path, _, line = source.rpartition(":")
-    text = linecache.getline(path, int(line or 0))
-    words = {word for word in "".join(c if c.isalnum() or c == "_" else " " for c in text).split() if word.isupper()}
-    for name in words if number not in (0.0, 1.0) else ():
-        for module in list(sys.modules.values()):
-            place = getattr(module, "__file__", None) or ""
-            if place.startswith(_PACKAGE) and type(vars(module).get(name)) is float and vars(module)[name] == number:
-                about = _said_of(place, name)
-                if about is not None:
-                    return name.strip("_"), about
-    return "", ""
-
-
-_PACKAGE = str(Path(__file__).parent.parent)
-
-
-def _said_of(path: str, name: str) -> str | None:
-    """The comment on a constant where it is defined, above it or after it; None where it is only imported."""
-    lines = linecache.getlines(path)
-    for index, line in enumerate(lines):
-        if line.startswith(f"{name} ="):
-            after = line.partition("#")[2].strip()
-            above: list[str] = []
-            while not after and index > 0 and lines[index - 1].startswith("#"):
-                index -= 1
-                above.insert(0, lines[index].lstrip("# ").rstrip())
-            return after or " ".join(above)
-    return None

@@ -1,16 +1,15 @@
-"""Routines as text: expressions re-nested, values named as in Python where a name helps, comments kept."""
+"""What the routines of a shader share: their names, the constants and structs that they come to need."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from .dialect import AND, ATOM, CHOICE, NATIVE, OPERATORS, OR, SIGN, Dialect, literal
-from .layout import INDENT, comment, common_head, wrap
-from .program import Program, Struct, flat, place
-from .simplify import Record, Routine, Value, check_single, module_constant, needed
-
-INLINE = 88  # characters: a longer part of an expression gets a line of its own
+from .dialect import NATIVE, Dialect, literal
+from .program import Program
+from .routine import RoutineWriter
+from .simplify import Record, Routine, Value, check_single, stem_of
+from .source import module_constant
 
 CONSTANTS = {
     "PI": math.pi,
@@ -46,11 +45,25 @@ class Writer:
             types = tuple(v.type for v in routine.parameters)
             if self.signatures.setdefault((name, types), routine) is routine and self._same_doc(name, routine):
                 return name
+        name = self._told_apart(name, routine) if name in taken else name
         found, number = name, 1
         while found in taken:
             number += 1
             found = f"{name}_{number}"
         return found
+
+    def _told_apart(self, name: str, routine: Routine) -> str:
+        """The name with what a copy was recorded for, where that is a flag or a word: "masking_shadowing_transmits"."""
+        first = next(r for r, known in self.names.items() if known == name)
+        if first.source != routine.source:
+            return name
+        before, now = (self.program.recorded[r].arguments for r in (first, routine))
+        for argument, value in now.items():
+            if value is True and before[argument] is False:
+                return f"{name}_{argument}"
+            if isinstance(value, str) and isinstance(before[argument], str) and value != before[argument]:
+                return f"{name}_{value.replace('-', '_')}"
+        return name
 
     def _same_doc(self, name: str, routine: Routine) -> bool:
         """Whether a name stands for one function of the source, in different types."""
@@ -69,7 +82,7 @@ class Writer:
         """The text of a function, its documentation above it; nothing where the language has its own."""
         if stem_of(routine) in NATIVE:
             return []
-        return _RoutineWriter(self, routine).text()
+        return RoutineWriter(self, routine).text()
 
     def number(self, value: Value) -> str:
         """A constant by its name, where it has one, or in digits."""
@@ -83,419 +96,3 @@ class Writer:
                 self.constants.setdefault(name, (known, ""))
                 return name if number > 0 else f"-{name}"
         return literal(number)
-
-
-class _RoutineWriter:
-    def __init__(self, writer: Writer, routine: Routine) -> None:
-        self.writer, self.routine, self.dialect = writer, routine, writer.dialect
-        self.program = writer.program
-        self.arguments = self.program.recorded[routine].arguments if routine in self.program.recorded else {}
-        self.taken: set[str] = {*writer.names.values()}
-        self.parameter_names: dict[int, str] = {}
-        self.heads: list[tuple[str, str]] = []
-        self.objects: dict[str, tuple[Struct, str]] = {}  # "struct name" -> (struct, name of the parameter)
-        self.locals: dict[int, str] = {}
-        self.lines: list[str] = []
-        self.built: dict[tuple, str] = {}
-        self.holders: dict[str, Value] = {}  # name -> the value that it stands for now
-        self.first_lines: dict[str, int] = {}  # name -> the line that declares it
-        self._parameters()
-
-    # ------------------------------------------------------------------ parameters
-
-    def _parameters(self) -> None:
-        routine, entry = self.routine, self.routine in self.program.entries.values()
-        used = [routine.parameters[i] for i in sorted(routine.used)]
-        derive = self.program.entries.get("derive") is routine
-        for argument, value in self.arguments.items():
-            mine = [p for p in used if place(p.static)[0] == argument]
-            struct = self.program.struct_of(value)
-            derived = self.program.derived_of(value)
-            if struct is not None or (derived is not None and isinstance(value, dict)):
-                plain = [p for p in mine if struct is not None and not place(p.static)[2]]
-                if struct is not None and (plain or entry):
-                    self._object(struct, "self", plain)
-                rest = [p for p in mine if p not in plain]
-                if derived is not None and (rest or (entry and not derive)):
-                    self._object(derived, "derived", rest)
-                continue
-            for parameter in (p for p in routine.parameters if place(p.static)[0] == argument):
-                if parameter in mine or entry:
-                    name = self.fresh(flat(parameter.static))
-                    self.parameter_names[parameter.order] = name
-                    self.heads.append((self.dialect.type(parameter.type), name))
-
-    def _object(self, struct: Struct, name: str, parameters: list[Value]) -> None:
-        name = self.fresh(name) if struct.record.name not in self.objects else self.objects[struct.record.name][1]
-        if struct.record.name not in self.objects:
-            self.objects[struct.record.name] = (struct, name)
-            self.heads.append((self.writer.note(struct.record), name))
-        for parameter in parameters:
-            field = flat(place(parameter.static)[1])
-            self.parameter_names[parameter.order] = f"{name}.{self.dialect.word(field)}"
-
-    def fresh(self, name: str) -> str:
-        """A name that is free in this function."""
-        base = self.dialect.word(name)
-        found, count = base, 1
-        while found in self.taken or found in self.dialect.reserved:
-            count += 1
-            found = f"{base}{count}" if not base[-1].isdigit() else f"{base}_{count}"
-        self.taken.add(found)
-        return found
-
-    # ------------------------------------------------------------------ text
-
-    def text(self) -> list[str]:
-        routine = self.routine
-        values = routine.values()
-        self._plan(values)
-        statements = [value for value in values if value.order in self.named]
-        last_use = self._last_uses(statements)
-        for index, value in enumerate(statements):
-            self._define(value, index, last_use)
-        body = self._result()
-        head = self.dialect.signature(self.writer.note(routine.type), self.writer.names[routine], self.heads)
-        return [*comment(routine.doc), *wrap(head, ""), *self.lines, *body, "}"]
-
-    def _result(self) -> list[str]:
-        routine = self.routine
-        if routine.single:
-            return wrap(f"return {self.whole(routine.results[0][1])};", INDENT)
-        record = routine.record
-        assert record is not None
-        values = [value for _, value in routine.results]
-        called = self._forwarded()
-        if called is not None:
-            return wrap(f"return {self.whole(called)};", INDENT)
-        parts = [self.splat(value, type_) for value, (_, type_) in zip(values, record.fields, strict=True)]
-        name = self.writer.note(record)
-        if self.dialect.struct_literal:
-            return wrap(f"return {name}({', '.join(parts)});", INDENT)
-        result = self.fresh("result")
-        lines = wrap(f"{name} {result} = {{ {', '.join(parts)} }};", INDENT)
-        return [*lines, f"{INDENT}return {result};"]
-
-    def _forwarded(self) -> Value | None:
-        """The call whose several results are returned as they stand, if there is one."""
-        values = [value for _, value in self.routine.results]
-        if self.routine.single or values[0].op != "element":
-            return None
-        called = values[0].args[0]
-        same = all(v.op == "element" and v.args[0] is called and v.static == i for i, v in enumerate(values))
-        return called if same else None
-
-    def _plan(self, values: list[Value]) -> None:
-        """Which values get a line and a name."""
-        uses: dict[int, int] = {}
-        for value in values:
-            for argument in needed(value):
-                uses[argument.order] = uses.get(argument.order, 0) + 1
-        for _, result in self.routine.results:
-            uses[result.order] = uses.get(result.order, 0) + 1
-        results = {v.order for _, v in self.routine.results}
-        self.named: set[int] = set()
-        self.uses = uses
-        sizes: dict[int, int] = {}
-        for value in values:
-            sizes[value.order] = _size(value, sizes)
-            if value.op in ("parameter", "constant", "component", "element"):
-                if value.op == "component" and value.args[0].op in (
-                    "call",
-                    "where",
-                    "add",
-                    "sub",
-                    "mul",
-                    "div",
-                    "texel",
-                ):
-                    self.named.add(value.args[0].order)
-                if value.op == "element":
-                    self.named.add(value.args[0].order)
-                continue
-            several = uses[value.order] > 1
-            cheap = sizes[value.order] <= 1 and value.op not in ("call", "texel", "div", "sqrt", "vector", "dot")
-            author = bool(value.name) and value.order not in results and sizes[value.order] >= 2
-            if (
-                (several and not (cheap and not value.name))
-                or author
-                or (several and value.op in ("mul", "div", "sqrt"))
-            ):
-                self.named.add(value.order)
-        if len(results) == 1 and self.routine.single:
-            order = self.routine.results[0][1].order
-            if uses[order] == 1:
-                self.named.discard(order)
-        called = self._forwarded()
-        if called is not None and uses[called.order] == len(self.routine.results):
-            self.named.discard(called.order)
-
-    def _last_uses(self, statements: list[Value]) -> dict[int, int]:
-        """By named value: the last statement that reads it; the result comes after all."""
-        last: dict[int, int] = {}
-        roots = [(index, needed(value)) for index, value in enumerate(statements)]
-        roots.append((len(statements), [value for _, value in self.routine.results]))
-        for index, pending in roots:
-            pending, seen = list(pending), set()
-            while pending:
-                value = pending.pop()
-                if value.order in seen:
-                    continue
-                seen.add(value.order)
-                if value.order in self.named:
-                    last[value.order] = index
-                else:
-                    pending.extend(needed(value))
-        return last
-
-    def _define(self, value: Value, index: int, last_use: dict[int, int]) -> None:
-        text = self.whole(value)
-        type_ = self.writer.note(value.type)
-        wanted = self.dialect.word(self._name_for(value))
-        holder = self.holders.get(wanted)
-        if value.name and holder is not None and holder.type == value.type and last_use[holder.order] <= index:
-            # Python gave the name anew when the old value had served: so does the shader
-            line = self.first_lines[wanted]
-            self.lines[line] = self.lines[line].replace("let ", "var ", 1)
-            self.lines += wrap(f"{wanted} = {text};", INDENT)
-            name = wanted
-        else:
-            name = self.fresh(self._name_for(value))
-            self.first_lines[name] = len(self.lines)
-            self.lines += wrap(self.dialect.local(type_, name, text), INDENT)
-        self.holders[name] = value
-        self.locals[value.order] = name
-
-    def _name_for(self, value: Value) -> str:
-        if value.op == "call" and isinstance(value.type, Routine):
-            for other in self.routine.values():
-                if other.op == "element" and other.args[0] is value and "." in other.name:
-                    return other.name.rpartition(".")[0].rpartition(".")[2]
-            return {"sample": "sampled"}.get(stem_of(value.static).rpartition("_")[2], "found")
-        if value.name:
-            parts = value.name.split(".")
-            places = [part for part in parts if part.isdigit()]
-            return "_".join([next(part for part in reversed(parts) if not part.isdigit()), *places])
-        if value.op == "call" and stem_of(value.static) != "sqr":
-            return stem_of(value.static).rpartition("_")[2].lower()
-        if value.type == "bool":
-            return "holds"
-        if value.op == "call" or (value.op == "mul" and value.args[0] is value.args[1]):
-            inner = self.expression(value.args[0])[0]
-            return "square" if not inner.replace(".", "").replace("_", "").isalnum() else inner.replace(".", "_") + "2"
-        return {
-            "sqrt": "root",
-            "dot": "cosine",
-            "div": "ratio",
-            "where": "chosen",
-            "texel": "texel",
-            "exp": "power",
-        }.get(value.op, {"add": "sum", "sub": "difference", "mul": "product"}.get(value.op, "value"))
-
-    # ------------------------------------------------------------------ expressions
-
-    def whole(self, value: Value) -> str:
-        """The text of a statement's value."""
-        return self.expression(value, root=True)[0]
-
-    def part(self, value: Value, level: int, strict: bool = False) -> str:
-        """An argument, in parentheses where it binds looser than `level`."""
-        text, mine = self.expression(value)
-        return f"({text})" if mine < level or (strict and mine == level) else text
-
-    def expression(self, value: Value, root: bool = False) -> tuple[str, int]:
-        """(text, precedence)."""
-        if not root and value.order in self.locals:
-            return self.locals[value.order], ATOM
-        text, level = self.compose(value)
-        if not root and len(text) > INLINE and value.op not in ("parameter", "constant", "component", "element"):
-            name = self.fresh(self._name_for(value))
-            self.lines += wrap(self.dialect.local(self.writer.note(value.type), name, text), INDENT)
-            self.locals[value.order] = name
-            return name, ATOM
-        return text, level
-
-    def compose(self, value: Value) -> tuple[str, int]:
-        op, args = value.op, value.args
-        if op == "parameter":
-            return self.parameter_names[value.order], ATOM
-        if op == "constant":
-            return self.constant(value)
-        if op == "component":
-            return f"{self.part(args[0], ATOM)}.{'xyzw'[value.static]}", ATOM
-        if op == "element":
-            field = value.args[0].static.record.fields[value.static][0]
-            return f"{self.part(args[0], ATOM)}.{self.dialect.word(field)}", ATOM
-        if op == "splat":
-            return self.splat(args[0], value.type), SIGN
-        if op == "vector":
-            parts = [self.whole_or_local(a) for a in args]
-            return f"{self.dialect.type(value.type)}({', '.join(parts)})", ATOM
-        if op == "call" and stem_of(value.static) in NATIVE:
-            kind = value.type if self.dialect.splat else "float"
-            return f"{self.writer.names[value.static]}({', '.join(self.splat(a, kind) for a in args)})", ATOM
-        if op == "call":
-            return f"{self.writer.names[value.static]}({', '.join(self.call_arguments(value))})", ATOM
-        if op == "texel":
-            return self.texel(value), ATOM
-        if op == "neg":
-            return f"-{self.part(args[0], SIGN, strict=True)}", SIGN
-        if op == "where":
-            return self.choice(value)
-        if op == "not" and value.type == "bool":
-            return f"!{self.part(args[0], SIGN)}", SIGN
-        wide = value.type.startswith("bvec")
-        if op in OPERATORS and not (wide and op in self.dialect.compare):
-            return self.infix(value)
-        template = self.dialect.compare[op] if wide else self.dialect.words[op]
-        spread = self.dialect.splat and (wide or op in ("minimum", "maximum"))
-        kind = max((a.type for a in args), key=lambda t: t.startswith("vec"))
-        parts = [self.splat(a, kind) if spread else self.whole_or_local(a) for a in args]
-        return template.format(*parts), ATOM
-
-    def whole_or_local(self, value: Value) -> str:
-        return self.expression(value)[0]
-
-    def infix(self, value: Value) -> tuple[str, int]:
-        symbol, level = OPERATORS[value.op]
-        a, b = value.args
-        # the order of evaluation is the source's: a + (b + c) keeps its parentheses
-        strict = value.op not in ("and", "or")
-        left, right = self.part(a, level), self.part(b, level, strict)
-        if level in (AND, OR):  # nobody should have to know which of && and || binds tighter
-            left, right = (
-                f"({text})"
-                if other.op in ("and", "or") and other.op != value.op and other.order not in self.locals
-                else text
-                for text, other in ((self.expression(a)[0], a), (self.expression(b)[0], b))
-            )
-            left, right = (
-                f"({text})" if other.op == "where" and other.order not in self.locals else text
-                for text, other in ((left, a), (right, b))
-            )
-        if value.type.startswith("bvec"):
-            left, right = self.splat(a, "vec" + value.type[-1]), self.splat(b, "vec" + value.type[-1])
-        if value.op in ("lt", "le") and self.dialect.name == "wgsl":  # or `a < b, c > d` is read as a template
-            return f"({left} {symbol} {right})", ATOM
-        return f"{left} {symbol} {right}", level
-
-    def choice(self, value: Value) -> tuple[str, int]:
-        mask, a, b = value.args
-        vector = mask.type.startswith("bvec")
-        template = self.dialect.choice[vector]
-        infix = "?" in template
-        parts = [self.part(mask, OR) if infix else self.whole_or_local(mask)]
-        parts += [self.splat(x, value.type, CHOICE + 1 if infix else CHOICE) for x in (a, b)]
-        return template.format(*parts), CHOICE if infix else ATOM
-
-    def splat(self, value: Value, type_: str, level: int = CHOICE) -> str:
-        """The text of a value, spread over a vector where it is a float and a vector is wanted."""
-        if value.type == type_ or value.type not in ("float",) or not type_.startswith("vec"):
-            return self.part(value, level)
-        if value.op == "constant":
-            return self.spread(type_, self.constant(value))
-        return self.spread(type_, self.expression(value))
-
-    def spread(self, type_: str, text: tuple[str, int]) -> str:
-        """A float spread over a vector."""
-        inside = text[0] if "({1})" in self.dialect.spread or text[1] == ATOM else f"({text[0]})"
-        return self.dialect.spread.format(self.dialect.type(type_), inside)
-
-    def constant(self, value: Value) -> tuple[str, int]:
-        if value.type in ("bool",) or value.type.startswith("bvec"):
-            text = "true" if value.static else "false"
-            return (text if value.type == "bool" else f"{self.dialect.type(value.type)}({text})"), ATOM
-        text = self.writer.number(value)
-        if value.type != "float":
-            return self.spread(value.type, (text, SIGN if text.startswith("-") else ATOM)), SIGN
-        return text, SIGN if text.startswith("-") else ATOM
-
-    def texel(self, value: Value) -> str:
-        table, group = value.static
-        arguments = [self.whole_or_local(a) for a in value.args]
-        if table.channels > 4:
-            arguments.append(str(group))
-        return f"lookup_{table.name}({', '.join(arguments)})"
-
-    # ------------------------------------------------------------------ calls
-
-    def call_arguments(self, value: Value) -> list[str]:
-        callee: Routine = value.static
-        recorded = self.program.recorded[callee]
-        entry = callee in self.program.entries.values()
-        texts: list[str] = []
-        given: set[str] = set()
-        for argument, object_ in recorded.arguments.items():
-            places = [i for i, p in enumerate(callee.parameters) if place(p.static)[0] == argument]
-            struct, derived = self.program.struct_of(object_), self.program.derived_of(object_)
-            if struct is not None or (derived is not None and isinstance(object_, dict)):
-                for wanted, below in ((struct, False), (derived, True)):
-                    if wanted is None:
-                        continue
-                    fields = {
-                        flat(place(callee.parameters[i].static)[1]): (value.args[i], i in callee.used)
-                        for i in places
-                        if (place(callee.parameters[i].static)[2] or isinstance(object_, dict)) == below
-                    }
-                    if entry or any(used for _, used in fields.values()):
-                        if wanted.record.name not in given:
-                            texts.append(self.object(wanted, fields))
-                        given.add(wanted.record.name)
-                continue
-            texts += [self.whole_or_local(value.args[i]) for i in places if i in callee.used or entry]
-        return texts
-
-    def object(self, struct: Struct, fields: dict[str, tuple[Value, bool]]) -> str:
-        """A struct as an argument: this function's own, where it holds just these fields, or a new one."""
-        name = struct.record.name
-        if name in self.objects:
-            own = self.objects[name][1]
-            if all(
-                self.parameter_names.get(v.order) == f"{own}.{self.dialect.word(field)}"
-                for field, (v, used) in fields.items()
-                if used
-            ):
-                return own
-        parts = []
-        for field, type_ in struct.record.fields:
-            given, used = fields.get(field, (None, False))
-            if given is not None and given.op == "parameter" and given.order not in self.parameter_names:
-                self._late(given)
-            if given is not None and (used or given.order in self.parameter_names):
-                parts.append(self.splat(given, type_))
-            else:  # nobody reads it
-                parts.append("0.0" if type_ == "float" else self.spread(type_, ("0.0", ATOM)))
-        key = (name, tuple(parts))
-        if key not in self.built:
-            local = self.fresh(common_head(parts) or name[0].lower() + name[1:])
-            type_name = self.writer.note(struct.record)
-            if self.dialect.struct_literal:
-                line = self.dialect.local(type_name, local, f"{type_name}({', '.join(parts)})")
-            else:
-                line = f"{type_name} {local} = {{ {', '.join(parts)} }};"
-            self.lines += wrap(line, INDENT)
-            self.built[key] = local
-        return self.built[key]
-
-    def _late(self, parameter: Value) -> None:
-        """A field of this function's own structs that only a struct passed on has."""
-        root, path, derived = place(parameter.static)
-        value = self.arguments.get(root)
-        struct = self.program.derived_of(value) if derived or isinstance(value, dict) else self.program.struct_of(value)
-        if struct is not None and struct.record.name in self.objects and path in struct.paths:
-            own = self.objects[struct.record.name][1]
-            self.parameter_names[parameter.order] = f"{own}.{self.dialect.word(flat(path))}"
-
-
-def stem_of(routine: Routine) -> str:
-    """A routine's name without the number that tells copies apart."""
-    stem, _, count = routine.name.rpartition("_")
-    return stem if stem and count.isdigit() else routine.name
-
-
-def _size(value: Value, sizes: dict[int, int]) -> int:
-    """Operations in an expression, as a reader counts them."""
-    if value.op in ("parameter", "constant"):
-        return 0
-    below = sum(sizes.get(a.order, 0) for a in needed(value))
-    return below + (0 if value.op in ("component", "element") else 1)

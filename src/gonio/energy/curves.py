@@ -320,7 +320,8 @@ def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.n
 
 def coefficients(ndf: str, masking: str, alpha: Any) -> tuple[Any, ...]:
     """c_0 to c_10 and M_avg, at an isotropic width."""
-    return ops.lookup(isotropic(ndf, masking), ops.inset(sqrt(alpha), ROWS))
+    row = ops.inset(sqrt(alpha), ROWS)
+    return ops.lookup(isotropic(ndf, masking), row)
 
 
 def turn(found: tuple[Any, ...], along: Any, across: Any) -> tuple[Any, ...]:

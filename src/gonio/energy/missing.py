@@ -163,8 +163,9 @@ class Metal:
         base = material.base
         (mu2,) = lookup(curves.lobe(base.ndf, base.masking), found["row"], inset(u.y, curves.LOBE_NODES))
         mu2 = clamp(mu2, 1e-12, 1.0)
-        sin, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * ops.pi) * u.z)
-        return vec3(sin * c, sin * s, sqrt(mu2))
+        phi = (2.0 * ops.pi) * u.z
+        sin_theta, (s, c) = sqrt(1.0 - mu2), sincos(phi)
+        return vec3(sin_theta * c, sin_theta * s, sqrt(mu2))
 
     @staticmethod
     def eta(material: Any, wo: Any, wi: Any) -> Any:
@@ -182,7 +183,7 @@ class Azimuth(NamedTuple):
 
 @function
 def _azimuth(w: Any, alpha: Any) -> Azimuth:
-    """(1 + y) / 2, (1 - y) / 2 and alpha_phi of `curves.anisotropic`; at the normal itself any azimuth will do."""
+    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi seen along w; at the normal itself any azimuth will do."""
     sin2 = maximum(frame.sin2(w), 1e-12)
     along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
     seen = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, sqr(microfacet.SMOOTH)))
@@ -300,7 +301,8 @@ class Glass:
         thin = Glass._thin(material, wo)
         value = Glass.missing(material, found, wo, thin) * Glass.pdf(material, found, wo, wi)
         if mode == "radiance":
-            value = value * where(wo.z * wi.z > 0.0, 1.0, 1.0 / sqr(Glass.eta(material, wo, wi)))
+            reflects = wo.z * wi.z > 0.0
+            value = value * where(reflects, 1.0, 1.0 / sqr(Glass.eta(material, wo, wi)))
         return found["added"] * value
 
     @staticmethod
@@ -333,9 +335,10 @@ class Glass:
         at = inset(u.y, tables["thin"].shape[-1])
         (of_thin,), (of_dense,) = (lookup(tables[side], *found["place"], at) for side in curves.SIDES)
         mu2 = clamp(where(either(thin, passes), of_thin, of_dense), 1e-12, 1.0)
-        sin, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * ops.pi) * u.z)
+        phi = (2.0 * ops.pi) * u.z
+        sin_theta, (s, c) = sqrt(1.0 - mu2), sincos(phi)
         z = copysign(sqrt(mu2), wo.z)
-        return vec3(sin * c, sin * s, where(passes, -z, z))
+        return vec3(sin_theta * c, sin_theta * s, where(passes, -z, z))
 
     @staticmethod
     def eta(material: Any, wo: Any, wi: Any) -> Any:

@@ -39,7 +39,7 @@ CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have th
 
 
 class Sample(NamedTuple):
-    """What `sample` returns, one entry a ray.
+    """What `sample` returns: a direction and what it carries.
 
     wi      direction chosen, unit
     weight  eval / pdf; of a delta lobe, its reflectance over its probability; 0 where sampling failed
@@ -249,7 +249,7 @@ class BSDF:
     def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
         """Choose wi for wo.
 
-        u  (N, 3) in [0, 1): the first picks the lobe, the others the direction
+        u  three numbers in [0, 1) a ray, (N, 3): the first picks the lobe, the others the direction
         Here: cosine sampling on wo's side.
         """
         local = warp.square_to_cosine_hemisphere(u.y, u.z)

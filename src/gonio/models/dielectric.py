@@ -167,7 +167,8 @@ class Dielectric(BSDF):
         reflects = u.x < share
         wi = where(reflects, frame.reflect(turned, facing), frame.refract(turned, facing, cos_t, eta))
         wi = frame.rotate_back(wi, self.rotation)
-        right_side = where(reflects, wo.z * wi.z > 0.0, wo.z * wi.z < 0.0)
+        sides = wo.z * wi.z
+        right_side = where(reflects, sides > 0.0, sides < 0.0)
         # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         facet = self._facet(wo, wi, eta)
         squeeze = self._squeeze(reflects, eta)

@@ -135,11 +135,11 @@ class Phong(_Empirical):
 @function
 def _around(axis: Any, w: Any) -> Any:
     """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
-    sign = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
-    a = -1.0 / (sign + axis.z)
+    side = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
+    a = -1.0 / (side + axis.z)
     b = axis.x * axis.y * a
-    s = vec3(1.0 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x)
-    t = vec3(b, sign + axis.y * axis.y * a, -axis.y)
+    s = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x)
+    t = vec3(b, side + axis.y * axis.y * a, -axis.y)
     return s * w.x + t * w.y + axis * w.z
 
 

@@ -37,8 +37,8 @@ def upright(like: Any) -> Any:
 
 @function
 def rotate(w: Any, rotation: Any) -> Any:
-    """w in a frame that is turned about z by an angle given as the vector (cos, sin); None is no rotation at all."""
-    if rotation is None:
+    """w in a frame that is turned about z by an angle given as the vector (cos, sin)."""
+    if rotation is None:  # known before anything runs: no rotation at all
         return w
     return vec3(rotation.x * w.x + rotation.y * w.y, rotation.x * w.y - rotation.y * w.x, w.z)
 

@@ -39,9 +39,9 @@ def dielectric(cos_i: Any, cos_t: Any, eta: Any) -> Any:
     under_s, under_p = cos_i + q, fma(eta2, cos_i, q)
     # one division for both; with cos_t over 1e-15 the product stays far above float32's smallest number
     over = 1.0 / (under_s * under_p)
-    step = (eta - 1.0) * (eta + 1.0)
-    r_s = step * sqr(under_p * over)
-    r_p = step * fma(eta2 + 1.0, sqr(cos_i), -1.0) * sqr(under_s * over)
+    contrast = (eta - 1.0) * (eta + 1.0)
+    r_s = contrast * sqr(under_p * over)
+    r_p = contrast * fma(eta2 + 1.0, sqr(cos_i), -1.0) * sqr(under_s * over)
     return ops.where(cos_t > 1e-15, 0.5 * fma(r_s, r_s, sqr(r_p)), 1.0)
 
 

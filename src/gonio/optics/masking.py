@@ -36,7 +36,7 @@ def schlick_g1(v: Any, k: Any) -> Any:
 
 @function
 def masking_shadowing(kind: str, ndf: NDF, wo: Any, wi: Any, m: Any, alpha: Any, transmits: bool = False) -> Any:
-    """G of one of `KINDS`; 0 where wo or wi sees the facet from its back.
+    """Masking and shadowing G, by name; 0 where wo or wi sees the facet from its back.
 
     m          the facet's normal, m.z > 0
     transmits  wi lies on the other side of the surface than wo

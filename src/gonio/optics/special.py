@@ -42,7 +42,8 @@ def power_of_cosine(cos_theta: Any, sin2: Any, p: Any) -> Any:
     t = minimum(sin2, 0.1)
     z = t / (t - 2.0)
     z2 = sqr(z)
-    series = 1.0 + z2 * (1 / 3 + z2 * (1 / 5 + z2 * (1 / 7 + z2 * (1 / 9 + z2 * (1 / 11 + z2 * (1 / 13))))))
+    tail = 1 / 7 + z2 * (1 / 9 + z2 * (1 / 11 + z2 * (1 / 13)))
+    series = 1.0 + z2 * (1 / 3 + z2 * (1 / 5 + z2 * tail))
     return where((sin2 < 0.1) & (cos_theta > 0.0), exp(p * z * series), ops.pow(cos_theta, p))
 
 
@@ -65,7 +66,8 @@ def _stirling(x: Any) -> Any:
     """The series of log Gamma beyond its leading terms; the next term is under 2e-9 at x = 4."""
     r = 1.0 / x
     r2 = sqr(r)
-    return r * (1 / 12 - r2 * (1 / 360 - r2 * (1 / 1260 - r2 * (1 / 1680 - r2 * (1 / 1188)))))
+    series = 1 / 12 - r2 * (1 / 360 - r2 * (1 / 1260 - r2 * (1 / 1680 - r2 * (1 / 1188))))
+    return r * series
 
 
 @function

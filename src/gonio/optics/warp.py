@@ -12,7 +12,8 @@ from ..ops import function, safe_sqrt, sincos, vec3
 def square_to_cosine_hemisphere(u1: Any, u2: Any) -> Any:
     """A direction with density cos(theta) / pi about +z; Malley's method (PBRT4)."""
     r = ops.sqrt(u1)
-    s, c = sincos((2.0 * ops.pi) * u2)
+    phi = (2.0 * ops.pi) * u2
+    s, c = sincos(phi)
     return vec3(r * c, r * s, safe_sqrt(1.0 - u1))
 
 
@@ -26,7 +27,8 @@ def square_to_power_lobe(u1: Any, u2: Any, p: Any) -> Any:
     """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994)."""
     cos_theta = ops.pow(1.0 - u1, 1.0 / (p + 1.0))
     sin_theta = safe_sqrt(1.0 - cos_theta * cos_theta)
-    s, c = sincos((2.0 * ops.pi) * u2)
+    phi = (2.0 * ops.pi) * u2
+    s, c = sincos(phi)
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
 
 

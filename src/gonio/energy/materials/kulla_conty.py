@@ -30,7 +30,7 @@ class KullaConty(_Added):
     Any other base that only reflects, by a finite isotropic lobe, is measured once (`gonio.energy.measured`): E is its
     albedo with F = 1 and every declared share 1, F_avg the ratio of its own to that. Lambert misses nothing; Oren-Nayar
     the interreflections; a material without a declared share (Phong) whatever its brightest channel does not return.
-    What a base gains stays its own. Its values must not vary over the surface, and it cannot be recorded.
+    What a base gains stays its own. Its values must not vary over the surface, and it has no shader code.
 
     Of masking schlick-direct, G does not tend to 1 as alpha -> 0 (E_avg = .835 at roughness .05): compensation then
     lays a false bright rim on smooth surfaces.

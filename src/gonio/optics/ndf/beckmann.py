@@ -101,7 +101,8 @@ class Beckmann(NDF):
     def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
         """A normal with density D(m) m.z: Gaussian slopes by Box-Muller (Walter2007, eq. 28)."""
         r = safe_sqrt(-log(1.0 - u1))
-        s, c = sincos((2.0 * ops.pi) * u2)
+        phi = (2.0 * ops.pi) * u2
+        s, c = sincos(phi)
         return normalize(vec3(r * c * alpha.x, r * s * alpha.y, 1.0 + 0.0 * r))
 
     @function

@@ -69,7 +69,8 @@ class GGX(NDF):
     def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
         """A normal with density D(m) m.z: a disk's slopes, stretched (Walter2007, eq. 35)."""
         r = sqrt(u1 / (1.0 - u1))
-        s, c = sincos((2.0 * ops.pi) * u2)
+        phi = (2.0 * ops.pi) * u2
+        s, c = sincos(phi)
         return normalize(vec3(r * c * alpha.x, r * s * alpha.y, 1.0 + 0.0 * r))
 
     @function
@@ -80,9 +81,11 @@ class GGX(NDF):
 
     def _from_cap(self, stretched: Any, depth: Any, u1: Any, u2: Any, alpha: Any) -> Any:
         # the cap reaches down to z = -depth; heights are counted from there, so that nothing cancels at its rim
-        lift = (1.0 - u2) * (1.0 + depth)
-        r = safe_sqrt((1.0 + depth - lift) * (1.0 - depth + lift))
-        s, c = sincos((2.0 * ops.pi) * u1)
+        height = 1.0 + depth
+        lift = (1.0 - u2) * height
+        r = safe_sqrt((height - lift) * (1.0 - depth + lift))
+        phi = (2.0 * ops.pi) * u1
+        s, c = sincos(phi)
         h = vec3(r * c + stretched.x, r * s + stretched.y, lift + (stretched.z - depth))
         # grazing view and the lowest point of the cap add up to zero length; any facet upright then
         return normalize(vec3(alpha.x * h.x, alpha.y * h.y, maximum(h.z, 1e-12)))
@@ -103,11 +106,11 @@ class GGX(NDF):
     def bounded_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
         """Density of `sample_bounded` over |v.m|: 2 D / (k |v.z| + sqrt(v.z^2 + slant^2)) (Eto2023)."""
         z = abs(v.z)
-        length = sqrt(fma(z, z, slant2(v, alpha)))
-        return 2.0 * self.D(m, alpha) / maximum(self._bound(v, alpha) * z + length, 1e-30)
+        root = sqrt(fma(z, z, slant2(v, alpha)))
+        return 2.0 * self.D(m, alpha) / maximum(self._bound(v, alpha) * z + root, 1e-30)
 
     def _bound(self, v: Any, alpha: Any) -> Any:
         """k: how far the cap reaches down, as a share of the full depth (Eto2023)."""
         a2 = sqr(clamp(minimum(alpha.x, alpha.y), 0.0, 1.0))
-        s2 = sqr(1.0 + sqrt(sin2(v)))
-        return (1.0 - a2) * s2 / (s2 + a2 * sqr(v.z))
+        reach2 = sqr(1.0 + sqrt(sin2(v)))
+        return (1.0 - a2) * reach2 / (reach2 + a2 * sqr(v.z))

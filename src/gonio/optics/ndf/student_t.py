@@ -43,5 +43,6 @@ class StudentT(NDF):
     def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
         """A normal with density D(m) m.z: tan^2 = 2 alpha^2 ((1 - u)^(-1/2) - 1)."""
         r = sqrt(2.0 * (1.0 / sqrt(1.0 - u1) - 1.0))
-        s, c = sincos((2.0 * ops.pi) * u2)
+        phi = (2.0 * ops.pi) * u2
+        s, c = sincos(phi)
         return normalize(vec3(r * c * alpha.x, r * s * alpha.y, 1.0 + 0.0 * r))

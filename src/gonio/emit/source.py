@@ -1,0 +1,80 @@
+"""What the Python source says of a value beyond the recording: the names of constants and of small helpers."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import linecache
+import sys
+from pathlib import Path
+from typing import Any
+
+
+@functools.cache
+def module_constant(number: float, source: str) -> tuple[str, str]:
+    """(name, what is said of it) of a constant of a module, where the line of the source uses it; else ("", "")."""
+    path, _, line = source.rpartition(":")
+    text = linecache.getline(path, int(line or 0))
+    words = {word for word in "".join(c if c.isalnum() or c == "_" else " " for c in text).split() if word.isupper()}
+    for name in words if number not in (0.0, 1.0) else ():
+        for module in sorted(sys.modules.values(), key=lambda m: getattr(m, "__file__", None) != path):  # its own first
+            place = getattr(module, "__file__", None) or ""
+            if place.startswith(_PACKAGE) and type(vars(module).get(name)) is float and vars(module)[name] == number:
+                about = _said_of(place, name)
+                if about is not None:
+                    return name.strip("_"), about
+    return "", ""
+
+
+_PACKAGE = str(Path(__file__).parent.parent)
+
+
+def _said_of(path: str, name: str) -> str | None:
+    """The comment on a constant where it is defined, above it or after it; None where it is only imported."""
+    lines = linecache.getlines(path)
+    for index, line in enumerate(lines):
+        if line.startswith(f"{name} ="):
+            after = line.partition("#")[2].strip()
+            above: list[str] = []
+            while not after and index > 0 and lines[index - 1].startswith("#"):
+                index -= 1
+                above.insert(0, lines[index].lstrip("# ").rstrip())
+            return after or " ".join(above)
+    return None
+
+
+def returned_by(op: str, source: str, own: str) -> str:
+    """The name of the plain function whose result a value is, recorded as part of another; "" for any other value.
+
+    source  the line that wrote it, "file:line";  own  that of the function whose part it became
+    """
+    path, _, line = source.rpartition(":")
+    for function, statement in _returns(path) if path.startswith(_PACKAGE) else ():
+        if statement.lineno <= int(line) <= (statement.end_lineno or 0) and _makes(statement.value, op):
+            first = min([function.lineno, *(d.lineno for d in function.decorator_list)])
+            return "" if own == f"{path}:{first}" else function.name.strip("_")
+    return ""
+
+
+@functools.cache
+def _returns(path: str) -> list[tuple[ast.FunctionDef, ast.Return]]:
+    tree = ast.parse("".join(linecache.getlines(path)))
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return [(f, node) for f in functions for node in ast.walk(f) if isinstance(node, ast.Return)]
+
+
+_OPERATORS: dict[type, str] = {
+    ast.BitAnd: "and",
+    ast.BitOr: "or",
+    ast.Add: "add",
+    ast.Sub: "sub",
+    ast.Mult: "mul",
+    ast.Div: "div",
+}
+
+
+def _makes(expression: Any, op: str) -> bool:
+    """Whether the outermost step of an expression is an operation."""
+    if isinstance(expression, ast.BinOp):
+        return _OPERATORS.get(type(expression.op)) == op
+    return isinstance(expression, ast.Call) and isinstance(expression.func, ast.Name) and expression.func.id == op
