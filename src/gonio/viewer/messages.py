@@ -155,7 +155,7 @@ def parse(text: str) -> Scene | Ack | Upload | Wish:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = "/".join(str(part) for part in first["loc"])
-        raise InputError(first["msg"], place or "message", "see docs/viewer.md") from None
+        raise InputError(_short(first["msg"]), _short(place) or "message", "see docs/viewer.md") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"no message: {error}", "message", "see docs/viewer.md") from None
     if isinstance(message, Scene):
@@ -164,6 +164,11 @@ def parse(text: str) -> Scene | Ack | Upload | Wish:
         what = f"a picture of {message.size >> 20} MiB"
         raise InputError(what, "upload", f"send at most {UPLOAD_BYTES >> 20} MiB; scale it down")
     return message
+
+
+def _short(text: str, most: int = 200) -> str:
+    """What was wrong may be as long as the message."""
+    return text if len(text) <= most else text[: most - 4] + " ..."
 
 
 def _check(scene: Scene) -> None:

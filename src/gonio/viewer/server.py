@@ -15,13 +15,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import ipaddress
 import re
 import secrets
 import signal
 import socket
 import sys
+import threading
 import webbrowser
+from collections.abc import Iterator
 from typing import Any
 from urllib.parse import parse_qs
 
@@ -44,10 +47,16 @@ from .stage import Stage
 LOOPBACK = "127.0.0.1"
 MOST_SESSIONS = 8  # each holds a scene and a picture in memory
 MOST_CONNECTIONS = 200  # that have not asked for anything yet
-REQUEST_SECONDS = 10.0  # for a request's headers to arrive, and for a session's first message
-STALL_SECONDS = 600.0  # for a frame to be taken: a page in a hidden tab draws nothing, and need not come back for it
+REQUEST_SECONDS = 10.0  # for a request's headers to arrive
+MOST_ANSWERS, ANSWER_SECONDS = 32, 120.0  # pages that are on their way at once, and how long: 9 kB/s
+# For a frame to be taken: a page in a hidden tab draws nothing, and need not come back for it. And for a first wish: a
+# page that shows what the reference cannot, one term alone, wants nothing of it.
+STALL_SECONDS = 600.0
 PATIENCE_SECONDS = 5.0  # the same where another page wants the place
 CLOSE_SECONDS = 2.0  # for the last words to go out
+READ_BYTES = 16 << 10  # of a socket at once
+MOST_FRAGMENTS = 1 << 14  # of one message: 4 KiB each in the largest upload; browsers send far longer ones
+MOST_CONTROLS = 10_000  # pings and pongs of a connection: one in 20 s for two days
 FULL, TOO_LARGE, REFUSED, LATE = 1013, 1009, 1008, 1008  # WebSocket close codes
 
 HEADERS = {
@@ -141,7 +150,7 @@ class Application:
         session = Session(websocket, self.renderer)
         self.sessions.append(session)
         try:
-            await session.run(REQUEST_SECONDS, STALL_SECONDS)
+            await session.run(STALL_SECONDS)
         finally:
             if session in self.sessions:
                 self.sessions.remove(session)
@@ -164,37 +173,95 @@ async def _nothing_here(request: Request, error: Exception) -> Response:
 
 
 class _Guarded(H11Protocol):
-    """HTTP that ends a connection whose request does not come, and the oldest such where there are too many."""
+    """HTTP that ends a connection whose request does not come, or whose answer is not taken.
 
-    waiting: dict[_Guarded, asyncio.TimerHandle]  # set by `serve`, one dictionary a server
+    Where there are too many of one kind, the oldest of it is ended.
+    """
+
+    waiting: dict[_Guarded, asyncio.TimerHandle]  # for requests; these two are set by `Server`, one pair a server
+    answering: dict[_Guarded, asyncio.TimerHandle]
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
-        self.waiting[self] = self.loop.call_later(REQUEST_SECONDS, self._give_up)
-        if len(self.waiting) > MOST_CONNECTIONS:
-            next(iter(self.waiting))._give_up()
+        self._watch(self.waiting, MOST_CONNECTIONS, REQUEST_SECONDS)
 
     def handle_events(self) -> None:
         super().handle_events()
-        if self.cycle is not None or self.transport.get_protocol() is not self:
-            self._came()
+        if self.transport.get_protocol() is not self:  # a WebSocket now
+            self._rest()
+        elif self.cycle is not None and self not in self.answering:
+            self._rest()
+            self._watch(self.answering, MOST_ANSWERS, ANSWER_SECONDS)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._came()
+        self._rest()
         super().connection_lost(exc)
 
-    def _came(self) -> None:
-        timer = self.waiting.pop(self, None)
-        if timer is not None:
-            timer.cancel()
+    def _watch(self, kind: dict[_Guarded, asyncio.TimerHandle], most: int, seconds: float) -> None:
+        kind[self] = self.loop.call_later(seconds, self._give_up)
+        if len(kind) > most:
+            next(iter(kind))._give_up()
+
+    def _rest(self) -> None:
+        for kind in (self.waiting, self.answering):
+            timer = kind.pop(self, None)
+            if timer is not None:
+                timer.cancel()
 
     def _give_up(self) -> None:
-        self._came()
+        self._rest()
         self.transport.abort()
 
 
 class _Socket(WebSocketsSansIOProtocol):
-    """A WebSocket whose connection does not outlive its session, though the other side takes nothing any more."""
+    """A WebSocket that bounds what uvicorn does not.
+
+    Its connection ends with its session, though the other side takes nothing any more, and with a handshake that
+    makes no sense. Frames that are no message cost time and memory too: empty fragments, pings, pongs.
+    """
+
+    controls = 0
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        transport.max_size = READ_BYTES  # asyncio's own is 256 KiB: a third of a second of empty frames
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        while not self.queue.empty():  # what a page had asked for that is gone
+            self.queue.get_nowait()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if not self.handshake_initiated:  # uvicorn hands the whole request over: nothing more would come of it
+            self.transport.abort()
+
+    def handle_cont(self, event: Any) -> None:
+        if len(self.frames) < MOST_FRAGMENTS:
+            super().handle_cont(event)
+        else:
+            self._refuse(TOO_LARGE, "too many fragments")
+
+    def handle_ping(self) -> None:
+        super().handle_ping()
+        self._count_control()
+
+    def handle_pong(self, event: Any) -> None:
+        super().handle_pong(event)
+        self._count_control()
+
+    def _count_control(self) -> None:
+        """A script on a page can send no pings; a program that watches its connection sends one in some seconds."""
+        self.controls += 1
+        if self.controls > MOST_CONTROLS:
+            self._refuse(REFUSED, "too many pings")
+
+    def _refuse(self, code: int, reason: str) -> None:
+        if self.close_sent or self.transport.is_closing():
+            return
+        self.frames = []
+        self.conn.fail(code, reason)
+        self.handle_parser_exception()
 
     async def run_asgi(self) -> None:
         try:
@@ -208,7 +275,7 @@ class Server(uvicorn.Server):
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
         self.application, self.host, self.browser, self.quiet = application, host, browser, quiet
-        guarded = type("Guarded", (_Guarded,), {"waiting": {}})
+        guarded = type("Guarded", (_Guarded,), {"waiting": {}, "answering": {}})
         self.listener = _listen(host, port)
         config = uvicorn.Config(
             application.asgi,
@@ -245,7 +312,8 @@ class Server(uvicorn.Server):
         if not self.quiet:
             print(f"{self.url}\nCtrl-C ends it", flush=True)
         if self.browser:
-            await asyncio.get_running_loop().run_in_executor(None, _open, self.url)
+            # some browsers hold up whoever opens them until they are closed
+            threading.Thread(target=_open, args=(self.url,), daemon=True).start()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         for session in list(self.application.sessions):
@@ -258,25 +326,42 @@ class Server(uvicorn.Server):
             with contextlib.suppress(KeyboardInterrupt):
                 self.run(sockets=[self.listener])
         finally:
-            self.application.renderer.stop()
             self.listener.close()
-            with contextlib.suppress(ValueError):  # a second Ctrl-C shall not end in a traceback
-                signal.signal(signal.SIGINT, signal.default_int_handler)
+            # The thread is waited for: to end amid a kernel is a crash. A second Ctrl-C makes that no faster.
+            with _deaf():
+                self.application.renderer.stop()
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """No Ctrl-C meanwhile; only the main thread hears one."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _listen(host: str, port: int) -> socket.socket:
+    """A socket that listens; MachineError where it cannot."""
+    if not re.fullmatch(r"[\w.:-]+", host, re.ASCII):  # "" would be every address
+        raise InputError(f"'{host}' is no address", "--host", "give one of this machine, such as 127.0.0.1 or ::1")
+    listener = None
     try:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
         listener.listen(MOST_CONNECTIONS)
-    except (OSError, OverflowError) as error:
-        listener.close()
+    except (OSError, UnicodeError) as error:  # UnicodeError: a part of the name is too long
+        if listener is not None:
+            listener.close()
+        taken = getattr(error, "errno", None) == errno.EADDRINUSE
+        hint = "--port 0 finds a free one" if taken else "give an address of this machine, and a port that is yours"
         text = getattr(error, "strerror", None) or str(error)
-        raise MachineError(
-            f"cannot listen: {text}", f"--host {host} --port {port}", "--port 0 finds a free one"
-        ) from None
+        raise MachineError(f"cannot listen: {text}", f"--host {host} --port {port}", hint) from None
     return listener
 
 

@@ -9,7 +9,6 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,10 @@ from .reference import Reference
 from .stage import Stage
 
 PICTURES = 2  # environments kept a session: the one that is shown, and the one that comes
+MOST_WISHES = 16  # shaders that a session waits for
+RATE = 250.0  # messages a second that are read of one page: it sends one a picture that it draws, one a frame it got
+SHARE = 0.1  # of the server's thread, for reading one page's messages
+BURST_SECONDS = 0.5  # saved up by a page that was silent: 125 messages at once
 MOST_WAITING = 64  # messages to a page that does not take them: answers to what it sends, and one frame
 
 
@@ -31,13 +34,14 @@ class Session:
     def __init__(self, websocket: WebSocket, renderer: Renderer):
         self.websocket, self.renderer = websocket, renderer
         self.loop = asyncio.get_running_loop()
-        self.asked = False  # whether a message ever came that made sense
+        self.asked = False  # whether it ever wanted something that made sense
         self.sent = self.acknowledged = 0  # numbers of frames
         self.stalled_since: float | None = None
         self._outbox: asyncio.Queue[str | bytes] = asyncio.Queue()
         self._ended = asyncio.Event()
         self._upload: messages.Upload | None = None
         self._reason = (1000, "")
+        self._due = 0.0  # when the next message may be read
         # the renderer's, under its lock
         self.scene: messages.Scene | None = None
         self.pictures: dict[str, Any] = {}
@@ -47,16 +51,15 @@ class Session:
 
     # ------------------------------------------------------------------ in the server's thread
 
-    async def run(self, first_seconds: float, stall_seconds: float) -> None:
+    async def run(self, stall_seconds: float) -> None:
         """Talk until one side ends it.
 
-        first_seconds  for the first message to come
-        stall_seconds  for a frame to be acknowledged
+        stall_seconds  for a first wish to come, and for a frame to be acknowledged
         """
         tasks = [
             asyncio.create_task(self._read()),
             asyncio.create_task(self._write()),
-            asyncio.create_task(self._watch(first_seconds, stall_seconds)),
+            asyncio.create_task(self._watch(stall_seconds)),
             asyncio.create_task(self._ended.wait()),
         ]
         try:
@@ -83,17 +86,27 @@ class Session:
             received = await self.websocket.receive()
             if received["type"] == "websocket.disconnect":
                 return
+            began = time.thread_time()
             try:
                 if received.get("text") is not None:
                     self._take(messages.parse(received["text"]))
                 elif received.get("bytes") is not None:
                     await self._take_upload(received["bytes"])
-                self.asked = True
             except GonioError as error:
                 self.send(messages.failure(error))
-            await asyncio.sleep(0)  # messages that came together must not keep others waiting
+            await self._pace(time.thread_time() - began)
+
+    async def _pace(self, took: float) -> None:
+        """Wait where messages come faster than RATE, or want more than SHARE of this thread: others are to be served.
+
+        took  CPU seconds of the last message
+        """
+        now = self.loop.time()
+        self._due = max(self._due, now - BURST_SECONDS) + max(1 / RATE, took / SHARE)
+        await asyncio.sleep(max(self._due - now, 0.0))
 
     def _take(self, message: Any) -> None:
+        self.asked = self.asked or not isinstance(message, messages.Ack)
         match message:
             case messages.Scene():
                 self.renderer.show(self, message)
@@ -129,15 +142,13 @@ class Session:
             else:
                 await self.websocket.send_text(message)
 
-    async def _watch(self, first_seconds: float, stall_seconds: float) -> None:
-        await asyncio.sleep(first_seconds)
-        if not self.asked:
-            self._reason = (1008, "nothing was asked for")
-            return
+    async def _watch(self, stall_seconds: float) -> None:
+        began = time.monotonic()
         while True:
-            await asyncio.sleep(1.0)
-            if self.stalled_since is not None and time.monotonic() - self.stalled_since > stall_seconds:
-                self._reason = (1008, "frames are not taken")
+            await asyncio.sleep(min(1.0, stall_seconds))
+            since = self.stalled_since if self.asked else began
+            if since is not None and time.monotonic() - since > stall_seconds:
+                self._reason = (1008, "frames are not taken" if self.asked else "nothing was asked for")
                 return
 
     # ------------------------------------------------------------------ from the renderer's thread
@@ -158,7 +169,7 @@ class Renderer:
     def __init__(self, what: Stage, device: str = "cpu"):
         self.stage, self.device = what, device
         self._sessions: list[Session] = []
-        self._jobs: list[Callable[[], None]] = []
+        self._jobs: list[_Variant] = []
         self._lock = threading.Condition()
         self._running = False
         self._thread: threading.Thread | None = None
@@ -187,9 +198,9 @@ class Renderer:
             known = ", ".join(self.stage.materials)
             raise InputError(f"unknown material '{wish.material}'", "material", f"known: {known}")
         with self._lock:
-            self._jobs = [job for job in self._jobs if getattr(job, "session", None) is not session]
-            job = _Variant(self.stage, session, wish)
-            self._jobs.append(job)
+            if sum(job.session is session for job in self._jobs) >= MOST_WISHES:
+                raise InputError(f"more than {MOST_WISHES} choices wait for their shaders", "choice", "wait for some")
+            self._jobs.append(_Variant(self.stage, session, wish))
             self._start()
             self._lock.notify()
 
@@ -203,6 +214,7 @@ class Renderer:
         with self._lock:
             if session in self._sessions:
                 self._sessions.remove(session)
+            self._jobs = [job for job in self._jobs if job.session is not session]
             session.scene = session.reference = None
 
     def stop(self) -> None:
@@ -228,32 +240,34 @@ class Renderer:
                     self._lock.wait()
                 if not self._running:
                     return
-                jobs, self._jobs = self._jobs, []
-                sessions = [session for session in self._sessions if _has_work(session)]
-            for job in jobs:
+                job = self._jobs.pop(0) if self._jobs else None  # a shader takes as long as some passes: one a round
+                turns = [(session, session.scene) for session in self._sessions if _has_work(session)]
+            if job is not None:
                 job()
-            for session in sessions:
+            for session, scene in turns:
+                if scene is None or not self._running:
+                    continue
                 try:
-                    self._turn(session)
+                    self._turn(session, scene)
                 except GonioError as error:
-                    self._give_up(session, error)
+                    self._give_up(session, scene, error)
                 except Exception as error:
-                    what = f"the reference failed: {type(error).__name__}: {str(error).strip().splitlines()[:1]}"
-                    self._give_up(session, GonioError(what, "reference", "report this; the page itself goes on"))
+                    first = str(error).strip().partition("\n")[0]
+                    what = f"the reference failed: {type(error).__name__}: {first}"
+                    self._give_up(session, scene, GonioError(what, "reference", "report this; the page itself goes on"))
 
-    def _give_up(self, session: Session, error: GonioError) -> None:
+    def _give_up(self, session: Session, scene: messages.Scene, error: GonioError) -> None:
+        """Drop a scene that cannot be rendered, but none that has come in its place."""
         with self._lock:
-            if session in self._sessions:
-                self._sessions.remove(session)
+            if session.scene is scene:
+                session.scene = None
         session.send_from_thread(messages.failure(error))
 
-    def _turn(self, session: Session) -> None:
-        """One pass for a session, and a frame where the page waits for one."""
+    def _turn(self, session: Session, scene: messages.Scene) -> None:
+        """One pass of a scene for a session, and a frame where the page waits for one."""
         with self._lock:
-            scene, reference = session.scene, session.reference
+            reference = session.reference
             pictures = dict(session.pictures)
-        if scene is None:
-            return
         if reference is None:
             reference = Reference(self.stage, self.device)
             session.reference = reference
