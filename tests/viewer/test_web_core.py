@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import math
 import re
@@ -164,6 +165,30 @@ def test_a_link_from_a_stranger_does_no_harm(page: Page, patch: Any) -> None:
     page.load()
 
 
+def test_a_link_sets_nothing_out_of_range(page: Page) -> None:
+    """As a slider would not: widths over 1, fewer numbers than a colour has, masking by no known name."""
+    first = page.state("valueOf()")
+    slot = {
+        "values": {"base.alpha": 5, "base.eta": [1, 2], "base.k": "x", "base.albedo": [2, -1, 0.5]},
+        "choices": {"base.masking": "none"},
+    }
+    lights = [{"type": "directional", "direction": [0, 0, 0]}, {"type": "environment", "scale": -5}]
+    panels = {"tables": {"layer": -4, "channel": 99}}
+    patch = {"slots": {"0": slot}, "lights": lights, "compare": {"wipe": 9e9}, "panels": panels}
+    page.load("#s=" + base64.urlsafe_b64encode(json.dumps(patch).encode()).decode().rstrip("="))
+    values = page.state("slots[0].values")
+    assert max(np.atleast_1d(values["base.alpha"])) <= 1 and values["base.albedo"] == [1, 0, 0.5]
+    assert "base.eta" not in values and "base.k" not in values
+    assert page.state("slots[0].choices") == first["slots"][0]["choices"]
+    assert np.linalg.norm(page.state("lights[0].direction")) == pytest.approx(1)
+    assert page.state("lights[1].scale") == 0 and page.state("compare.wipe") == 1
+    page.tab.evaluate("() => gonio.app.store.set('dock.open', 'tables')")
+    note = page.tab.locator(".panel-body[data-panel=tables] .p-note")
+    note.wait_for(state="visible")
+    assert "NaN" not in note.text_content()
+    page.load()
+
+
 def test_screenshot_is_the_picture(page: Page) -> None:
     page.picture(8)
     with page.tab.expect_download() as download:
@@ -216,34 +241,19 @@ def test_dropped_picture_lights_the_balls_as_its_radiance_says(page: Page) -> No
         assert abs(means / (0.5 * furnace) - 1).max() < error, method
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "says"),
-    [
-        ("cut.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4000 +X 8000\nxx", "cut off"),
-        ("huge.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n", "largest"),
-        ("other.hdr", b"\x89PNG", "not a Radiance picture"),
-        ("empty.obj", b"# nothing\n", "no mesh"),
-        ("what.exe", b"MZ", "drop a Radiance picture"),
-    ],
-)
-def test_a_bad_file_gets_one_clear_line(page: Page, name: str, content: bytes, says: str) -> None:
-    assert says in page.tab.evaluate(DROP, [base64.b64encode(content).decode(), name])
-    assert page.picture(2)[..., 1].max() > 0.5
+POINTS = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "<f4").tobytes()
 
 
-QUAD = b"v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1/1 2/2/1 3/3/1 4/4/1\n"
-
-
-def gltf() -> bytes:
-    points = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "<f4")
-    data = "data:application/octet-stream;base64," + base64.b64encode(points.tobytes()).decode()
+def gltf(uri: str = "") -> bytes:
+    """A triangle, its points inside the file or at `uri`; with a picture that is nowhere, which the page needs not."""
+    data = "data:application/octet-stream;base64," + base64.b64encode(POINTS).decode()
     return json.dumps(
         {
             "asset": {"version": "2.0"},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
             "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
             "accessors": [
                 {
                     "bufferView": 0,
@@ -255,9 +265,35 @@ def gltf() -> bytes:
                 }
             ],
             "bufferViews": [{"buffer": 0, "byteLength": 36}],
-            "buffers": [{"byteLength": 36, "uri": data}],
+            "buffers": [{"byteLength": 36, "uri": uri or data}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+            "textures": [{"source": 0}],
+            "images": [{"uri": "missing.png"}],
         }
     ).encode()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("cut.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4000 +X 8000\nxx", "cut off"),
+        ("huge.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n", "largest"),
+        ("other.hdr", b"\x89PNG", "not a Radiance picture"),
+        ("empty.obj", b"# nothing\n", "no mesh"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no mesh"),
+        ("hole.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "hole.obj: a corner"),
+        ("corner.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "corner.obj: a corner"),
+        ("cut.glb", b"glTF\x02\0\0\0\x50\0\0\0junkjunk", "cut.glb cannot be read"),
+        ("alone.gltf", gltf("points.bin"), "alone.gltf keeps its data in points.bin"),
+        ("what.exe", b"MZ", "drop a Radiance picture"),
+    ],
+)
+def test_a_bad_file_gets_one_clear_line(page: Page, name: str, content: bytes, says: str) -> None:
+    assert says in page.tab.evaluate(DROP, [base64.b64encode(content).decode(), name])
+    assert page.picture(2)[..., 1].max() > 0.5
+
+
+QUAD = b"v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1/1 2/2/1 3/3/1 4/4/1\n"
 
 
 @pytest.mark.parametrize(("name", "content"), [("quad.obj", QUAD), ("triangle.gltf", gltf())])
@@ -269,6 +305,16 @@ def test_dropped_mesh_takes_the_place_of_the_balls(page: Page, name: str, conten
     assert 0.2 * before < picture[..., 3].sum() < before
     # flat, facing the camera, under a light at one angle: far and near rows differ little, and nothing is black
     assert picture[..., 1][picture[..., 3] > 0.99].min() > 0
+
+
+def test_a_gltf_finds_the_data_that_is_dropped_with_it(page: Page) -> None:
+    files = {"points.bin": POINTS, "triangle.gltf": gltf("points.bin")}
+    page.tab.evaluate(
+        """files => gonio.useFiles(...files.map(([name, bytes]) => new File([Uint8Array.from(bytes)], name)))""",
+        [[name, list(content)] for name, content in files.items()],
+    )
+    assert page.state("view.mesh") == "file"
+    assert page.tab.evaluate("() => gonio.app.scene().mesh.mesh.positions.length") == 9
 
 
 @pytest.mark.parametrize("mesh", ["torus", "shaderball"])
@@ -297,8 +343,14 @@ def test_usable_on_a_phone(chrome: Any, homework_file: Path) -> None:
     picture = page.picture(4)
     edge = picture[:, [0, -1], 3]
     assert edge.max() == 0 and picture[..., 3].max() > 0.99  # no ball is cut off
-    page.control("roughness").locator("input[type=range]").scroll_into_view_if_needed()
-    assert page.tab.locator("canvas.picture").bounding_box()["y"] >= 0  # the picture stays while controls scroll
+    for control in ("roughness", "Exposure"):  # the picture stays while controls scroll, to the last
+        page.control(control).locator("input[type=range]").scroll_into_view_if_needed()
+        assert page.tab.locator("canvas.picture").bounding_box()["y"] >= 0, control
+    page.tab.evaluate("() => gonio.app.store.set('dock.open', 'slices')")
+    body = page.tab.locator(".panel-body[data-panel=slices]")
+    body.wait_for(state="visible")
+    inner, outer = body.evaluate("b => [b.scrollHeight, b.clientHeight]")
+    assert inner <= outer + 1  # all plots are there at once: the page scrolls, not a box within it
     assert page.problems == []
     context.close()
 
@@ -322,4 +374,32 @@ def test_one_model_without_terms_or_choices(chrome: Any, tmp_path: Path) -> None
     brightest = max(np.max(ball.values["albedo"]) for ball in what.rows[0].balls)
     assert page.picture(8)[..., 0].max() == pytest.approx(brightest, rel=0.01)  # where it faces a light of pi
     assert page.problems == []
+    tab.close()
+
+
+def test_nothing_lies_over_three_rows(chrome: Any, tmp_path: Path) -> None:
+    what = stage.of_models([go.Conductor(), go.Lambert(), go.Mirror()])
+    tab = chrome.new_page(viewport={"width": 1280, "height": 720})
+    page = Page(tab, page_file.export(what, tmp_path / "three.html"))
+    tab.evaluate("() => gonio.app.store.set('dock.open', 'lobe')")
+    tab.locator(".panel-body[data-panel=lobe]").wait_for(state="visible")
+    bar, picture = (tab.locator(s).bounding_box() for s in (".terms", "canvas.picture"))
+    assert bar["y"] + bar["height"] <= picture["y"]
+    assert tab.locator(".terms").evaluate("b => b.scrollWidth <= b.clientWidth")
+    page.set("s.view.term = 'D'")
+    assert "1/sr" in tab.locator(".term-note").text_content()
+    page.set("s.view.term = 'full'")
+    assert "C: a mirror shows an environment only" in tab.locator(".term-note").text_content()
+    page.set("s.furnace = true")
+    assert tab.locator(".term-note").text_content() == ""
+    assert page.problems == []
+    tab.close()
+
+
+def test_what_is_not_shown_is_told_at_once(chrome: Any, tmp_path: Path) -> None:
+    what = dataclasses.replace(stage.of_models([go.Lambert()]), notes=["the texture of albedo is not shown"])
+    tab = chrome.new_page(viewport=WIDE)
+    Page(tab, page_file.export(what, tmp_path / "noted.html"))
+    tab.get_by_text("1 note").click()
+    assert "the texture of albedo is not shown" in tab.locator("dialog[open]").text_content()
     tab.close()

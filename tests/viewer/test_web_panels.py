@@ -248,13 +248,16 @@ def test_table_read_out_is_the_float(fresh: Opened) -> None:
     body = open_panel(fresh, "tables")
     manifest, tables = fresh.tab.evaluate("[gonio.app.shaderOf(0).manifest, gonio.app.shaderOf(0).variant.tables]")
     assert manifest["textures"], "Kulla-Conty reads a table"
+    texture = manifest["textures"][0]
+    first = body.locator("select").first
+    assert "albedo" in first.locator("option").first.text_content()  # E(mu) itself stands before its coefficients
+    first.select_option(index=1)
     canvas = body.locator("canvas")
     canvas.wait_for(state="visible")
     box = canvas.bounding_box()
     import base64
     import re
 
-    texture = manifest["textures"][0]
     floats = np.frombuffer(base64.b64decode(tables[texture["uniform"]]), "<f4")
     columns, channels = texture["size"][0], texture["channels"]
     seen = set()
@@ -327,6 +330,7 @@ def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
 
 def test_smaller_reference_is_compared_with_averages(fresh: Opened) -> None:
     open_panel(fresh, "compare")
+    fresh.tab.wait_for_timeout(300)  # the dock makes the canvas lower, and the picture begins anew
     fresh.tab.evaluate("gonio.app.store.setPanel('compare', { pixels: 'all' })")
     fresh.tab.evaluate(
         """() => gonio.converge().then(picture => {
@@ -387,6 +391,17 @@ def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int,
     # the words on the pictures differ: on a phone 8 per cent of the pixels, where other places would differ in 30
     assert np.mean(np.abs(halves[0] - halves[1]).max(axis=2) > 24) < 0.12
     assert halves[0].std() > 10
+
+
+def test_a_reference_of_what_was_shown_before_is_not_measured(fresh: Opened) -> None:
+    body = open_panel(fresh, "compare")
+    fresh.tab.wait_for_timeout(300)
+    fresh.tab.evaluate("() => gonio.converge(2)")
+    fresh.tab.evaluate(REFERENCE, [1.1])
+    fresh.tab.wait_for_function("() => gonio.comparison().figures !== null", timeout=30_000)
+    fresh.tab.evaluate("gonio.app.setReference({ ...gonio.app.referencePicture(), stale: true })")
+    fresh.tab.wait_for_function("() => gonio.comparison().figures === null", timeout=30_000)
+    assert "Waiting for the reference" in body.locator(".p-note").text_content()
 
 
 def test_page_without_a_server_says_so(fresh: Opened) -> None:

@@ -79,7 +79,7 @@ export class PageApp implements App {
   }
 
   private fromLink(): State {
-    return decodeState(location.hash, this.store.initial, (id) => this.data.materials.some((m) => m.id === id));
+    return decodeState(location.hash, this.store.initial, this.data.materials);
   }
 
   get state(): State {

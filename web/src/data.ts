@@ -42,6 +42,9 @@ export interface TableTexture {
   size: number[];
   channels: 1 | 2 | 4;
   file: string;
+  /** What runs along x, y, z, and what a texel holds, where the page's maker knows. */
+  axes?: string[];
+  doc?: string;
 }
 
 export type FunctionName = "eval" | "pdf" | "sample" | "terms" | "derive";

@@ -139,6 +139,8 @@ export class Live {
     if (text === this.sent) return;
     this.sent = text;
     this.id += 1;
+    // It stays on the screen until the first frame of the new one, but counts no more.
+    if (app.reference) app.setReference({ ...app.reference, stale: true });
     Object.assign(this.status, { samples: 0, done: false, target: TARGET });
     this.text({ type: "scene", id: this.id, ...scene });
     this.onStatus();

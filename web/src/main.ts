@@ -7,7 +7,7 @@ import { install, panels, testHooks } from "./panels";
 import { Change, type State } from "./state";
 import { element } from "./ui/dom";
 import { Layout, frame } from "./ui/layout";
-import { useFile } from "./ui/files";
+import { useFiles } from "./ui/files";
 
 function start(host: HTMLElement): void {
   const data = readPageData();
@@ -38,7 +38,7 @@ function start(host: HTMLElement): void {
       readPixels: () => app.picture(),
       converge: (samples?: number) => app.converge(samples),
       setState: (write: (state: State) => void) => app.store.update("", write),
-      useFile: (file: File) => useFile(app, file),
+      useFiles: (...files: File[]) => useFiles(app, files),
       ...testHooks(app),
     },
   });

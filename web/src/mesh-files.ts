@@ -1,16 +1,38 @@
 /** glTF and OBJ files as one geometry, by three.js' own readers. */
-import { BufferAttribute, BufferGeometry, Mesh, type Object3D, Vector3 } from "three";
+import { BufferAttribute, BufferGeometry, LoadingManager, Mesh, MeshBasicMaterial, type Object3D, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { OBJLoader } from "three/examples/jsm/loaders/OBJLoader.js";
 
-export async function parseMesh(file: File): Promise<BufferGeometry> {
-  const name = file.name.toLowerCase();
-  if (name.endsWith(".obj")) return merged(new OBJLoader().parse(await file.text()), file.name);
-  if (name.endsWith(".glb") || name.endsWith(".gltf")) {
-    const gltf = await new GLTFLoader().parseAsync(await file.arrayBuffer(), "");
-    return merged(gltf.scene, file.name);
+/** `beside`: files that came with it, where a .gltf keeps its data in a .bin. */
+export async function parseMesh(file: File, beside: readonly File[]): Promise<BufferGeometry> {
+  const root = /\.obj$/i.test(file.name) ? new OBJLoader().parse(await file.text()) : await parseGltf(file, beside);
+  return merged(root, file.name);
+}
+
+async function parseGltf(file: File, beside: readonly File[]): Promise<Object3D> {
+  const given: string[] = [];
+  let lacking = "";
+  const manager = new LoadingManager();
+  manager.setURLModifier((address) => {
+    if (/^(data|blob):/.test(address)) return address;
+    const name = decodeURIComponent(address).split("/").pop() as string;
+    const found = beside.find((other) => other.name === name);
+    if (!found) lacking ||= name;
+    given.push(URL.createObjectURL(found ?? new Blob()));
+    return given[given.length - 1] as string;
+  });
+  const loader = new GLTFLoader(manager);
+  // The page brings its own materials: nothing of the file's is read, its pictures least of all.
+  const material = new MeshBasicMaterial();
+  loader.register(() => ({ name: "no-materials", loadMaterial: () => Promise.resolve(material) }));
+  try {
+    return (await loader.parseAsync(await file.arrayBuffer(), "")).scene;
+  } catch (error) {
+    if (lacking) throw new Error(`${file.name} keeps its data in ${lacking}: drop both together, or a .glb.`);
+    throw new Error(`${file.name} cannot be read: ${error instanceof Error ? error.message.replace(/^THREE\.\w+: /, "") : String(error)}`);
+  } finally {
+    for (const address of given) URL.revokeObjectURL(address);
   }
-  throw new Error(`${file.name} is not a mesh: drop .glb, .gltf or .obj.`);
 }
 
 /** All meshes of a scene, in world space. */
@@ -29,6 +51,7 @@ function merged(root: Object3D, name: string): BufferGeometry {
     const position = geometry.getAttribute("position");
     const normal = geometry.getAttribute("normal");
     const uv = geometry.getAttribute("uv");
+    if (!position.array.every(Number.isFinite)) throw new Error(`${name}: a corner of a face is missing or not a number.`);
     everyUv &&= Boolean(uv);
     for (let i = 0; i < position.count; i++) {
       point.fromBufferAttribute(position, i).applyMatrix4(object.matrixWorld);

@@ -123,11 +123,11 @@ function smooth(points: [number, number][], v: number): [number, number] {
 
 const LARGEST_FILE = 64 * 1024 * 1024;
 
-/** A dropped .glb, .gltf (with its data inside) or .obj. */
-export async function readMesh(file: File): Promise<Mesh> {
-  if (file.size > LARGEST_FILE) throw new Error(`${file.name} is larger than 64 MB.`);
+/** A dropped .glb, .gltf (with its .bin `beside` it, where it has one) or .obj. */
+export async function readMesh(file: File, beside: readonly File[] = []): Promise<Mesh> {
+  for (const each of [file, ...beside]) if (each.size > LARGEST_FILE) throw new Error(`${each.name} is larger than 64 MB.`);
   const { parseMesh } = await import("./mesh-files");
-  return fromGeometry(await parseMesh(file));
+  return fromGeometry(await parseMesh(file, beside));
 }
 
 /** Centred and scaled into the unit sphere; tangents along u where there are texture coordinates. */

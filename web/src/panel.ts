@@ -28,6 +28,8 @@ export interface Picture {
   /** Samples per pixel so far. */
   samples: number;
   done: boolean;
+  /** A reference of what was shown before: the newer one is on its way. */
+  stale?: boolean;
 }
 
 export interface Picked {

@@ -181,7 +181,7 @@ export function initialState(data: PageData): State {
     view: { mesh: meshName(scene.mesh), term: "full", background: "theme", labels: true, spacing: scene.spacing },
     display: { tone: display.tone, exposure: display.exposure, theme: "auto" },
     compare: { mode: "off", wipe: 0.5 },
-    dock: { open: null, height: 260 },
+    dock: { open: null, height: Math.round(Math.min(440, Math.max(260, 0.38 * innerHeight))) },
     panels: {},
   };
 }

@@ -1,5 +1,6 @@
 /** The state in the URL's fragment: what differs from the page's initial state, as JSON in base64url. */
 import { newLight } from "./lights";
+import type { Material, Parameter, Values } from "./data";
 import type { Light, State } from "./state";
 
 type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
@@ -15,26 +16,40 @@ export function encodeState(state: State, initial: State): string {
 
 /**
  * The initial state with the fragment's patch; whatever does not fit (a newer page's, a stranger's) is left out.
- * `known` tells whether the page holds a material.
+ * `materials` are those of the page: a link may speak of no others.
  */
-export function decodeState(fragment: string, initial: State, known: (material: string) => boolean = () => true): State {
+export function decodeState(fragment: string, initial: State, materials: readonly Material[]): State {
   const match = /(?:^#?|&)s=([A-Za-z0-9_-]+)/.exec(fragment);
   const state = structuredClone(initial);
   if (!match) return state;
   try {
     const binary = atob((match[1] as string).replaceAll("-", "+").replaceAll("_", "/"));
     const patch = JSON.parse(new TextDecoder().decode(Uint8Array.from(binary, (c) => c.charCodeAt(0)))) as Json;
-    return bounded(merge(state as unknown as Json, patch, "") as unknown as State, initial, known);
+    return bounded(merge(state as unknown as Json, patch, "") as unknown as State, initial, materials);
   } catch {
     return state;
   }
 }
 
 /** Types fit by now; here what a type does not say: names that exist, numbers that can be drawn. */
-function bounded(state: State, initial: State, known: (material: string) => boolean): State {
+function bounded(state: State, initial: State, materials: readonly Material[]): State {
   const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
   state.slots.forEach((slot, index) => {
-    if (!known(slot.material)) state.slots[index] = structuredClone(initial.slots[index] as State["slots"][number]);
+    const material = materials.find(({ id }) => id === slot.material);
+    if (!material) state.slots[index] = structuredClone(initial.slots[index] as State["slots"][number]);
+    else {
+      const parameters = material.variants[0]?.manifest.parameters ?? [];
+      for (const [path, value] of Object.entries(slot.choices)) {
+        const parameter = parameters.find((p) => p.path === path);
+        if (!(parameter?.kind === "flag" ? typeof value === "boolean" : Object.hasOwn(parameter?.choices ?? {}, String(value)))) {
+          const own = material.variants[0]?.choices[path];
+          if (own === undefined) delete slot.choices[path];
+          else slot.choices[path] = own;
+        }
+      }
+      slot.values = inRange(slot.values, parameters);
+      for (const ball of slot.balls) ball.set = inRange(ball.set, parameters);
+    }
   });
   if (state.solo !== null && !state.slots[state.solo]) state.solo = null;
   if (!state.slots.some((slot) => slot.visible)) state.slots.forEach((slot) => (slot.visible = true));
@@ -47,6 +62,7 @@ function bounded(state: State, initial: State, known: (material: string) => bool
   state.view.spacing = clamp(state.view.spacing, 2, 20);
   state.display.exposure = clamp(state.display.exposure, -30, 30);
   state.dock.height = clamp(state.dock.height, 100, 4000);
+  state.compare.wipe = clamp(state.compare.wipe, 0, 1);
   // A dropped file, be it shape or picture, is not in the link.
   const pictured = initial.lights.some((light) => light.type === "environment" && light.image);
   for (const light of state.lights) if (light.type === "environment" && !pictured) light.image = null;
@@ -66,6 +82,23 @@ function bounded(state: State, initial: State, known: (material: string) => bool
   return state;
 }
 
+/** Numbers within what the parameters declare, of their shape; the rest is as if it were not said. */
+function inRange(values: Values, parameters: readonly Parameter[]): Values {
+  const kept: Values = {};
+  for (const parameter of parameters) {
+    const value = values[parameter.path];
+    if (value === undefined) continue;
+    const numbers = [value].flat() as unknown[];
+    const size = parameter.kind === "spectrum" ? 3 : parameter.kind === "alpha" ? 2 : 1;
+    if ((numbers.length !== 1 && numbers.length !== size) || !numbers.every((v) => typeof v === "number" && Number.isFinite(v))) continue;
+    // A number where three are declared stays one: it stands for all.
+    const { low, high } = parameter;
+    const held = (numbers as number[]).map((v) => Math.min(high ?? Infinity, Math.max(low ?? -Infinity, v)));
+    kept[parameter.path] = Array.isArray(value) ? held : (held[0] as number);
+  }
+  return kept;
+}
+
 /** A light of the link over a new one of its kind, so that every value it needs is there. */
 function lightFrom(patch: Json): Json[] {
   const type = isObject(patch) ? patch["type"] : null;
@@ -74,6 +107,11 @@ function lightFrom(patch: Json): Json[] {
   const image = isObject(patch) && isObject(patch["image"]) ? patch["image"] : null;
   const sized = image && typeof image["width"] === "number" && typeof image["height"] === "number";
   const merged = merge(made, patch, "light") as { [key: string]: Json };
+  if (type === "directional") {
+    const length = Math.hypot(...(merged["direction"] as number[]));
+    if (!(length > 0 && length < Infinity)) merged["direction"] = made["direction"] as Json;
+  }
+  if (type === "environment") merged["scale"] = Math.max(0, merged["scale"] as number);
   return [type === "environment" ? { ...merged, image: sized ? { width: image["width"] as Json, height: image["height"] as Json, data: null } : null } : merged];
 }
 

@@ -29,6 +29,14 @@ VERSION = 1
 STATIC = Path(__file__).parent / "static"
 # Bilinear lookups are off by 1e-3 (RMS); at low roughness, where B rises within mu < .05, by up to 6e-2.
 DFG_SIZE = 64
+# What `energy.curves` lays along x, y, z of its tables, and what a texel holds, by the start of their names.
+TABLES = {
+    "missing_turned_": (["sqrt(alpha_min / alpha_max)", "sqrt(alpha_max)"], "coefficients of 1 - E(mu, phi)"),
+    "missing_glass_": (["roughness", "F0^(1/4)"], "coefficients of 1 - E(mu)"),
+    "missing_": (["roughness", "group of four"], "coefficients of 1 - E(mu), F = 1"),
+    "lobe_glass_": (["u", "roughness", "F0^(1/4)"], "mu^2 below which the share u of the missing light lies"),
+    "lobe_": (["u", "roughness"], "mu^2 below which the share u of the missing light lies"),
+}
 
 
 def page_data(what: Stage, socket: str | None = None) -> dict[str, Any]:
@@ -81,7 +89,12 @@ def variant_data(bsdf: BSDF, choices: dict[str, Any]) -> dict[str, Any]:
     """Shader, manifest and tables of a model with some choices made otherwise."""
     bundle = emit.bundle(stage.replaced(bsdf, choices, "choices"), "glsl")
     tables = {name: encode(values) for name, values in bundle.tables.items()}
-    return {"choices": choices, "manifest": _finite(bundle.manifest), "text": bundle.text, "tables": tables}
+    manifest = _finite(bundle.manifest)
+    for texture in manifest["textures"]:
+        name = texture["uniform"].removeprefix("table_")
+        axes, doc = next((what for start, what in TABLES.items() if name.startswith(start)), ([], ""))
+        texture |= {"axes": axes, "doc": doc}
+    return {"choices": choices, "manifest": manifest, "text": bundle.text, "tables": tables}
 
 
 def _finite(value: Any) -> Any:

@@ -67,25 +67,20 @@ class AlbedoPanel implements Panel {
     const wo = MUS.flatMap((mu) => polar(Math.acos(mu), phi * RADIANS));
     const estimates = new Map<Model, AlbedoEstimate>();
     let shown = 0;
-    for (const model of models) {
-      if (!model.shader.manifest.functions.sample) continue;
-      estimates.set(
-        model,
-        await evaluatorOf(app).albedo(model.shader, model.values, wo, {
-          error: TARGET,
-          progress: (estimate) => {
-            estimates.set(model, estimate);
-            if (performance.now() - shown > 150 && generation === this.generation) {
-              this.draw(models, estimates, channel);
-              shown = performance.now();
-            }
-            return generation === this.generation;
-          },
-        }),
-      );
-      if (generation !== this.generation) return;
-    }
-    this.draw(models, estimates, channel);
+    // Side by side: every curve is there at once, and all grow sharper together.
+    const estimated = models.filter((model) => model.shader.manifest.functions.sample).map(async (model) => {
+      const progress = (estimate: AlbedoEstimate): boolean => {
+        estimates.set(model, estimate);
+        if (performance.now() - shown > 150 && generation === this.generation) {
+          this.draw(models, estimates, channel);
+          shown = performance.now();
+        }
+        return generation === this.generation;
+      };
+      await evaluatorOf(app).albedo(model.shader, model.values, wo, { error: TARGET, progress });
+    });
+    await Promise.all(estimated);
+    if (generation === this.generation) this.draw(models, estimates, channel);
   }
 
   private draw(models: Model[], estimates: Map<Model, AlbedoEstimate>, channel: Channel): void {

@@ -93,8 +93,16 @@ export class Comparison {
       this.figures = this.pair = null;
       this.lack =
         app.data.mode === "live"
-          ? "The reference has not sent its first frame yet."
+          ? app.state.view.mesh === "sphere"
+            ? "The reference has not sent its first frame yet."
+            : "The reference is of spheres only: choose the sphere as shape to compare."
           : "This page stands alone: it has no path tracer to compare with. Start `gonio view` for a live reference.";
+      for (const listener of this.listeners) listener();
+      return;
+    }
+    if (reference.stale) {
+      this.figures = this.pair = null;
+      this.lack = "Waiting for the reference of what is shown now.";
       for (const listener of this.listeners) listener();
       return;
     }
@@ -155,7 +163,7 @@ export class Comparison {
     const { mode, wipe } = this.app.state.compare;
     const reference = this.app.referencePicture();
     const ready = reference !== null && reference.samples > 0;
-    const decorated = JSON.stringify([mode, wipe, reference?.samples, reference?.done, this.view.high, this.settings(), this.app.canvas.clientWidth, this.app.canvas.clientHeight]);
+    const decorated = JSON.stringify([mode, wipe, reference?.samples, reference?.done, reference?.stale, this.view.high, this.settings(), this.app.canvas.clientWidth, this.app.canvas.clientHeight]);
     if (decorated === this.decorated) return; // asked after every frame
     this.decorated = decorated;
     const two = ready && (mode === "wipe" || mode === "side");
@@ -165,7 +173,7 @@ export class Comparison {
     const [left, right] = this.tags;
     left.hidden = right.hidden = !two;
     left.textContent = "raster";
-    right.textContent = ready ? `reference, ${reference.samples} spp${reference.done ? "" : " …"}` : "";
+    right.textContent = ready ? (reference.stale ? "reference of before …" : `reference, ${reference.samples} spp${reference.done ? "" : " …"}`) : "";
     const stacked = tall && mode === "side";
     // In the wipe the words go with the bar; below the page's own bar of terms in any case.
     const bar = `${100 * wipe}%`;
@@ -179,11 +187,11 @@ export class Comparison {
     const { kind, range, pixels } = this.settings();
     const table = colorTable("magma");
     const bar = element("i");
-    bar.style.background = `linear-gradient(to right, ${Array.from({ length: 17 }, (_, i) => css(table, i / 16)).join(", ")})`;
-    const ends = element("span");
-    ends.append(element("b", "", "0"), element("b", "", `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " and more"}`));
     const how = kind !== "flip" && range === "auto" ? "; 99.5 % of the pixels lie inside" : "";
-    this.scale.replaceChildren(element("div", "", `${KINDS[kind]}, ${PIXELS[pixels]}${how}`), bar, ends);
+    this.scale.title = `${KINDS[kind]}, ${PIXELS[pixels]}${how}`;
+    bar.style.background = `linear-gradient(to right, ${Array.from({ length: 17 }, (_, i) => css(table, i / 16)).join(", ")})`;
+    const high = `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " and more"}`;
+    this.scale.replaceChildren(element("span", "", KINDS[kind]), element("b", "", "0"), bar, element("b", "", high));
   }
 
   private listen(): void {

@@ -216,14 +216,21 @@ export class LobeView {
   }
 
   private placeLabels(matrix: Float32Array, width: number, height: number): void {
+    const placed: [number, number][] = [];
     this.arrows.forEach((arrow, i) => {
       const p = arrow.direction.map((v) => (ARROW + 0.08) * v);
       const [x, y, , w] = [0, 1, 2, 3].map((row) =>
         (matrix[row] as number) * (p[0] as number) + (matrix[4 + row] as number) * (p[1] as number) + (matrix[8 + row] as number) * (p[2] as number) + (matrix[12 + row] as number),
       ) as [number, number, number, number];
       const label = this.labels.children[i] as HTMLElement;
-      label.style.left = `${(0.5 + (0.5 * x) / w) * width}px`;
-      label.style.top = `${(0.5 - (0.5 * y) / w) * height}px`;
+      let left = (0.5 + (0.5 * x) / w) * width;
+      const top = (0.5 - (0.5 * y) / w) * height;
+      // The view from near the normal: two letters in one place read as a word.
+      const beside = placed.find(([px, py]) => Math.abs(px - left) < 18 && Math.abs(py - top) < 14);
+      if (beside) left = beside[0] + (left < beside[0] ? -20 : 20);
+      placed.push([left, top]);
+      label.style.left = `${left}px`;
+      label.style.top = `${top}px`;
       label.style.color = `rgb(${arrow.color.map((c) => Math.round(255 * c)).join(",")})`;
     });
   }

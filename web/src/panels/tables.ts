@@ -9,12 +9,14 @@ interface Table {
   label: string;
   size: number[];
   channels: number;
-  /** What runs along x, y, z, where the page knows. */
+  /** What runs along x, y, z, what a texel holds, and its numbers' names, where the page knows. */
   axes: string[];
+  doc: string;
+  components: string[];
   floats: Float32Array;
 }
 
-const DEFAULTS = { table: "", channel: 0, layer: 0, fixed: false };
+const DEFAULTS = { table: "", channel: -1, layer: 0, fixed: false };
 
 class TablesPanel implements Panel {
   readonly id = "tables";
@@ -39,7 +41,7 @@ class TablesPanel implements Panel {
     host.classList.add("p-panel");
     const set = (values: Partial<typeof DEFAULTS>) => app.store.setPanel(this.id, values);
     const bar = element("div", "p-bar");
-    this.which = select<string>(bar, "table", "Every texture that a shader of the page reads", {}, (table) => set({ table, channel: 0, layer: 0 }));
+    this.which = select<string>(bar, "table", "Every texture that a shader of the page reads", {}, (table) => set({ table, channel: -1, layer: 0 }));
     this.channel = select<string>(bar, "component", "Tables may hold several numbers a texel", { "0": "0" }, (channel) => set({ channel: Number(channel) }));
     this.layer = range(bar, "layer", "Slice of a three-dimensional table", [0, 0, 1], "", (layer) => set({ layer }));
     this.fixed = check(bar, "0 to 1", "Colours from 0 to 1 instead of from the smallest to the largest value", (fixed) => set({ fixed }));
@@ -68,9 +70,12 @@ class TablesPanel implements Panel {
     if (what === "theme") this.show();
   }
 
-  /** All tables of the shown models, then the split sum's; the floats are decoded once. */
+  /** The albedo that facets have, which everybody looks for first, then all tables of the shown models. */
   private collect(): void {
     const wanted = new Map<string, () => Table>();
+    const { dfg } = this.app.data;
+    const facets = this.app.visibleSlots().some((slot) => this.app.shaderOf(slot).manifest.terms?.some(({ name }) => name === "D"));
+    if (dfg && facets) wanted.set("dfg", () => splitSum(dfg.size, decodeFloats(dfg.data)));
     for (const slot of this.app.visibleSlots()) {
       const { key, manifest, variant, material } = this.app.shaderOf(slot);
       for (const texture of manifest.textures) {
@@ -80,13 +85,13 @@ class TablesPanel implements Panel {
           label: `${material.title}: ${texture.uniform.replace(/^table_/, "")}`,
           size: texture.size,
           channels: texture.channels,
-          axes: [],
+          axes: texture.axes ?? [],
+          doc: texture.doc ?? "",
+          components: [],
           floats: decodeFloats(data),
         }));
       }
     }
-    const { dfg } = this.app.data;
-    if (dfg) wanted.set("dfg", () => ({ label: "split sum (A, B)", size: dfg.size, channels: dfg.channels, axes: ["μ", "roughness"], floats: decodeFloats(dfg.data) }));
     this.tables = new Map([...wanted].map(([key, make]) => [key, this.tables.get(key) ?? make()]));
   }
 
@@ -107,9 +112,11 @@ class TablesPanel implements Panel {
       return;
     }
     const [width, height = 1, depth = 1] = table.size as [number, number?, number?];
-    const channel = Math.min(settings.channel, table.channels - 1);
-    const layer = Math.min(settings.layer, depth - 1);
-    this.channel.options(Object.fromEntries(Array.from({ length: table.channels }, (_, i) => [String(i), String(i)])));
+    const whole = (value: unknown, most: number) => Math.min(most, Math.max(0, Math.round(Number(value)) || 0));
+    // Of the split sum first what it is best known for, the albedo: its last.
+    const channel = settings.channel === -1 ? (table.components.length ? table.channels - 1 : 0) : whole(settings.channel, table.channels - 1);
+    const layer = whole(settings.layer, depth - 1);
+    this.channel.options(Object.fromEntries(Array.from({ length: table.channels }, (_, i) => [String(i), table.components[i] ?? String(i)])));
     this.channel.show(String(channel));
     this.channel.enable(table.channels > 1);
     this.layer.hide(depth === 1);
@@ -124,7 +131,7 @@ class TablesPanel implements Panel {
     Object.assign(this.bitmap, { width, height });
     (this.bitmap.getContext("2d") as CanvasRenderingContext2D).putImageData(paint(flipped, width, height, "viridis", ...this.span), 0, 0);
     this.current = { table, channel, layer };
-    this.note.textContent = `${table.size.join(" × ")} texels of ${table.channels} float32; this picture: smallest ${exact(low)}, largest ${exact(high)}. Axes count texel centres from 0 to 1.`;
+    this.note.textContent = `${table.doc ? `${table.doc}. ` : ""}${table.size.join(" × ")} texels of ${table.channels} float32; this picture: smallest ${exact(low)}, largest ${exact(high)}. Axes count texel centres from 0 to 1.`;
     this.write();
     this.sketch.redraw();
   }
@@ -200,10 +207,28 @@ class TablesPanel implements Panel {
     const [i, j] = this.pointed;
     const [columns, lines = 1, depth = 1] = table.size as [number, number?, number?];
     const at = ((layer * lines + j) * columns + i) * table.channels;
-    const numbers = Array.from(table.floats.subarray(at, at + table.channels), exact);
+    const numbers = Array.from(table.floats.subarray(at, at + table.channels), (v, c) => (table.components[c] ? `${table.components[c]} = ${exact(v)}` : exact(v)));
     const place = [`${table.axes[0] ?? "x"} ${short((i + 0.5) / columns)}`, ...(lines > 1 ? [`${table.axes[1] ?? "y"} ${short((j + 0.5) / lines)}`] : [])];
     this.read.textContent = `texel (${[i, j, ...(depth > 1 ? [layer] : [])].join(", ")}), ${place.join(", ")}: ${numbers.join("  ")}`;
   }
+}
+
+/** A and B of the split sum, and their sum: the albedo of the same lobe where nothing is absorbed. */
+function splitSum(size: number[], ab: Float32Array): Table {
+  const floats = new Float32Array((ab.length / 2) * 3);
+  for (let i = 0; i < ab.length / 2; i++) {
+    const [a, b] = [ab[2 * i] as number, ab[2 * i + 1] as number];
+    floats.set([a, b, a + b], 3 * i);
+  }
+  return {
+    label: "GGX: albedo, and A and B of the split sum",
+    size,
+    channels: 3,
+    axes: ["μ", "roughness"],
+    doc: "Albedo: F0 A + B for that reflectance at normal incidence, A + B = E(μ) for F = 1",
+    components: ["A", "B", "A + B = E"],
+    floats,
+  };
 }
 
 /** A vertical viridis bar with its two ends written beside it. */

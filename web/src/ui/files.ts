@@ -8,23 +8,25 @@ import type { Light } from "../state";
 import { element } from "./dom";
 
 const ENVIRONMENT = ".hdr,.pic";
-const MESH = ".glb,.gltf,.obj";
+const MESH = ".glb,.gltf,.bin,.obj";
+const PICTURES = /\.(hdr|pic)$/i;
+const MESHES = /\.(glb|gltf|obj)$/i;
 
 export function openFile(app: PageApp, kind: "environment" | "mesh"): void {
-  const input = element("input", { type: "file", accept: kind === "environment" ? ENVIRONMENT : MESH });
-  input.addEventListener("change", () => {
-    if (input.files?.[0]) void useFile(app, input.files[0]);
-  });
+  const input = element("input", { type: "file", accept: kind === "environment" ? ENVIRONMENT : MESH, multiple: kind === "mesh" });
+  input.addEventListener("change", () => void useFiles(app, [...(input.files ?? [])]));
   input.click();
 }
 
-export async function useFile(app: PageApp, file: File): Promise<void> {
+/** The first picture or mesh of what was dropped together; the others are what it may refer to. */
+export async function useFiles(app: PageApp, files: readonly File[]): Promise<void> {
+  const file = files.find(({ name }) => PICTURES.test(name) || MESHES.test(name)) ?? files[0];
+  if (!file) return;
   try {
-    const name = file.name.toLowerCase();
-    if (/\.(hdr|pic)$/.test(name)) {
+    if (PICTURES.test(file.name)) {
       const picture = readRadiance(new Uint8Array(await file.arrayBuffer()), file.name);
       useEnvironment(app, picture.width, picture.height, picture.data);
-    } else if (/\.(glb|gltf|obj)$/.test(name)) app.useMesh(await readMesh(file));
+    } else if (MESHES.test(file.name)) app.useMesh(await readMesh(file, files.filter((other) => other !== file)));
     else throw new Error(`${file.name}: drop a Radiance picture (.hdr) or a mesh (.glb, .gltf, .obj).`);
     app.say(`${file.name} is in use.`);
   } catch (error) {
@@ -65,7 +67,6 @@ export function attachDrop(app: PageApp, host: HTMLElement): void {
     event.preventDefault();
     depth = 0;
     mark(false);
-    const file = event.dataTransfer?.files[0];
-    if (file) void useFile(app, file);
+    void useFiles(app, [...(event.dataTransfer?.files ?? [])]);
   });
 }

@@ -49,7 +49,8 @@ export class Layout {
     panels: readonly Panel[],
   ) {
     const actions: Actions = { copyLink: () => void this.copyLink(), screenshot: () => void this.screenshot(), theme: () => this.theme() };
-    const help = helpCard(app.data.notes ?? []);
+    const notes = app.data.notes ?? [];
+    const help = helpCard(notes);
     this.furnace = button("Furnace", "White furnace: radiance 1 from everywhere (F)", () => app.store.set("furnace", !app.state.furnace));
     this.furnace.dataset["act"] = "furnace";
     this.solo = button("All rows", "Show all rows again (Esc)", () => app.store.set("solo", null), "solo-note");
@@ -58,6 +59,7 @@ export class Layout {
       { class: "bar" },
       element("h1", {}, "Gonio"),
       element("span", { class: "title", title: app.data.title }, app.data.title),
+      ...(notes.length ? [button(notes.length === 1 ? "1 note" : `${notes.length} notes`, notes.join("\n"), () => help.showModal(), "notes")] : []),
       element("span", { class: "spacer" }),
       this.furnace,
       button("Link", "Copy a link that holds everything you see (C)", actions.copyLink),
@@ -74,9 +76,11 @@ export class Layout {
     this.lights = new LightSection(app, lights, (kind) => openFile(app, kind));
     this.view = new ViewSection(app, gui.addFolder("View"), (kind) => openFile(app, kind));
     this.terms = termBar(app);
-    parts.stage.append(element("div", { class: "over-top" }, this.terms.host, this.solo), this.status);
+    parts.stage.append(this.status);
     this.dock = new Dock(app, panels);
-    const center = element("div", { class: "center" }, parts.stage, this.dock.host);
+    // Above the picture, not over it: three rows of balls fill its height.
+    const top = element("div", { class: "top" }, this.terms.host, this.solo, this.terms.note);
+    const center = element("div", { class: "center" }, element("div", { class: "view" }, top, parts.stage), this.dock.host);
     parts.root.replaceChildren(bar, center, side, help);
     this.labels = new Labels(app);
     attachKeys(app, actions, help);

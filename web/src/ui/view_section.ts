@@ -4,6 +4,7 @@ import type { PageApp } from "../app";
 import { resetCamera } from "../camera";
 import { TONES } from "../display";
 import { hasTerm } from "../glsl";
+import { actingLights } from "../lights";
 import type { State, Term } from "../state";
 import { ChoiceControl, RangeControl, TickControl, addRow } from "./controls";
 import { button, element, segmented } from "./dom";
@@ -16,20 +17,22 @@ const TERM_LABELS: Record<Term, [string, string]> = {
   single: ["Single", "Light that bounced once between facets: the base alone."],
   multi: ["Multi", "Light that bounced more than once: what compensation adds."],
   compensated: ["Compensated", "Single and multi together. A row without compensation shows what it has."],
-  difference: ["Full − single", "What compensation adds, with its sign: orange above zero, blue below."],
-  rows: ["Row A − row", "The first row minus each other row, with its sign: orange above zero, blue below."],
+  difference: ["Full − single", "What compensation adds: orange above zero, blue below, black none."],
+  rows: ["Row A − row", "The first row minus each other row: orange above zero, blue below, black none."],
 };
 
-/** The bar over the picture that picks a term. */
-export function termBar(app: PageApp): { host: HTMLElement; update(): void } {
+/** The bar above the picture that picks a term, and a line that says what is seen where that is not plain. */
+export function termBar(app: PageApp): { host: HTMLElement; note: HTMLElement; update(): void } {
   const bar = segmented(
     (Object.keys(TERM_LABELS) as Term[]).map((value) => ({ value, label: TERM_LABELS[value][0], title: TERM_LABELS[value][1] })),
     (term) => app.store.set("view.term", term),
   );
   bar.host.classList.add("terms");
   bar.host.setAttribute("aria-label", "Term shown");
+  const note = element("p", { class: "term-note" });
   return {
     host: bar.host,
+    note,
     update() {
       const slots = app.visibleSlots();
       const possible = (term: Term) => {
@@ -38,8 +41,20 @@ export function termBar(app: PageApp): { host: HTMLElement; update(): void } {
         return slots.some((slot) => hasTerm(app.shaderOf(slot).manifest, term));
       };
       bar.show(app.state.view.term, possible);
+      const { term } = app.state.view;
+      const said = term === "full" ? unseen(app, slots) : TERM_LABELS[term][1];
+      if (note.textContent !== said) note.textContent = note.title = said;
     },
   };
+}
+
+/** Why a row is black, where the lights are to blame. */
+function unseen(app: PageApp, slots: number[]): string {
+  const lights = actingLights(app.state);
+  if (lights.length === 0) return "No light is on.";
+  if (lights.some((light) => light.type === "environment")) return "";
+  const mirrors = slots.filter((slot) => app.shaderOf(slot).manifest.delta === "always").map((slot) => String.fromCharCode(65 + slot));
+  return mirrors.length ? `${mirrors.join(", ")}: a mirror shows an environment only; its one direction never meets these lights.` : "";
 }
 
 export class ViewSection {
