@@ -170,6 +170,37 @@ def test_an_environment_comes_from_where_the_format_says() -> None:
     assert bright.sum() == pytest.approx(2 * right.sum(), rel=0.02)
 
 
+def test_an_environment_turns_as_far_as_one_likes() -> None:
+    what = one_ball(go.Lambert(albedo=1.0))
+    reference = Reference(what)
+    reference.pictures["k"] = np.linspace(0.0, 1.0, 8 * 16 * 3, dtype=np.float32).reshape(8, 16, 3)
+    light = {"type": "environment", "image": {"key": "k"}}
+    once = picture(reference, scene(what, [{**light, "rotation": 0.7}]))
+    often = picture(reference, scene(what, [{**light, "rotation": 0.7 + 100_000 * math.tau}]))
+    assert often == pytest.approx(once, rel=1e-3, abs=1e-4)
+
+
+def test_another_picture_under_the_same_key_is_another_light() -> None:
+    what = one_ball(go.Lambert(albedo=1.0))
+    reference = Reference(what)
+    light = {"type": "environment", "image": {"key": "k"}}
+    means = []
+    for radiance in (1.0, 3.0):
+        reference.pictures = {"k": np.full((4, 8, 3), radiance, np.float32)}
+        means.append(picture(reference, scene(what, [light]))[..., :3].mean())
+    assert means[1] == pytest.approx(3 * means[0], rel=1e-3)
+
+
+def test_under_a_black_environment_a_ball_is_black_and_not_gone() -> None:
+    what = one_ball(go.Conductor(alpha=0.3))
+    reference = Reference(what)
+    lit = picture(reference, scene(what, [SUN]))
+    reference.pictures["k"] = np.zeros((4, 8, 3), np.float32)
+    dark = picture(reference, scene(what, [{"type": "environment", "image": {"key": "k"}}]))
+    assert not dark[..., :3].astype("f2").any()
+    assert np.array_equal(dark[..., 3], lit[..., 3])
+
+
 @pytest.mark.parametrize("light", ["directional", "area", "environment"])
 def test_a_changed_value_compiles_nothing(light: str) -> None:
     command = [sys.executable, str(Path(__file__).with_name("kernels.py")), light]

@@ -252,6 +252,7 @@ class _Lamps:
     def __init__(self, mi: Any):
         self.mi = mi
         self.parts: dict[str, Any] = {}
+        self._shown: list[np.ndarray | None] = []
         self.extended = False
         self._structure: Any = None
         self._scene: Any = None
@@ -261,11 +262,13 @@ class _Lamps:
             if isinstance(light, messages.Environment) and light.image and light.image.key not in pictures:
                 hint = "upload it before the scene that names it"
                 raise InputError(f"unknown picture '{light.image.key}'", "lights", hint)
-        structure = [(light.type, getattr(light, "image", None)) for light in given]
-        if structure != self._structure:
+        shown = [pictures[x.image.key] if isinstance(x, messages.Environment) and x.image else None for x in given]
+        structure = [light.type for light in given]
+        # a key may be given to another picture: the arrays themselves are compared
+        if structure != self._structure or any(a is not b for a, b in zip(shown, self._shown, strict=True)):
             self.parts = {f"light{n}": self.mi.load_dict(self._plugin(x, pictures)) for n, x in enumerate(given)}
             self._scene = self.mi.load_dict({"type": "scene", **self.parts})
-            self._structure = structure
+            self._structure, self._shown = structure, shown
             self.extended = any(light.type in ("area", "environment") for light in given)
         self.write(self._scene, given)
         return self._scene
@@ -289,7 +292,10 @@ class _Lamps:
             case messages.Area():
                 return {"type": "rectangle", "emitter": {"type": "gonio_area", "radiance": white}}
             case messages.Environment(image=messages.Image(key=key)):
-                return textures.environment(self.mi, pictures[key])
+                picture = pictures[key]
+                if not picture.any():  # nothing to choose directions by; too dark for any picture will do
+                    picture = np.full_like(picture, 1e-20)
+                return textures.environment(self.mi, picture)
         return {"type": "constant", "radiance": white}
 
     def _values(self, light: Any) -> dict[str, Any]:
@@ -314,7 +320,8 @@ class _Lamps:
             case messages.Environment(image=None):
                 return {"radiance.value": mi.Color3f(*light.constant) * light.scale}
         # half a turn: see textures.environment
-        turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation) + 180.0)
+        # (modulo a turn: float32 keeps no angle of many turns)
+        turn = mi.Transform4f().rotate([0, 1, 0], math.degrees(light.rotation % math.tau) + 180.0)
         return {"to_world": turn, "scale": float(light.scale)}
 
 
