@@ -45,6 +45,11 @@ def test_the_page_comes_with_a_strict_policy(one: server.Server) -> None:
     assert "access-control-allow-origin" not in headers and "server" not in headers
 
 
+def test_the_policy_names_the_socket_as_far_as_it_can(one: server.Server) -> None:
+    for host, source in (("localhost:1", "ws://localhost:1"), ("[::1]:1", "'self'")):  # it knows no IPv6 addresses
+        assert f"connect-src blob: data: {source};" in get(one, Host=host)[1]["content-security-policy"]
+
+
 @pytest.mark.parametrize("path", ["/", "/?token=", "/?token=wrong", "/?token=a&token=b", "/?token=%ff"])
 def test_without_the_token_there_is_nothing(one: server.Server, path: str) -> None:
     status, _, body = get(one, path)
@@ -364,6 +369,18 @@ def test_a_browser_that_holds_up_whoever_opens_it_holds_up_no_end(monkeypatch: p
         assert not thread.is_alive()
     finally:
         closed.set()
+
+
+@pytest.mark.parametrize(("host", "warned"), [("127.1", False), ("localhost", False), ("0", True)])
+def test_the_address_is_the_one_that_was_had(
+    host: str, warned: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(server.Server, "serve_until_interrupted", lambda self: (print(self.url), self.listener.close()))
+    server.serve(STAGE, host=host, browser=False)
+    output = capsys.readouterr()
+    # what is open to all is reached by the loopback, too
+    assert output.out.startswith("http://127.0.0.1:") and "/?token=" in output.out
+    assert ("listening on 0.0.0.0" in output.err) == warned
 
 
 @pytest.mark.parametrize("host", ["", "[::1]", "a b", "http://127.0.0.1"])

@@ -134,7 +134,9 @@ class Application:
         if refusal:
             return PlainTextResponse(f"{refusal}: open the address that gonio view printed\n", 403, HEADERS)
         host = request.headers["host"]
-        policy = page.content_policy(f"ws://{host}") + "; frame-ancestors 'none'"
+        # A policy knows no IPv6 addresses; 'self' is the socket there, for browsers of CSP 3.
+        socket_address = "'self'" if host.startswith("[") else f"ws://{host}"
+        policy = page.content_policy(socket_address) + "; frame-ancestors 'none'"
         return HTMLResponse(self._html, headers={**HEADERS, "Content-Security-Policy": policy})
 
     async def talk(self, websocket: WebSocket) -> None:
@@ -274,7 +276,7 @@ class Server(uvicorn.Server):
     """uvicorn with the guards above, which says where it is reached and opens the browser once it is."""
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
-        self.application, self.host, self.browser, self.quiet = application, host, browser, quiet
+        self.application, self.browser, self.quiet = application, browser, quiet
         guarded = type("Guarded", (_Guarded,), {"waiting": {}, "answering": {}})
         self.listener = _listen(host, port)
         config = uvicorn.Config(
@@ -298,12 +300,17 @@ class Server(uvicorn.Server):
         super().__init__(config)
 
     @property
+    def address(self) -> str:
+        """Where it listens: what the host, which may be a name, came to."""
+        return str(self.listener.getsockname()[0])
+
+    @property
     def port(self) -> int:
         return int(self.listener.getsockname()[1])
 
     @property
     def url(self) -> str:
-        host = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
+        host = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.address, self.address)
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/?token={self.application.door.token}"
 
@@ -389,14 +396,7 @@ def serve(
     engine.variant_for(device)  # complains about a missing GPU now, not when the first page asks
     application = Application(what, Door(host), device)
     server = Server(application, host, port, browser)
-    if not _is_loopback(host):
-        print(
-            f"listening on {host}: whoever knows the address below can use it, and it is not encrypted", file=sys.stderr
-        )
+    if not ipaddress.ip_address(server.address).is_loopback:
+        warning = "whoever knows the address below can use it, and it is not encrypted"
+        print(f"listening on {server.address}: {warning}", file=sys.stderr)
     server.serve_until_interrupted()
-
-
-def _is_loopback(host: str) -> bool:
-    with contextlib.suppress(ValueError):
-        return ipaddress.ip_address(host).is_loopback
-    return host == "localhost"
