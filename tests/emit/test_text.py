@@ -12,8 +12,8 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio import cli
-from gonio.emit import bundle
+from gonio import cli, models, ops
+from gonio.emit import DIALECTS, bundle
 from gonio.emit.dialect import literal, pixels
 from gonio.energy import curves
 from gonio.ops import Table, lookup
@@ -77,7 +77,13 @@ def test_manifest_tells_what_a_program_must_know(lang: str) -> None:
     json.dumps(m, allow_nan=False)
     assert m["lang"] == lang and m["title"] == "KullaConty" and m["model"] == "kulla-conty"
     fields = {f["path"]: f for f in m["fields"]}
-    assert fields["base.alpha"] == {"name": "base_alpha", "path": "base.alpha", "type": "vec2", "value": [0.3, 0.1]}
+    alpha = fields["base.alpha"]
+    assert (alpha["name"], alpha["type"], alpha["value"]) == ("base_alpha", "vec2", [0.3, 0.1]) and "width" in alpha[
+        "doc"
+    ]
+    # eta, k, alpha, rotation, albedo
+    assert [f["offset"] for f in m["fields"]] == [0, 16, 32, 40, 48]
+    assert m["size"] == 64 and m["shader"] == f"kulla-conty.{lang}"
     assert fields["base.rotation"]["value"] == pytest.approx([np.cos(0.5), np.sin(0.5)])
     assert [t["name"] for t in m["terms"]] == ["D", "G", "F", "single", "multi"] and all(t["doc"] for t in m["terms"])
     kinds = {p["path"]: p["kind"] for p in m["parameters"]}
@@ -266,3 +272,32 @@ def test_numbers_do_not_shape_the_code() -> None:
     assert len(texts(*(go.Dielectric(eta, a) for eta, a in [(1, 0), (0.5, 0.2), (1.5, 1)]))) == 1
     assert len(texts(*(go.mix(go.Lambert(), go.Phong(), w) for w in (0, 0.5, 1)))) == 1
     assert len(texts(*(go.KullaConty(go.Conductor(alpha=a)) for a in (0, 0.5, 1)))) == 1
+
+
+def test_names_are_legal_in_every_language() -> None:
+    """GLSL keeps gl_ and every double underscore for itself, and each language its own words."""
+    for lang, dialect in DIALECTS.items():
+        for name, material in FEW.items():
+            code = re.sub("//.*", "", bundle(material, lang).text)
+            words = set(re.findall(r"[A-Za-z_]\w*", code))
+            assert not [w for w in words if "__" in w or w.startswith(("gl_", "_"))], (lang, name)
+            declared = set(re.findall(r"(?:\bfn|\blet|\bvar|\bstruct) (\w+)|^    (?:\w+) (\w+) = ", code, re.M))
+            assert not {w for pair in declared for w in pair} & dialect.reserved, (lang, name)
+
+
+def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None:
+    class Odd(go.BSDF):
+        """A grey surface whose parameters have unlucky names."""
+
+        half: float = models.base.number(0.5, "share of light that is reflected", low=0.0, high=1.0)
+        sample_: float = models.base.number(0.5, "another")
+
+        def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
+            """half times another |cos theta_i| / pi."""
+            return ops.where(wo.z * wi.z > 0.0, ops.abs(wi.z) * self.half * self.sample_ * ops.inv_pi, 0.0)
+
+    for lang in LANGS:
+        made = bundle(Odd(), lang, ("eval",))
+        names = [f["name"] for f in made.manifest["fields"]]
+        assert names[0] == ("half" if lang == "wgsl" else "half_")
+        assert all(re.search(rf"\b(?:self|material)\.{name}\b", made.text) for name in names)

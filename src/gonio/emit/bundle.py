@@ -23,7 +23,7 @@ from .glsl import GLSL
 from .hlsl import HLSL
 from .layout import COLUMNS, INDENT, comment
 from .program import Program
-from .simplify import Record
+from .simplify import SIZES, Record
 from .wgsl import WGSL
 from .writer import Writer
 
@@ -57,8 +57,10 @@ class Bundle:
     def write(self, folder: Path | str) -> list[Path]:
         """Write shader, manifest.json and one raw little-endian float32 file a table; the paths written."""
         folder = files.check_folder(folder)
-        name = self.manifest["model"] + self.dialect.suffix
-        contents = {name: self.text.encode(), "manifest.json": json.dumps(self.manifest, indent=2).encode()}
+        contents = {
+            self.manifest["shader"]: self.text.encode(),
+            "manifest.json": json.dumps(self.manifest, indent=2).encode(),
+        }
         for texture in self.manifest["textures"]:
             contents[texture["file"]] = self.tables[texture["uniform"]].astype("<f4").tobytes()
         files.write_all(folder, contents)
@@ -207,9 +209,17 @@ def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[st
     cls = type(model)
     struct = made.struct_of(made.bound)
     assert struct is not None
+    offsets, size = layout([type_ for _, type_ in struct.record.fields], dialect.name)
     fields = [
-        {"name": name, "path": path, "type": type_, "value": numbers[path]}
-        for (name, type_), path in zip(struct.record.fields, struct.paths, strict=True)
+        {
+            "name": dialect.word(name),
+            "path": path,
+            "type": type_,
+            "value": numbers[path],
+            "offset": offset,
+            "doc": struct.record.docs.get(name, ""),
+        }
+        for (name, type_), path, offset in zip(struct.record.fields, struct.paths, offsets, strict=True)
     ]
     terms = made.entries.get("terms")
     derived = made.derived
@@ -219,12 +229,14 @@ def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[st
         "model": cls.name,
         "title": cls.__name__,
         "doc": inspect.cleandoc(cls.__doc__ or ""),
+        "shader": cls.name + dialect.suffix,
         "struct": dialect.word(struct.record.name),
+        "size": size,
         "fields": fields,
         "derived": derived
         and {
-            "struct": derived.record.name,
-            "fields": [{"name": name, "type": type_} for name, type_ in derived.record.fields],
+            "struct": dialect.word(derived.record.name),
+            "fields": [{"name": dialect.word(name), "type": type_} for name, type_ in derived.record.fields],
         },
         "functions": {method: writer.names[routine] for method, routine in made.entries.items()},
         "terms": [
@@ -238,6 +250,7 @@ def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[st
                 "dimension": 3 if len(axes(table)) == 3 else 2,
                 "size": list(axes(table)),
                 "channels": width(table),
+                "format": {1: "r32float", 2: "rg32float", 4: "rgba32float"}[width(table)],
                 "file": f"{table.name}.f32",
                 "binding": place,
             }
@@ -248,6 +261,20 @@ def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[st
         "stochastic": False,
         "isotropic": bool(model.isotropic),
     }
+
+
+def layout(types: list[str], lang: str) -> tuple[list[int], int]:
+    """(offset of each field in bytes, size of the struct) in a uniform buffer: std140, WGSL's, or a cbuffer of HLSL."""
+    offsets, end = [], 0
+    for type_ in types:
+        size = 4 * SIZES.get(type_, 1)
+        if lang == "hlsl":  # packed, but no vector crosses a row of 16 bytes
+            start = end if end % 16 + size <= 16 else end + -end % 16
+        else:
+            start = end + -end % {4: 4, 8: 8, 12: 16, 16: 16}[size]
+        offsets.append(start)
+        end = start + size
+    return offsets, max(16, end + -end % 16)
 
 
 TERMS = {

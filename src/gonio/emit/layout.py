@@ -49,7 +49,7 @@ def _break(text: str, limit: int) -> int | None:
         elif c == " " and text[i + 1 : i + 3] in ("+ ", "- ", "? ", ": ", "* ", "/ ", "&&", "||"):
             place_ = i
         if place_ is not None:
-            loose = 0 if text[i + 1 : i + 2] in "?:&|" or c == "," else 1 if text[i + 1] in "+-" else 2
+            loose = 0 if c == "," else 1 if text[i + 1] in "?:&|" else 2 if text[i + 1] in "+-" else 3
             rank = (depth, loose)
             if best is None or rank <= best[0]:
                 best = (rank, place_)

@@ -79,7 +79,8 @@ class RoutineWriter:
         found, count = base, 1
         while found in self.taken or found in self.dialect.reserved:
             count += 1
-            found = f"{base}_{count}"  # a digit without the dash is a power: x2 is x squared
+            # a digit without the dash is a power, x2 is x squared; and GLSL keeps "__" for itself
+            found = f"{base.rstrip('_')}_{count}"
         self.taken.add(found)
         return found
 

@@ -53,7 +53,8 @@ def log_share(q: Any, p: Any) -> Any:
 
     The next term of the series is under 4e-10 of its value.
     """
-    z = minimum(p, 0.5) / (minimum(p, 0.5) - 2.0)
+    t = minimum(p, 0.5)
+    z = t / (t - 2.0)
     z2 = sqr(z)
     series: Any = 1 / 17
     for odd in range(15, 0, -2):
