@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, MachineError
@@ -51,13 +52,13 @@ def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
         import traitlets
     except ImportError:
         raise MachineError("anywidget is not installed", "go.view", "pip install 'gonio[notebook]'") from None
-    if not 100 <= height <= 4000:
-        raise InputError(f"height {height}", "go.view: height", "give 100 to 4000 pixels")
+    if not isinstance(height, Integral) or not 100 <= height <= 4000:
+        raise InputError(f"height {height!r}", "go.view: height", "give a whole number of pixels, 100 to 4000")
     html = page.html(page.page_data(_stage(models)))
     members: dict[str, Any] = {
         "_esm": _SCRIPT,
         "html": traitlets.Unicode(html).tag(sync=True),
-        "height": traitlets.Int(height).tag(sync=True),
+        "height": traitlets.Int(int(height)).tag(sync=True),
     }
     return type("GonioView", (anywidget.AnyWidget,), members)()
 
@@ -76,7 +77,13 @@ def _stage(models: tuple[Any, ...]) -> stage.Stage:
             bsdfs += [m.bsdf for m in named.materials.values()]
             given.append(set())
         else:
-            raise InputError(f"{type(model).__name__} given, a material or its name expected", "go.view")
+            name = model.__name__ if isinstance(model, type) else type(model).__name__
+            hint = ""
+            if isinstance(model, type) and issubclass(model, BSDF):
+                hint = f"make one of the class: go.view({name}())"
+            elif isinstance(model, list | tuple):
+                hint = "give them one by one: go.view(a, b)"
+            raise InputError(f"{name} given, a material or its name expected", "go.view", hint)
     return stage.of_models(bsdfs, given)
 
 
