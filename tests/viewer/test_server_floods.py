@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 import websockets
 from gonio.viewer import server, session
-from live_server import final_frame, get, next_frame, rest, running, scene, speak, upgraded, wait_for
+from live_server import STAGE, final_frame, get, next_frame, rest, running, scene, speak, upgraded, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +169,40 @@ def test_messages_are_read_at_a_bounded_rate(monkeypatch: pytest.MonkeyPatch) ->
     assert sum(light[:120]) == pytest.approx(0) and light[-1] == pytest.approx(1 / session.RATE)
     heavy = waits(0.01, 10)  # 100 a second would take all of the thread
     assert sum(heavy[:4]) == pytest.approx(0) and heavy[-1] == pytest.approx(0.01 / session.SHARE)
+
+
+def test_each_session_has_as_much_of_the_renderers_time_as_any_other() -> None:
+    renderer = session.Renderer(STAGE)
+    small, *large = [types.SimpleNamespace(cost=cost, spent=0.0, turns=0) for cost in (0.01, 0.3, 0.3, 0.3)]
+
+    def take_turns(ready: list[Any], count: int) -> None:
+        for _ in range(count):
+            chosen = renderer._next(ready)
+            chosen.turns += 1
+            chosen.spent += chosen.cost
+
+    take_turns(large, 30)
+    take_turns([small, *large], 330)  # who comes later has no more than the others from then on
+    assert small.turns == pytest.approx(300, abs=40)
+    assert [one.turns for one in large] == pytest.approx([20] * 3, abs=2)
+
+
+def test_nothing_is_rendered_for_a_page_that_takes_no_frames(
+    one: server.Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session, "HIDDEN_SECONDS", 0.0)
+    with speak(one) as client:
+        client.send(scene(1, spp=1 << 16))
+        header, _ = next_frame(client)
+        reference = one.application.sessions[0].reference
+        with speak(one) as other:  # two pictures of it, so that the thread has had the time for the first's next pass
+            other.send(scene(1, spp=1))
+            final_frame(other, 1)
+            other.send(scene(2, spp=1))
+            final_frame(other, 2)
+        assert reference.samples == header["spp"]
+        client.send(json.dumps({"type": "ack", "frame": header["frame"]}))
+        assert next_frame(client)[0]["spp"] > header["spp"]
 
 
 def test_a_message_of_endless_fragments_is_cut_off(one: server.Server) -> None:

@@ -21,6 +21,7 @@ from .reference import Reference
 from .stage import Stage
 
 PICTURES = 2  # environments kept a session: the one that is shown, and the one that comes
+HIDDEN_SECONDS = 1.0  # after which a page that has not taken a frame is one in a hidden tab: it waits until it does
 MOST_WISHES = 16  # shaders that a session waits for
 RATE = 250.0  # messages a second that are read of one page: it sends one a picture that it draws, one a frame it got
 SHARE = 0.1  # of the server's thread, for reading one page's messages
@@ -47,6 +48,7 @@ class Session:
         self.pictures: dict[str, Any] = {}
         self.reference: Reference | None = None
         self.shown_samples = 0
+        self.spent = 0.0  # seconds of the renderer's thread
         self.started = 0.0  # when this picture was begun
 
     # ------------------------------------------------------------------ in the server's thread
@@ -160,7 +162,7 @@ class Session:
 
 
 class Renderer:
-    """The thread that renders: one short pass for each session in turn, and shaders in between.
+    """The thread that renders: short passes for sessions, and shaders, each having as much of its time as any other.
 
     what    materials by key
     device  "cpu", "cuda" or "auto"
@@ -172,6 +174,7 @@ class Renderer:
         self._jobs: list[_Variant] = []
         self._lock = threading.Condition()
         self._running = False
+        self._clock = 0.0  # the least time that a session with work has had
         self._thread: threading.Thread | None = None
 
     # ------------------------------------------------------------------ asked by sessions
@@ -240,23 +243,35 @@ class Renderer:
                     self._lock.wait()
                 if not self._running:
                     return
-                job = self._jobs.pop(0) if self._jobs else None  # a shader takes as long as some passes: one a round
-                turns = [(session, session.scene) for session in self._sessions if _has_work(session)]
-            if job is not None:
-                job()
-            for session, scene in turns:
-                if scene is None or not self._running:
-                    continue
-                try:
+                session = self._next([*filter(_has_work, self._sessions), *(job.session for job in self._jobs)])
+                job = next((job for job in self._jobs if job.session is session), None)
+                if job is not None:
+                    self._jobs.remove(job)
+                scene = session.scene
+            began = time.perf_counter()
+            try:
+                if job is not None:
+                    job()
+                elif scene is not None:
                     self._turn(session, scene)
-                except GonioError as error:
-                    self._give_up(session, scene, error)
-                except Exception as error:
-                    first = str(error).strip().partition("\n")[0]
-                    what = f"the reference failed: {type(error).__name__}: {first}"
-                    self._give_up(session, scene, GonioError(what, "reference", "report this; the page itself goes on"))
+            except GonioError as error:
+                self._give_up(session, scene, error)
+            except Exception as error:
+                first = str(error).strip().partition("\n")[0]
+                what = f"the reference failed: {type(error).__name__}: {first}"
+                self._give_up(session, scene, GonioError(what, "reference", "report this; the page itself goes on"))
+            session.spent += time.perf_counter() - began
 
-    def _give_up(self, session: Session, scene: messages.Scene, error: GonioError) -> None:
+    def _next(self, ready: list[Session]) -> Session:
+        """Whose turn it is: who has had least of the thread's time. So a large picture does not hold up small ones.
+
+        Time without work is not saved up: who comes back begins where the others are (start-time fair queueing).
+        """
+        chosen = min(ready, key=lambda session: max(session.spent, self._clock))
+        self._clock = chosen.spent = max(chosen.spent, self._clock)
+        return chosen
+
+    def _give_up(self, session: Session, scene: messages.Scene | None, error: GonioError) -> None:
         """Drop a scene that cannot be rendered, but none that has come in its place."""
         with self._lock:
             if session.scene is scene:
@@ -314,9 +329,9 @@ def _worth_showing(reference: Reference, shown: int) -> bool:
 
 
 def _has_work(session: Session) -> bool:
-    """Whether samples are missing, or a finished picture waits to be shown."""
+    """Whether samples are missing, or a finished picture waits to be shown, to a page that takes what it gets."""
     reference = session.reference
-    if session.scene is None:
+    if session.scene is None or session.idle_for() > HIDDEN_SECONDS:
         return False
     if reference is None or reference.scene is not session.scene or not reference.done:
         return True
