@@ -301,3 +301,8 @@ def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None
         names = [f["name"] for f in made.manifest["fields"]]
         assert names[0] == ("half" if lang == "wgsl" else "half_")
         assert all(re.search(rf"\b(?:self|material)\.{name}\b", made.text) for name in names)
+
+
+def test_comparisons_of_wgsl_have_parentheses_only_where_a_template_could_be_read() -> None:
+    text = go.emit(GOLD, "wgsl")
+    assert "let is_smooth = material.alpha.x < SMOOTH && material.alpha.y < SMOOTH;" in text

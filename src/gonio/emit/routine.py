@@ -270,7 +270,10 @@ class RoutineWriter:
 
     def whole(self, value: Value) -> str:
         """The text of a statement's value."""
-        return self.expression(value, root=True)[0]
+        text = self.expression(value, root=True)[0]
+        if self.dialect.name == "wgsl" and value.op in ("lt", "le", "and", "or") and "," not in text:
+            text = re.sub(r"(?<!\w)\(([\w.]+ <=? [\w.]+)\)", r"\1", text)  # nothing here can be read as a template
+        return text
 
     def part(self, value: Value, level: int, strict: bool = False) -> str:
         """An argument, in parentheses where it binds looser than `level`."""
@@ -282,7 +285,7 @@ class RoutineWriter:
         if not root and value.order in self.locals:
             return self.locals[value.order], ATOM
         text, level = self.compose(value)
-        if not root and len(text) > INLINE and value.op not in SELECTED:
+        if not root and len(text) > INLINE and value.op not in (*SELECTED, "call"):  # a call is broken at its commas
             name = self.fresh(self._name_for(value))
             self.lines += wrap(self.dialect.local(self.writer.note(value.type), name, text), INDENT)
             self.locals[value.order] = name
