@@ -101,7 +101,9 @@ class Program:
             fields = [(path, type_) for path, type_ in key if path in paths]
             if fields and key in owner:
                 name = _free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
-                self._derived[key] = Struct(name, fields, "What follows from the parameters alone.")
+                by = f"{type(self.model).__name__}_derive"
+                doc = f"What follows from the parameters alone: {by} computes it, once a draw."
+                self._derived[key] = Struct(name, fields, doc)
         derive = self.entries.get("derive")
         if derive is None:
             return

@@ -238,7 +238,8 @@ class RoutineWriter:
             for other in self.routine.values():
                 if other.op == "element" and other.args[0] is value and "." in other.name:
                     return other.name.rpartition(".")[0].rpartition(".")[2]
-            return {"sample": "sampled"}.get(stem_of(value.static).rpartition("_")[2], "found")
+            tail = stem_of(value.static).rpartition("_")[2]
+            return {"sample": "sampled"}.get(tail, tail)
         squared = value.args[0] if _squares(value) else None
         if squared is not None and (not value.name or self.locals.get(squared.order) == value.name):
             inner = self.expression(squared)[0].replace(".", "_")
@@ -252,6 +253,8 @@ class RoutineWriter:
             return helper
         if value.op == "call":
             return stem_of(value.static).rpartition("_")[2].lower()
+        if value.op == "texel" and value.static[0].channels > 4:
+            return f"texel_{value.static[1]}"
         if value.type == "bool":
             return "holds"
         if value.op in ("abs", "neg") and value.args[0].type == value.type:
