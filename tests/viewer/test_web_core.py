@@ -99,6 +99,29 @@ def test_keys_turn_the_camera_and_reset_it(page: Page) -> None:
     assert page.state("camera") == first
 
 
+def test_keys_act_after_a_control_was_used(page: Page) -> None:
+    """The furnace is one key away, also where a slider, a tick or a list was the last thing touched."""
+    page.control("roughness").locator("input[type=range]").click()
+    page.tab.keyboard.press("f")
+    assert page.state("furnace")
+    page.control("Labels").locator("input").click()
+    page.tab.keyboard.press("f")
+    assert not page.state("furnace")
+    azimuth = page.state("camera.azimuth")
+    page.control("roughness").locator("input[type=range]").focus()
+    page.tab.keyboard.press("ArrowRight")
+    assert page.state("camera.azimuth") == azimuth  # an arrow is the slider's
+
+
+def test_preset_shows_its_linear_reflectance(page: Page) -> None:
+    page.control("Preset").locator("select").select_option("gold")
+    gold = go.Conductor.preset("Au")
+    eta, k = np.array(gold.eta), np.array(gold.k)
+    f0 = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)  # course sheet, eq. 11 and 12
+    shown = page.control("Preset").locator(".hint").text_content()
+    assert shown == "F0 " + " ".join(f"{v:.2f}".lstrip("0") for v in f0)
+
+
 def test_dragging_turns_the_camera(page: Page) -> None:
     box = page.tab.locator("canvas.picture").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -116,6 +139,13 @@ def test_solo_shows_one_row(page: Page) -> None:
     page.tab.keyboard.press("Escape")
     assert page.state("solo") is None
     assert page.picture(4)[..., 3].sum() == pytest.approx(2 * covered, rel=0.05)
+
+
+def test_a_row_alone_is_the_one_that_is_edited(page: Page) -> None:
+    page.tab.keyboard.press("2")
+    assert page.state("solo") == 1
+    assert page.state("selection") == {"slot": 1, "ball": 2}
+    assert page.tab.evaluate("() => [gonio.app.picked.slot, gonio.app.picked.ball]") == [1, 2]
 
 
 # --------------------------------------------------------------------------- link, theme, files

@@ -173,12 +173,22 @@ export class PageApp implements App {
     if (change.touches("slots", "solo", "lights", "furnace", "environment", "camera", "view.mesh", "view.term", "view.spacing")) this.invalidate();
     else if (change.touches("display", "view", "compare")) this.redraw();
     if (change.touches("display.theme")) this.themeChanged();
+    if (change.touches("slots", "solo", "selection")) this.selectShown();
     if (change.touches("slots"))
       this.state.slots.forEach((slot, index) => {
         if (!this.shaders.find(slot.material, slot.choices)) this.onMissingVariant(index);
       });
     if (change.touches("slots", "selection", "camera", "view.mesh", "view.spacing", "solo")) this.repick();
     this.saveLink();
+  }
+
+  /** What is edited and plotted is among what is seen: a row alone, or the first one left, is the selected one. */
+  private selectShown(): void {
+    const shown = this.visibleSlots();
+    const { slot, ball } = this.state.selection;
+    const first = shown[0];
+    if (first === undefined || shown.includes(slot)) return;
+    this.store.set("selection", { slot: first, ball: Math.min(ball, this.slot(first).balls.length - 1) });
   }
 
   invalidate(): void {

@@ -96,6 +96,9 @@ export class Live {
   }
 
   private later(): void {
+    // At once: what is on its way is of the new scene, what is on the screen of the old one.
+    const { reference } = this.app;
+    if (reference && !reference.stale && this.sent && this.scene() !== this.sent) this.app.setReference({ ...reference, stale: true });
     clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.send(), QUIET);
   }
@@ -120,6 +123,24 @@ export class Live {
       if (app.reference) app.setReference(null);
       return this.onStatus();
     }
+    const text = this.scene();
+    if (text === this.sent) {
+      // There and back within a moment: the picture is of what is shown after all.
+      if (app.reference?.stale && this.status.samples > 0) app.setReference({ ...app.reference, stale: false });
+      return;
+    }
+    this.sent = text;
+    this.id += 1;
+    if (app.reference && !app.reference.stale) app.setReference({ ...app.reference, stale: true });
+    Object.assign(this.status, { samples: 0, done: false, target: TARGET });
+    this.text({ type: "scene", id: this.id, ...(JSON.parse(text) as object) });
+    this.onStatus();
+  }
+
+  /** What the server is told of the state, as text. */
+  private scene(): string {
+    const { app } = this;
+    const { state } = app;
     const rows = app.visibleSlots().flatMap((slot) => {
       const row = state.slots[slot];
       if (!row) return [];
@@ -134,16 +155,7 @@ export class Live {
     const [width, height] = this.size();
     const half = fitted(Math.tan((state.camera.fov * Math.PI) / 360), width / height);
     const camera = { ...state.camera, fov: (Math.atan(half) * 360) / Math.PI };
-    const scene = { state: { rows, lights, camera, spacing: state.view.spacing }, width, height, spp: TARGET };
-    const text = JSON.stringify(scene);
-    if (text === this.sent) return;
-    this.sent = text;
-    this.id += 1;
-    // It stays on the screen until the first frame of the new one, but counts no more.
-    if (app.reference) app.setReference({ ...app.reference, stale: true });
-    Object.assign(this.status, { samples: 0, done: false, target: TARGET });
-    this.text({ type: "scene", id: this.id, ...scene });
-    this.onStatus();
+    return JSON.stringify({ state: { rows, lights, camera, spacing: state.view.spacing }, width, height, spp: TARGET });
   }
 
   /** Sends the picture of the environment once; lights name it by its key. */

@@ -53,7 +53,7 @@ function bounded(state: State, initial: State, materials: readonly Material[]): 
   });
   if (state.solo !== null && !state.slots[state.solo]) state.solo = null;
   if (!state.slots.some((slot) => slot.visible)) state.slots.forEach((slot) => (slot.visible = true));
-  const slot = Math.round(clamp(state.selection.slot, 0, state.slots.length - 1));
+  const slot = state.solo ?? Math.round(clamp(state.selection.slot, 0, state.slots.length - 1));
   const balls = state.slots[slot]?.balls.length ?? 1;
   state.selection = { slot, ball: Math.round(clamp(state.selection.ball, 0, balls - 1)) };
   state.camera.distance = clamp(state.camera.distance, 0.5, 500);

@@ -170,8 +170,8 @@ def homework(metal: str = "Ag") -> Stage:
     base = model("conductor")(eta=silver.eta, k=silver.k, alpha=ROUGHNESS[0] ** 2)  # type: ignore[call-arg]
     compensated = model("kulla-conty")(base=base)  # type: ignore[call-arg]
     materials = {
-        "m0": Material(f"Kulla-Conty, {silver.name}", compensated, {"base.masking": HOMEWORK_MASKINGS}),
-        "m1": Material(f"Plain conductor, {silver.name}", base, {"masking": HOMEWORK_MASKINGS}),
+        "m0": Material("Kulla-Conty", compensated, {"base.masking": HOMEWORK_MASKINGS}),
+        "m1": Material("Plain conductor", base, {"masking": HOMEWORK_MASKINGS}),
     }
     rows = (
         Row("Kulla-Conty", "m0", tuple(_rough("base.alpha", r) for r in ROUGHNESS)),

@@ -79,6 +79,7 @@ export class Comparison {
 
   private presented(): void {
     this.decorate();
+    if (this.figures && this.app.referencePicture()?.stale) this.wait();
     if (!this.wanted() || this.timer) return;
     this.timer = window.setTimeout(() => {
       this.timer = 0;
@@ -100,12 +101,7 @@ export class Comparison {
       for (const listener of this.listeners) listener();
       return;
     }
-    if (reference.stale) {
-      this.figures = this.pair = null;
-      this.lack = "Waiting for the reference of what is shown now.";
-      for (const listener of this.listeners) listener();
-      return;
-    }
+    if (reference.stale) return this.wait();
     const { term } = app.state.view;
     if (term !== "full" && term !== "compensated") {
       this.figures = this.pair = null;
@@ -139,12 +135,21 @@ export class Comparison {
       const map = await flipMap(screens.test, screens.reference, pair.width, pair.height);
       this.flip = { map, mean: Number.NaN };
       this.flipOf = screen;
+      if (app.referencePicture()?.stale) return this.wait();
     }
     if (this.flip) {
       this.flip.mean = meanOf(this.flip.map, mask);
       this.figures = { ...figures, flip: this.flip.mean, samples };
       if (kind === "flip") this.paint(this.flip.map.map((v, i) => (mask[i] ? v : Number.NaN)), pair);
     }
+    for (const listener of this.listeners) listener();
+  }
+
+  /** The picture and the reference are of two scenes: no figures of them. */
+  private wait(): void {
+    this.figures = this.pair = null;
+    this.seen = "";
+    this.lack = "Waiting for the reference of what is shown now.";
     for (const listener of this.listeners) listener();
   }
 
@@ -191,7 +196,7 @@ export class Comparison {
     this.scale.title = `${KINDS[kind]}, ${PIXELS[pixels]}${how}`;
     bar.style.background = `linear-gradient(to right, ${Array.from({ length: 17 }, (_, i) => css(table, i / 16)).join(", ")})`;
     const high = `${short(this.view.high)}${kind === "flip" && this.view.high === 1 ? "" : " and more"}`;
-    this.scale.replaceChildren(element("span", "", KINDS[kind]), element("b", "", "0"), bar, element("b", "", high));
+    this.scale.replaceChildren(element("span", "", `${KINDS[kind]}${this.app.referencePicture()?.stale ? ", of before" : ""}`), element("b", "", "0"), bar, element("b", "", high));
   }
 
   private listen(): void {

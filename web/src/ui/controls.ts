@@ -166,6 +166,7 @@ export class TripleControl extends Base<number[]> {
 export class ChoiceControl extends Base<string> {
   private readonly select = element("select");
   private readonly patch = element("span", { class: "patch" });
+  private readonly numbers = element("span", { class: "hint" });
   private shown = "";
 
   constructor(
@@ -181,8 +182,11 @@ export class ChoiceControl extends Base<string> {
     this.select.addEventListener("change", () => {
       field.set(this.select.value);
       this.updateDisplay();
+      // Chosen by hand: keys mean the page again. Who chooses by keys goes on in the list.
+      if (!this.select.matches(":focus-visible")) this.select.blur();
     });
     this.$widget.append(this.select);
+    if (color) this.$name.append(this.numbers);
     this.updateDisplay();
   }
 
@@ -199,7 +203,12 @@ export class ChoiceControl extends Base<string> {
     this.select.value = this.field.get();
     const shade = this.color?.();
     this.patch.hidden = !shade;
-    if (shade) this.patch.style.background = hexOf(shade);
+    this.numbers.hidden = !shade;
+    if (shade) {
+      this.patch.style.background = hexOf(shade);
+      this.numbers.textContent = `F0 ${shade.map((v) => v.toFixed(2).replace(/^0/, "")).join(" ")}`;
+      this.numbers.title = `Reflectance at normal incidence, linear RGB: ${shade.map((v) => short(v)).join(", ")}`;
+    }
     return this;
   }
 }

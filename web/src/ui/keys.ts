@@ -54,12 +54,15 @@ const KEYS: Key[] = [
 ];
 
 export function attachKeys(app: PageApp, actions: Actions, help: HTMLDialogElement): void {
-  addEventListener("keydown", (event) => {
+  // On the way down: the side panel's controls keep key presses to themselves.
+  const listen = (event: KeyboardEvent) => {
     if (event.ctrlKey || event.metaKey || event.altKey || help.open) return;
     const target = event.target as HTMLElement;
-    if (target.matches("input, select, textarea, [contenteditable]")) return;
+    // Letters belong to what is written in; a slider, a tick or a colour just used must not swallow them.
+    if (target.matches("input:not([type=range], [type=checkbox], [type=color]), select, textarea, [contenteditable]")) return;
+    if (target.matches("input") && (event.key.length > 1 || event.key === " ") && event.key !== "Escape") return;
     // In a row of tabs or a panel's own canvas the arrows belong to it.
-    if (event.key.startsWith("Arrow") && target.closest(".dock, [role=radiogroup]")) return;
+    if (event.key.startsWith("Arrow") && target.closest(".dock, .overlay, [role=radiogroup]")) return;
     if (event.key === "?" || event.key === "h") {
       help.showModal();
       return;
@@ -69,7 +72,8 @@ export function attachKeys(app: PageApp, actions: Actions, help: HTMLDialogEleme
     if (!key) return;
     event.preventDefault();
     key.act(app, actions, name);
-  });
+  };
+  addEventListener("keydown", listen, { capture: true });
 }
 
 export function helpCard(notes: readonly string[]): HTMLDialogElement {
