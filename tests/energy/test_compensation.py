@@ -157,6 +157,14 @@ def test_what_is_missing_keeps_its_digits_in_float32(ndf, masking):
         rows = ops.lookup(curves.isotropic(ndf, masking), ops.inset(kind.float(roughness), curves.ROWS))
         found.append(np.array(curves.missing(form, rows, curves.knee(form, masking, alpha), kind.float(mu))))
     assert found[0].min() >= 0.0 and found[0][found[0] > 0].min() < 1e-5
+    # and it is what the fit was made for, down to grazing
+    grazing = np.append(mu[:200], [0.0, 1e-7, 1e-5, 1e-3, 1.0])
+    rows = curves.isotropic(ndf, masking).values[(curves.ROWS - 1) // 2]
+    bend = curves.numpy_knee(form, masking, np.array([0.25]))
+    told = curves.evaluate(form, rows[None, :-1], bend, grazing[None])[0]
+    kind = ops.backend.types("float64")
+    ours = curves.missing(form, [kind.float(c) for c in rows], kind.float(bend), kind.float(grazing))
+    assert np.array(ours) == pytest.approx(told, rel=1e-9, abs=1e-12)
     some = found[0] > 1e-12
     # 10 times the relative change of z / r, which near the normal is that of 1 - mu
     slack = 3e-6 + 1e-6 / (1.0 - mu[some])

@@ -10,7 +10,7 @@ M is a smooth function of z in [0, 1] whatever the width, down to a limit at alp
 normal (z = 0), often toward grazing too, and a polynomial in powers of z would lose its digits there in float32. So it
 is kept in the basis of Bernstein, with no coefficient below 0:
 
-    M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   r = 1 / (1 + z / r),   c_k >= 0.
+    M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   1 / r = 1 + z / r,   c_k >= 0.
 
 Every term is positive and z / r is found without cancellation (`descent`): M keeps its digits where it is all but
 nothing. Rows of a table hold the c_k at equal steps of roughness and are interpolated linearly, M_avg beside them;
@@ -153,10 +153,9 @@ def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarra
     """Non-negative coefficients whose worst error times importance is small: the best of a few steps of reweighting."""
     from scipy.optimize import nnls  # late: a picture whose tables are there shall not wait for it
 
-    size = 1.0 / basis.max(axis=0)  # terms of one size: else the small are never chosen
-    weight, best, least = importance, np.zeros(len(size)), np.inf
+    weight, best, least = importance, np.zeros(basis.shape[1]), np.inf
     for _ in range(STEPS_OF_FIT):
-        found = nnls(basis * size * weight[:, None], target * weight, maxiter=10000)[0] * size
+        found = nnls(basis * weight[:, None], target * weight, maxiter=10000)[0]
         error = np.abs(basis @ found - target) * importance
         if error.max() < least:
             best, least = found, error.max()
@@ -353,7 +352,7 @@ def missing(form: Form, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
     found  from `coefficients`, the c_k first;  bend  `knee` at this width
     """
     ratio = descent(form, mu, bend)
-    return _polynomial(found[: form.degree + 1], ratio) * _power(1.0 / (1.0 + ratio), form.degree)
+    return _polynomial(found[: form.degree + 1], ratio) / _power(1.0 + ratio, form.degree)
 
 
 @ops.function
