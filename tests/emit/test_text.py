@@ -126,8 +126,11 @@ def test_unknown_languages_functions_and_things_are_refused() -> None:
         go.emit(GOLD, "glls")
     with pytest.raises(go.InputError, match="unknown function 'evil'"):
         go.emit(GOLD, functions=("evil",))
-    with pytest.raises(go.InputError, match="str given, a material expected"):
-        go.emit("conductor")  # type: ignore[arg-type]
+    with pytest.raises(go.InputError, match="int given, a material expected"):
+        go.emit(3)  # type: ignore[arg-type]
+    with pytest.raises(go.InputError, match="did you mean 'conductor'"):
+        go.emit("conducter")
+    assert go.emit("kulla-conty(color=sheet)") == go.emit(go.KullaConty(go.Conductor(alpha=0.3), color="sheet"))
     with pytest.raises(go.InputError, match="one value a ray given"):
         go.emit(go.Lambert(np.full((5, 3), 0.5)))
 

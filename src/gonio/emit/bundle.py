@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import files
 from ..errors import InputError, did_you_mean
-from ..models import BSDF
+from ..models import BSDF, notation
 from ..ops import graph
 from . import program as programs
 from .dialect import Dialect, axes, literal, pixels, reader, width
@@ -67,11 +67,12 @@ class Bundle:
         return [folder / file for file in contents]
 
 
-def emit(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:
+def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:
     """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
 
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
 
+    model      a material, or its text as the command line takes it: "conductor(preset=Au)"
     lang       "glsl" (ES 3.00, WebGL2), "wgsl" (WebGPU) or "hlsl" (shader model 6)
     functions  of "eval", "pdf", "sample", "terms" (D, G, F, ...; where the model has them)
     Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
@@ -81,10 +82,12 @@ def emit(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "p
     return bundle(model, lang, functions).text
 
 
-def bundle(model: BSDF, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")) -> Bundle:
+def bundle(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")) -> Bundle:
     """Shader, manifest and tables of a material; arguments as in `emit`."""
     if str(lang) not in DIALECTS:
         raise InputError(f"unknown language '{lang}'", "emit: lang", did_you_mean(str(lang), list(DIALECTS)))
+    if isinstance(model, str):
+        model = notation.named(model)[0]
     functions = programs.check(model, functions, "emit")
     dialect = DIALECTS[str(lang)]
     numbers = dict(_numbers(model))  # raises where there is more than one material's worth
