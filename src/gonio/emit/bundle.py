@@ -82,7 +82,9 @@ def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eva
     return bundle(model, lang, functions).text
 
 
-def bundle(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")) -> Bundle:
+def bundle(
+    model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")
+) -> Bundle:
     """Shader, manifest and tables of a material; arguments as in `emit`."""
     if str(lang) not in DIALECTS:
         raise InputError(f"unknown language '{lang}'", "emit: lang", did_you_mean(str(lang), list(DIALECTS)))
