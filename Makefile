@@ -22,7 +22,7 @@ install: .venv/installed
 demo: .venv/rendering
 	@mkdir -p out
 	$(BIN)/gonio bake ggx --lut E,Eavg,dfg -o out/tables
-	$(BIN)/gonio render examples/shading-balls -o out/shading-balls.png
+	$(BIN)/gonio render examples/shading-balls --spp 512 -o out/shading-balls.png
 	$(BIN)/gonio render examples/white-furnace -o out/white-furnace.png
 	$(BIN)/gonio view --export out/shading-balls.html
 

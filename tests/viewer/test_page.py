@@ -260,7 +260,7 @@ def test_the_export_opens_from_disk_and_asks_for_nothing(tmp_path: Path) -> None
         opened.on("pageerror", lambda error: problems.append(str(error)))
         opened.goto(path.as_uri())
         opened.wait_for_selector("canvas", timeout=30_000)
-        opened.wait_for_timeout(1000)
+        opened.wait_for_function("window.gonio.frames > 2")  # which a program may ask in the way it is used to
         picture = opened.screenshot()
     outside = [url for url in requests if not url.startswith(("file:", "blob:", "data:"))]
     assert outside == [] and problems == []
