@@ -61,6 +61,8 @@ def executable() -> str | None:
 
 
 class _Empty(http.server.BaseHTTPRequestHandler):
+    """An empty page: WebGPU is there in a secure context only, such as this machine's own pages."""
+
     def do_GET(self) -> None:
         self.send_response(200)
         self.send_header("Content-Type", "text/html")
@@ -72,9 +74,9 @@ class _Empty(http.server.BaseHTTPRequestHandler):
 
 
 @contextlib.contextmanager
-def origin() -> Iterator[str]:
-    """The address of an empty page on this machine: WebGPU is there in a secure context only."""
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), _Empty)
+def serving(handler: Any = _Empty) -> Iterator[str]:
+    """The address of a server on this machine that answers by the handler."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
         yield f"http://127.0.0.1:{server.server_port}/"
@@ -101,7 +103,7 @@ def chromium(*flags: str) -> Iterator[Any]:
 @contextlib.contextmanager
 def page(*flags: str) -> Iterator[Any]:
     """An empty page in a secure context; what it writes on its console comes with a failing test."""
-    with chromium(*flags) as browser, origin() as address:
+    with chromium(*flags) as browser, serving() as address:
         opened = browser.new_page()
         opened.on("console", lambda message: print(f"console: {message.text}"))
         opened.on("pageerror", lambda error: print(f"page error: {error}"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import http.server
 import shutil
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -36,13 +35,8 @@ def chromium() -> Iterator[Any]:
 def address(tmp_path: Path) -> Iterator[str]:
     shutil.copy(Path(__file__).with_name("alone.html"), tmp_path)
     handler = functools.partial(_Folder, directory=str(tmp_path))
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}/alone.html"
-    finally:
-        server.shutdown()
-        server.server_close()
+    with browser.serving(handler) as root:
+        yield f"{root}alone.html"
 
 
 @pytest.mark.parametrize("lang", ["glsl", "wgsl"])

@@ -130,7 +130,7 @@ def test_the_reference_follows_the_sliders(live: Live) -> None:
 def test_a_page_elsewhere_gets_nothing(live: Live) -> None:
     """The worst case: it knows the address with its token, and asks from another port of this machine."""
     sessions = len(live.one.application.sessions)
-    with browser.origin() as address:
+    with browser.serving() as address:
         tab = live.tab.context.new_page()
         tab.goto(address)
         found = tab.evaluate(HOSTILE, live.one.url)
@@ -143,7 +143,7 @@ def test_a_page_elsewhere_gets_nothing(live: Live) -> None:
 
 
 def test_the_page_may_not_reach_elsewhere(live: Live) -> None:
-    with browser.origin() as address:
+    with browser.serving() as address:
         tried = "(a) => fetch(a).then(() => 'reached', () => 'refused')"
         assert live.tab.evaluate(tried, address) == "refused"
     live.problems.clear()  # the browser says so on the console
