@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, overload
 
 from . import graph
 from .backend import (
@@ -25,11 +25,19 @@ from .backend import (
 )
 from .graph import Graph, Node, RecordingError, record
 from .table import Table, inset, lookup
+from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Vector
 
 __all__ = [
+    "Direction",
     "Graph",
+    "Mask",
+    "Mode",
     "Node",
+    "Pair",
+    "Precision",
     "RecordingError",
+    "Scalar",
+    "Spectrum",
     "Table",
     "abs",
     "atan2",
@@ -75,6 +83,8 @@ pi = math.pi
 inv_pi = 1.0 / math.pi
 
 F = TypeVar("F", bound=Callable)
+V = TypeVar("V", bound=Vector)
+T = TypeVar("T", float, Scalar, Pair, Direction, Spectrum)  # what a word takes and gives back
 
 
 def function(python_function: F) -> F:
@@ -89,7 +99,22 @@ def function(python_function: F) -> F:
     return wrapper  # type: ignore[return-value]
 
 
-def _unary(name: str, drjit_name: str | None = None) -> Callable[[Any], Any]:
+class _Unary(Protocol):
+    def __call__(self, x: T, /) -> T: ...
+
+
+class _Binary(Protocol):
+    @overload
+    def __call__(self, a: float, b: float, /) -> float: ...  # type: ignore[overload-overlap]
+    @overload
+    def __call__(self, a: Scalar | float, b: Scalar | float, /) -> Scalar: ...
+    @overload
+    def __call__(self, a: V, b: V | Scalar | float, /) -> V: ...
+    @overload
+    def __call__(self, a: Scalar | float, b: V, /) -> V: ...
+
+
+def _unary(name: str, drjit_name: str | None = None) -> _Unary:
     def word(x: Any) -> Any:
         if isinstance(x, Node):
             return graph.emit(name, x.type, x)
@@ -112,7 +137,7 @@ floor = _unary("floor")
 abs = _unary("abs")
 
 
-def _binary(name: str, drjit_name: str, python: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+def _binary(name: str, drjit_name: str, python: Callable[[Any, Any], Any]) -> _Binary:
     def word(a: Any, b: Any) -> Any:
         if isinstance(a, Node) or isinstance(b, Node):
             return graph.arithmetic(name, a, b)
@@ -130,6 +155,14 @@ atan2 = _binary("atan2", "atan2", math.atan2)
 copysign = _binary("copysign", "copysign", math.copysign)
 
 
+@overload
+def where(mask: Mask | bool, a: V, b: V | Scalar | float) -> V: ...
+@overload
+def where(mask: Mask | bool, a: Scalar | float, b: V) -> V: ...
+@overload
+def where(mask: Mask | bool, a: Scalar | float, b: Scalar | float) -> Scalar: ...
+@overload
+def where(mask: Mask | bool, a: Mask, b: Mask) -> Mask: ...
 def where(mask: Any, a: Any, b: Any) -> Any:
     """`a` where `mask` holds, else `b`; both are computed."""
     if isinstance(mask, Node) or isinstance(a, Node) or isinstance(b, Node):
@@ -142,16 +175,17 @@ def where(mask: Any, a: Any, b: Any) -> Any:
 
 
 @function
-def pow(x: Any, y: Any) -> Any:
+def pow(x: Scalar, y: Scalar | float) -> Scalar:
     """x ** y for x > 0; 0 where x <= 0, so that no power of unknown sign reaches a shader or a gradient."""
     positive = x > 0.0
     return where(positive, exp(y * log(where(positive, x, 1.0))), 0.0)
 
 
-def isfinite(x: Any) -> Any:
+def isfinite(x: Scalar | Vector) -> Mask:
     """True where x is neither infinite nor NaN."""
     if isinstance(x, Node):
-        return graph.emit("isfinite", "bool", x)
+        mask: Any = graph.emit("isfinite", "bool", x)
+        return mask
     return drjit().isfinite(x)
 
 
@@ -167,31 +201,39 @@ def is_short(x: Any) -> bool:
     return is_single(x)
 
 
-def sincos(x: Any) -> tuple[Any, Any]:
+def sincos(x: Scalar) -> tuple[Scalar, Scalar]:
     """(sin x, cos x)."""
     if is_drjit(x):
         return drjit().sincos(x)
     return sin(x), cos(x)
 
 
+@overload
+def fma(a: Scalar | float, b: Scalar | float, c: Scalar | float) -> Scalar: ...
+@overload
+def fma(a: V, b: V | Scalar | float, c: V | Scalar | float) -> V: ...
+@overload
+def fma(a: Scalar | float, b: V, c: V | Scalar | float) -> V: ...
+@overload
+def fma(a: Scalar | float, b: Scalar | float, c: V) -> V: ...
 def fma(a: Any, b: Any, c: Any) -> Any:
     """a b + c, in float32 in one operation and rounded once; float64, the oracle, rounds both as NumPy does."""
     return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
 
 @function
-def sqr(x: Any) -> Any:
+def sqr(x: T) -> T:
     """x * x."""
     return x * x
 
 
 @function
-def clamp(x: Any, low: Any, high: Any) -> Any:
+def clamp(x: T, low: T | float, high: T | float) -> T:
     """x held in [low, high]."""
     return minimum(maximum(x, low), high)
 
 
-def rsqrt(x: Any) -> Any:
+def rsqrt(x: T) -> T:
     """1 / sqrt(x); in float32 by the processor's estimate and a step of Newton's method, within 2 units."""
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
@@ -202,12 +244,19 @@ def _guarded(mask: Any, x: Any) -> Any:
 
 
 @function
-def safe_sqrt(x: Any) -> Any:
+def safe_sqrt(x: T) -> T:
     """sqrt(max(x, 0)), with gradient 0 instead of infinity where x <= 0."""
     positive = x > 0.0
-    return where(positive, sqrt(_guarded(positive, x)), 0.0)
+    root: Any = where(positive, sqrt(_guarded(positive, x)), 0.0)
+    return root
 
 
+@overload
+def safe_div(a: Scalar | float, b: Scalar) -> Scalar: ...
+@overload
+def safe_div(a: V, b: V | Scalar) -> V: ...
+@overload
+def safe_div(a: Scalar | float, b: V) -> V: ...
 @function
 def safe_div(a: Any, b: Any) -> Any:
     """a / b, and 0 where b = 0."""
@@ -215,14 +264,14 @@ def safe_div(a: Any, b: Any) -> Any:
     return where(some, a / _guarded(some, b), 0.0)
 
 
-def vec2(x: Any, y: Any) -> Any:
+def vec2(x: Scalar | float, y: Scalar | float) -> Pair:
     """A vector of two components."""
     if isinstance(x, Node) or isinstance(y, Node):
         return graph.emit("vector", "vec2", x, y)
     return types_like(type(x if is_drjit(x) else y)).vec2(x, y)
 
 
-def vec3(x: Any, y: Any, z: Any) -> Any:
+def vec3(x: Scalar | float, y: Scalar | float, z: Scalar | float) -> Direction:
     """A vector of three components."""
     if isinstance(x, Node) or isinstance(y, Node) or isinstance(z, Node):
         return graph.emit("vector", "vec3", x, y, z)
@@ -230,7 +279,7 @@ def vec3(x: Any, y: Any, z: Any) -> Any:
     return types_like(type(known)).vec3(x, y, z)
 
 
-def dot(a: Any, b: Any) -> Any:
+def dot(a: V, b: V) -> Scalar:
     """Scalar product."""
     if isinstance(a, Node):
         return graph.emit("dot", "float", a, b)
@@ -243,25 +292,25 @@ def dot(a: Any, b: Any) -> Any:
     return total
 
 
-def norm(v: Any) -> Any:
+def norm(v: Vector) -> Scalar:
     """Length of a vector."""
     return sqrt(dot(v, v))
 
 
 @function
-def normalize(v: Any) -> Any:
+def normalize(v: V) -> V:
     """v / |v|; v must not be 0."""
     return v * rsqrt(dot(v, v))
 
 
-def mean(spectrum: Any) -> Any:
+def mean(spectrum: Spectrum) -> Scalar:
     """Mean over the channels of a spectrum, as a float."""
     if isinstance(spectrum, Node):
         return graph.emit("mean", "float", spectrum)
     return drjit().mean(spectrum, axis=0)
 
 
-def max_component(spectrum: Any) -> Any:
+def max_component(spectrum: Spectrum) -> Scalar:
     """Largest channel of a spectrum, as a float."""
     if isinstance(spectrum, Node):
         return graph.emit("max_component", "float", spectrum)

@@ -1,0 +1,134 @@
+"""A family of members that anyone may add to: materials, distributions, laws, verbs, ...
+
+A member is found in one of three places, and nowhere has it to be listed:
+
+    one file in the family's folder                     whatever stands in `src/gonio`
+    an entry point of an installed package              [project.entry-points."gonio.models"]  ward = "mypackage:Ward"
+    `go.register(Ward)`, in a program or as decorator
+
+Names are unique in a family: a member that takes the name of another is an error, unless it is the same class again,
+from a file that was loaded anew.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from .errors import GonioWarning, InputError, did_you_mean
+
+Member = TypeVar("Member")
+
+
+class Family(Generic[Member]):
+    """The members of one kind, by name.
+
+    kind     what a member is called in errors, "material"
+    group    the entry points' group, "gonio.models"
+    folders  packages whose modules hold members, looked through when the first is asked for
+    member   what of a module or an entry point is a member, as (name, member); None where it is none
+    where    what an error about an unknown name points at
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        group: str,
+        folders: Iterable[str] | Callable[[], Iterable[str]],
+        member: Callable[[object], tuple[str, Member] | None],
+        where: str = "",
+    ) -> None:
+        self.kind, self.group, self.where = kind, group, where or kind
+        self._folders, self._member = folders, member
+        self._found: dict[str, Member] | None = None
+        self._added: dict[str, Member] = {}
+
+    def all(self) -> dict[str, Member]:
+        """Every member by name, in alphabetical order."""
+        if self._found is None:
+            found: dict[str, Member] = {}
+            for folder in self._folders() if callable(self._folders) else self._folders:
+                for name, member in self._in_package(folder):
+                    found[name] = member
+            self._found = found
+            for point in entry_points(group=self.group):
+                self._announced(point)
+        return dict(sorted({**self._found, **self._added}.items()))
+
+    def get(self, name: str, where: str = "") -> Member:
+        """The member of that name. InputError with the nearest known spelling where there is none."""
+        known = self.all()
+        if name not in known:
+            raise InputError(f"unknown {self.kind} '{name}'", where or self.where, did_you_mean(name, list(known)))
+        return known[name]
+
+    def add(self, thing: object, where: str = "register") -> str:
+        """Add a member; its name. InputError where it is none, or takes the name of another."""
+        found = self._member(thing)
+        if found is None:
+            raise InputError(f"{thing!r} is no {self.kind}", where)
+        name, member = found
+        standing = self.all().get(name)
+        if standing is not None and standing is not member and _source(standing) != _source(member):
+            what = f"the {self.kind} '{name}' is there already, in {_source(standing)[0]}"
+            raise InputError(what, where, "give yours another name")
+        self._added[name] = member
+        return name
+
+    def remove(self, name: str) -> None:
+        """Take back what `add` added."""
+        self._added.pop(name, None)
+
+    def _announced(self, point: Any) -> None:
+        """What an installed package brings; a broken one costs a warning and nothing else."""
+        where = f"entry point {self.group}: {point.name} = {point.value}"
+        try:
+            self.add(point.load(), where)
+        except Exception as error:  # a package of somebody else's
+            warnings.warn(f"{where} is left out: {type(error).__name__}: {error}", GonioWarning, stacklevel=4)
+
+    def _in_package(self, package: str) -> Iterable[tuple[str, Member]]:
+        module = importlib.import_module(package)
+        for entry in pkgutil.iter_modules(module.__path__):
+            name = f"{package}.{entry.name}"
+            for thing in vars(importlib.import_module(name)).values():
+                # what a module imports from another is that other's
+                if getattr(thing, "__module__", name) == name and (found := self._member(thing)) is not None:
+                    yield found
+
+
+def _source(member: object) -> tuple[str, str]:
+    """File (or module) and name of a member: the same for a class that was loaded anew."""
+    thing: Any = member if isinstance(member, type) or callable(member) else type(member)
+    module = sys.modules.get(thing.__module__)
+    file = str(getattr(module, "__file__", None) or thing.__module__)
+    return str(Path(file).resolve()) if file.endswith(".py") else file, str(thing.__qualname__)
+
+
+def subclasses_of(base: type[Member]) -> Callable[[object], tuple[str, type[Member]] | None]:
+    """What takes classes that derive from `base` and have a name, as members."""
+
+    def member(thing: object) -> tuple[str, type[Member]] | None:
+        if not isinstance(thing, type) or not issubclass(thing, base):
+            return None
+        name = str(getattr(thing, "name", ""))  # a base that members share has none
+        return (name, thing) if name else None
+
+    return member
+
+
+def instances_of(base: type[Member]) -> Callable[[object], tuple[str, Member] | None]:
+    """As `subclasses_of`, for families whose members need no parameters: one instance of each class."""
+
+    def member(thing: object) -> tuple[str, Member] | None:
+        found = of_class(thing)
+        return None if found is None else (found[0], found[1]())
+
+    of_class = subclasses_of(base)
+    return member
