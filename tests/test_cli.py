@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gonio import cli
-from gonio.ops import llvm
+from gonio import cli, llvm
 from gonio.render import images
 
 SCENE = {

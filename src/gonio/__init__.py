@@ -5,15 +5,24 @@
     value = gold.eval(wo, wi)            # (N, 3) arrays in, (N, 3) out
     sample = gold.sample(wo, u)          # .wi .weight .pdf .delta
 
-Names load when first used; Dr.Jit and Mitsuba load when something is first computed.
+Names load when first used; Dr.Jit and Mitsuba load when something is first computed. A libLLVM for them is chosen here,
+so that `import drjit` and `import mitsuba` work after this, and before it too.
 """
 
 from __future__ import annotations
 
+import contextlib
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from . import llvm
+from .errors import MachineError
+
 __version__ = "0.1.0"
+
+# Before Dr.Jit looks for one. Where there is none, whoever computes on the CPU says so; a GPU does without.
+with contextlib.suppress(MachineError):
+    llvm.use()
 
 _PLACES = {
     "GonioError": "errors",
@@ -34,7 +43,7 @@ _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 if TYPE_CHECKING:
     from . import emit, models, render, verify
     from .energy.albedo import Albedo, albedo
-    from .errors import GonioError, GonioWarning, InputError, MachineError
+    from .errors import GonioError, GonioWarning, InputError
     from .models import BSDF, Sample, model
     from .ops import get_precision, set_precision
     from .viewer.widget import view

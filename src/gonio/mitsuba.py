@@ -5,7 +5,8 @@
     import gonio.mitsuba
     bsdf = mi.load_dict({"type": "gonio_conductor", "preset": "Au", "alpha": 0.2})
 
-The import sets a variant only where none is set, and registers again whenever the variant changes.
+It does not matter which is imported first. The import sets a variant only where none is set, and registers again
+whenever the variant changes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Dr.Jit arrays: which array types to use, and the way in and out of NumPy.
 
-Dr.Jit starts here and nowhere else outside `render`, after an LLVM that works has been found.
+Dr.Jit starts here and nowhere else outside `render`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import llvm
 from ..errors import InputError
-from . import llvm
 
 PRECISIONS = ("float32", "float64")
 _precision = "float32"
@@ -44,9 +44,7 @@ def get_precision() -> str:
 
 @lru_cache
 def drjit() -> ModuleType:
-    """Dr.Jit; imported here first, it gets a working LLVM. On a GPU it is there already and needs none."""
-    if "drjit" not in sys.modules:
-        llvm.use()
+    """Dr.Jit, loaded when something is first computed."""
     import drjit as dr
 
     return dr
@@ -56,7 +54,7 @@ def drjit() -> ModuleType:
 def _types(backend: str, double: bool) -> Types:
     dr = drjit()
     if backend == "llvm":
-        llvm.use()  # whoever imported Dr.Jit: an LLVM that would abort is an error here
+        llvm.use()  # where none was found, or one that would abort, that is an error here
     module: ModuleType = getattr(dr, backend).ad
     end = "64" if double else ""
     return Types(

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._callable import make_callable
-from ..errors import MachineError
-from ..ops import llvm
 
 if TYPE_CHECKING:
     import numpy as np
-
-
-# Modules of this room import Dr.Jit, which loads an LLVM at once: the right one is named first. Where there is none,
-# `engine.load` says so, or a GPU does without.
-with contextlib.suppress(MachineError):
-    llvm.use()
 
 
 def render(scene: str | Path, *, denoise: bool = False, **options: Any) -> np.ndarray:

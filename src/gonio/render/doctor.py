@@ -14,8 +14,7 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .. import __version__
-from ..ops import llvm
+from .. import __version__, llvm
 from . import denoise, engine
 
 # Rays through Embree or OptiX, a Gonio material by its plugin, a compiled kernel: all that a render needs.
@@ -109,10 +108,7 @@ def _libraries() -> list[Finding]:
         place = f"{library.path} ({library.source})"
         if not library.usable:
             why = f"older than {llvm.OLDEST_USABLE}, it would abort the process" if library.version else "no libLLVM"
-            forced = library.source == "environment"
-            text = f"{place}: {why}" + (f"; unset {llvm.VARIABLE}, which names it" if forced else "; not used")
-            found.append(Finding("bad" if forced else "missing", subject, text))
-            chosen = chosen or forced
+            found.append(Finding("missing", subject, f"{place}: {why}; not used"))
         else:
             found.append(Finding("ok", subject, place + (": spare" if chosen else ": used for --device cpu")))
             chosen = True

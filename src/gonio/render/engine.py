@@ -1,16 +1,12 @@
-"""Choose the machine to render on: find LLVM, pick Mitsuba's variant, load Mitsuba once.
-
-Everything in `render` gets Mitsuba through `load()`, so that no import can start Dr.Jit with a wrong LLVM.
-"""
+"""Choose the machine to render on: Mitsuba's variant, and Mitsuba itself."""
 
 from __future__ import annotations
 
 import ctypes
-import os
 from types import ModuleType
 
+from .. import llvm
 from ..errors import InputError, MachineError
-from ..ops import llvm
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -44,18 +40,15 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
     threads  how many cores to use; None leaves Dr.Jit's default (all)
     Raises MachineError where no usable LLVM or no GPU is found.
     """
-    if os.environ.get("DRJIT_LIBLLVM_PATH") is None or device != "cuda":
-        try:
-            llvm.use()
-        except MachineError:
-            if device != "cuda":
-                raise
     import mitsuba as mi
 
-    if device is not None or mi.variant() is None:
+    variant = mi.variant()
+    if device is not None or variant is None:
         variant = variant_for(device or "cpu", spectral)
-        if mi.variant() != variant:
-            mi.set_variant(variant)
+    if variant.startswith("llvm_"):
+        llvm.use()
+    if mi.variant() != variant:
+        mi.set_variant(variant)
     if threads is not None:
         import drjit as dr
 

@@ -15,14 +15,12 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from ..errors import InputError
-from ..ops.backend import drjit
 from .integrators import Render, Settings, Transport
 from .lights import Lights
-
-dr = drjit()
 
 
 class Foreground(Render):

@@ -22,14 +22,12 @@ from dataclasses import dataclass, make_dataclass
 from functools import cache
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from ..errors import InputError
-from ..ops.backend import drjit
 from . import engine, sampler
 from .lights import Lights
-
-dr = drjit()
 
 INTEGRATORS: dict[str, str] = {
     "path": "path tracing: light and BSDF sampling combined at every vertex (max_depth - 1 shaded vertices)",

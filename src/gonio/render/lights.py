@@ -15,9 +15,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from ..ops.backend import drjit
-
-dr = drjit()
+import drjit as dr
 
 # Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
 # 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing

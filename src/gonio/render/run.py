@@ -131,7 +131,6 @@ def prepare(request: Request) -> Prepared:
     request.check()
     if not request.scene.exists():
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
-    # First of all: whatever imports Dr.Jit before the engine has chosen an LLVM makes it load the wrong one.
     mi = engine.load(request.device, threads=request.threads)
     if request.scene.suffix.lower() == ".xml" and request.scene.is_file():
         return _prepare_mitsuba(request, mi)

@@ -18,9 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..ops.backend import drjit
-
-dr = drjit()  # not `import drjit`: that would load whatever LLVM the system has
+import drjit as dr
 
 SAMPLERS: dict[str, str] = {
     "sobol": "Owen-scrambled Sobol pairs, shuffled per pixel and dimension: the least noise; any number of samples",

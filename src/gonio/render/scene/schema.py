@@ -6,7 +6,6 @@ Keys are spelled as in the file through their aliases.
 
 from __future__ import annotations
 
-import contextlib
 import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -38,11 +37,6 @@ class Output(Part):
 
 def samplers() -> list[str]:
     """The sampler names the integrators know."""
-    from ...errors import MachineError
-    from ...ops import llvm
-
-    with contextlib.suppress(MachineError):  # the import below starts Dr.Jit; without LLVM it can still serve a GPU
-        llvm.use()
     from ..sampler import SAMPLERS
 
     return list(SAMPLERS)

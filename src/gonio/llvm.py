@@ -1,0 +1,179 @@
+"""Find a libLLVM that Dr.Jit can use, before Dr.Jit looks for one itself.
+
+Dr.Jit ships no LLVM. When it is imported it loads the one that DRJIT_LIBLLVM_PATH names, else the first it finds. With
+LLVM 14, 15 and 16 Mitsuba 3.9 aborts the whole process ("Cannot select fminimum"), and an abort cannot be caught. So
+`import gonio` names one that works. Versions are read from the files, without loading them: every libLLVM carries its
+version as a symbol-version string such as `LLVM_19.1`.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import re
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from .errors import GonioWarning, MachineError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+OLDEST_USABLE = 17  # 14, 15 and 16 measured to abort under Mitsuba 3.9; 19.1 and 23.1 measured to work
+VARIABLE = "DRJIT_LIBLLVM_PATH"
+
+_SYSTEM_FOLDERS = (
+    "/usr/lib/x86_64-linux-gnu",
+    "/usr/lib/aarch64-linux-gnu",
+    "/usr/lib64",
+    "/usr/lib",
+    "/usr/local/lib",
+    "/opt/homebrew/opt/llvm/lib",
+    "/usr/local/opt/llvm/lib",
+)
+
+# Mitsuba's kinds of objects that Dr.Jit numbers; `jit_registry_id_bound` tells whether one of them is alive.
+_REGISTERED = ("BSDF", "Emitter", "Medium", "Mesh", "PhaseFunction", "Sensor", "Shape", "Texture")
+
+
+class Library(NamedTuple):
+    """A libLLVM: where it is, its version ("" where the file names none) and who provided it."""
+
+    path: Path
+    version: str
+    source: str  # "environment", "wheel" or "system"
+
+    @property
+    def usable(self) -> bool:
+        return bool(self.version) and int(self.version.split(".")[0]) >= OLDEST_USABLE
+
+
+def read_version(path: Path) -> str:
+    """The version of the libLLVM at `path`, "" where it is none; the file is read, not loaded."""
+    try:
+        with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
+            match = re.search(rb"\0LLVM_(\d+(?:\.\d+)?)\0", text)
+            if match:
+                return match[1].decode()
+    except (OSError, ValueError):  # missing, unreadable or empty
+        return ""
+    # macOS and Windows builds carry no version nodes; their file names do.
+    match_name = re.search(r"LLVM[-.](?:so\.|C\.)?(\d+(?:\.\d+)?)", path.resolve().name)
+    return match_name[1] if match_name else ""
+
+
+def _wheel() -> list[Path]:
+    """Those of installed wheels."""
+    places = (("lib", "libLLVM*.so*"), ("lib", "libLLVM*.dylib"), ("bin", "LLVM-C*.dll"))
+    prefixes = dict.fromkeys((sys.prefix, sys.base_prefix))
+    return [path for prefix in prefixes for folder, name in places for path in sorted(Path(prefix, folder).glob(name))]
+
+
+def _system() -> list[Path]:
+    """Those of the system."""
+    from ctypes.util import find_library
+
+    names = ("libLLVM*.so*", "libLLVM*.dylib")
+    found = [path for folder in _SYSTEM_FOLDERS for name in names for path in sorted(Path(folder).glob(name))]
+    found += sorted(Path("/usr/lib").glob("llvm-*/lib/libLLVM*.so*"))
+    by_linker = find_library("LLVM")
+    return [*found, Path(by_linker)] if by_linker and os.path.isabs(by_linker) else found
+
+
+def _ranked(paths: list[Path], source: str) -> list[Library]:
+    """One entry a file, the newest first."""
+    files = dict.fromkeys(path.resolve() for path in paths)
+    found = [Library(path, read_version(path), source) for path in files]
+    return sorted(found, key=lambda library: -float(library.version or 0))
+
+
+def _in_order() -> Iterator[Library]:
+    """The environment's, the wheel's, the system's; each is looked for when the one before was not enough."""
+    given = os.environ.get(VARIABLE)
+    if given:
+        yield from _ranked([Path(given)], "environment")
+    yield from _ranked(_wheel(), "wheel")
+    yield from _ranked(_system(), "system")
+
+
+def libraries() -> list[Library]:
+    """Every libLLVM in reach, one entry a file, in the order in which they are tried."""
+    seen: dict[Path, Library] = {}
+    for library in _in_order():
+        # `use` writes the wheel's path into the environment: it stays the wheel's
+        first = seen.setdefault(library.path, library)
+        seen[library.path] = first._replace(source=library.source)
+    return list(seen.values())
+
+
+def use() -> Library:
+    """Choose the first usable libLLVM and see to it that Dr.Jit uses it; `import gonio` does so.
+
+    Dr.Jit loads its libLLVM when it is imported. Where a program has imported it before Gonio and it took one that is
+    too old, it is made to load another, as long as nothing has been computed and no object of Mitsuba's is alive.
+    Where the environment names one that cannot be used, the next is taken, with a warning. Raises MachineError where
+    nothing fits.
+    """
+    loaded = _loaded()
+    if loaded is not None and loaded.usable:
+        return loaded
+    tried: list[Library] = []
+    for library in _in_order():
+        if library.usable:
+            if tried and tried[0].source == "environment":
+                said = f"LLVM {tried[0].version}, which aborts the process" if tried[0].version else "no libLLVM"
+                text = f"{VARIABLE} names {said}; LLVM {library.version} at {library.path} is used instead"
+                warnings.warn(text, GonioWarning, stacklevel=2)
+            os.environ[VARIABLE] = str(library.path)
+            if loaded is not None and not _exchange():
+                old = f"loaded LLVM {loaded.version}, which aborts the process" if loaded.version else "found no LLVM"
+                hint = f"import gonio before drjit and mitsuba, or set {VARIABLE}={library.path} before Python starts"
+                raise MachineError(f"Dr.Jit was imported before Gonio and {old}", "LLVM", hint)
+            return library
+        tried.append(library)
+    too_old = ", ".join(dict.fromkeys(f"{x.version} at {x.path}" for x in tried if x.version))
+    what = f"no LLVM {OLDEST_USABLE} or newer found" + (f" (too old: {too_old})" if too_old else "")
+    install = "pip install karellen-llvm-core (Linux x86-64), or apt-get install libllvm19, or any LLVM >= 17"
+    raise MachineError(what, "LLVM", install)
+
+
+def _loaded() -> Library | None:
+    """The libLLVM that Dr.Jit has loaded, of version "" where it found none; None where Dr.Jit is not imported."""
+    dr = sys.modules.get("drjit")
+    if dr is None:
+        return None
+    version = ".".join(map(str, dr.detail.llvm_version()[:2])) if dr.has_backend(dr.JitBackend.LLVM) else ""
+    return Library(Path(os.environ.get(VARIABLE, "")), version, "loaded")
+
+
+def _exchange() -> bool:
+    """Let Dr.Jit shut down and start again with the libLLVM that the environment names now; whether it did.
+
+    It is left alone where kernels have run, a GPU holds values, or objects of Mitsuba's are alive: these would be lost.
+    Dr.Jit offers this to C++ only, by the names that Linux and macOS give to `jit_shutdown(int)` and so on. Having
+    found no libLLVM at first, it looks for none again.
+    """
+    import ctypes
+
+    dr, mi = sys.modules["drjit"], sys.modules.get("mitsuba")
+    report = dr.whos(as_string=True)
+    launches = re.search(r"Kernel launches *: (\d+)", report)
+    if launches is None or launches[1] != "0" or "CUDA" in report:
+        return False
+    try:
+        core = ctypes.CDLL(str(next(Path(str(dr.__file__)).parent.glob("*drjit-core.*"))))
+        shutdown, start, alive = core._Z12jit_shutdowni, core._Z8jit_initj, core._Z21jit_registry_id_boundPKcS0_
+    except (AttributeError, OSError, StopIteration):  # Windows, or another Dr.Jit
+        return False
+    variants = mi.variants() if mi else ()
+    if any(alive(variant.encode(), kind.encode()) for variant in variants for kind in _REGISTERED):
+        return False
+    threads = dr.thread_count()
+    dr.detail.clear_registry()
+    shutdown(0)
+    start(1 << dr.JitBackend.CUDA.value | 1 << dr.JitBackend.LLVM.value)
+    dr.set_thread_count(threads)
+    loaded = _loaded()
+    return loaded is not None and loaded.usable
