@@ -68,6 +68,10 @@ class Family(Generic[Member]):
             raise InputError(f"unknown {self.kind} '{name}'", where or self.where, did_you_mean(name, list(known)))
         return known[name]
 
+    def titles(self) -> dict[str, str]:
+        """Name -> first line of the member's docstring, without its full stop: what help and the manual print."""
+        return {name: (member.__doc__ or name).splitlines()[0].rstrip(".") for name, member in self.all().items()}
+
     def add(self, thing: object, where: str = "register") -> str:
         """Add a member; its name. InputError where it is none, or takes the name of another."""
         found = self._member(thing)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 from gonio.models.dielectric import Dielectric
 from gonio.ops import where
 from gonio.optics import fresnel
+from gonio.optics.fresnel.exact import dielectric
 
 
 class RightGlass(Dielectric):
@@ -35,7 +36,7 @@ class FresnelInsideOut(Dielectric):
     def reflectance(self, cos_o: Any, cos_t: Any, eta: Any) -> Any:
         inverse = 1.0 / eta
         turned = fresnel.cos_transmitted(cos_o, inverse)
-        return where(cos_t > 0.0, fresnel.dielectric(cos_o, turned, inverse), 1.0)
+        return where(cos_t > 0.0, dielectric(cos_o, turned, inverse), 1.0)
 
 
 GLASS = [RightGlass, WrongScaling, FresnelInsideOut]

@@ -6,7 +6,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.energy import curves, fresnel_average, quadrature, walk
+from gonio.energy import curves, quadrature, walk
 from gonio.models.base import converter
 from gonio.ops import backend
 
@@ -176,32 +176,6 @@ def test_no_coefficient_is_below_0(name):
     tables = getattr(curves, name)("ggx", "smith-correlated", *(["exact"] if name == "glass" else []))
     for table in tables.values() if name == "glass" else [tables]:
         assert table.values.min() >= 0.0
-
-
-def test_average_fresnel_has_its_closed_forms():
-    assert fresnel_average.schlick(0.04) == pytest.approx(0.04 + 0.96 / 21)
-    n = 1.5  # Walsh1926, as Duntley1942 gives it
-    closed = 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2)
-    closed += n**2 * (n**2 - 1) ** 2 / (n**2 + 1) ** 3 * np.log((n - 1) / (n + 1))
-    closed -= 2 * n**3 * (n**2 + 2 * n - 1) / ((n**2 + 1) * (n**4 - 1))
-    closed += 8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n)
-    assert fresnel_average.dielectric(n) == pytest.approx(closed, abs=1e-7)
-
-
-def test_the_imageworks_fit_is_within_a_percent_of_the_integral():
-    for metal in ("Au", "Ag", "Cu", "Al", "Fe", "Ti"):
-        m = go.Conductor.preset(metal)
-        for eta, k in zip(m.eta, m.k, strict=True):
-            exact = fresnel_average.integral(lambda mu, eta=eta, k=k: fresnel_average.fresnel.conductor(mu, eta, k))
-            assert fresnel_average.imageworks(*fresnel_average.edge_tint(eta, k)) == pytest.approx(exact, abs=0.01)
-
-
-def test_an_artists_two_colours_name_a_metal_and_come_back():
-    r, g = np.array([0.944, 0.776, 0.373]), np.array([0.9, 0.6, 0.2])
-    metal = go.Conductor(*fresnel_average.index_of(r, g))
-    for eta, k, reflectivity, tint in zip(metal.eta, metal.k, r, g, strict=True):
-        found = fresnel_average.edge_tint(float(eta), float(k))
-        assert found == pytest.approx((reflectivity, tint), abs=1e-9)
 
 
 def test_colours_agree_in_a_furnace_and_differ_on_gold():

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
 from gonio.ops import backend
 from gonio.optics import fresnel
+from gonio.optics.fresnel import artist, exact
+from gonio.optics.fresnel.schlick import schlick, schlick_average
 
 from sphere import SEED
 
@@ -21,7 +24,7 @@ def number(x: Any) -> Any:
 
 def dielectric(cos_i: Any, eta: Any) -> np.ndarray:
     c, e = number(cos_i), number(eta)
-    return fresnel.dielectric(c, fresnel.cos_transmitted(c, e), e).numpy()
+    return exact.dielectric(c, fresnel.cos_transmitted(c, e), e).numpy()
 
 
 def test_dielectric_is_the_textbook_formula() -> None:
@@ -36,13 +39,13 @@ def test_conductor_is_the_textbook_formula_with_a_complex_index() -> None:
     n = eta + 1j * k
     cos_t = np.sqrt(1 - (1 - cos_i**2) / n**2)
     s, p = (cos_i - n * cos_t) / (cos_i + n * cos_t), (n * cos_i - cos_t) / (n * cos_i + cos_t)
-    got = fresnel.conductor(number(cos_i), number(eta), number(k)).numpy()
+    got = exact.conductor(number(cos_i), number(eta), number(k)).numpy()
     np.testing.assert_allclose(got, 0.5 * (np.abs(s) ** 2 + np.abs(p) ** 2), rtol=1e-9)
 
 
 def test_conductor_without_absorption_is_a_dielectric() -> None:
     cos_i, eta = RNG.random(2000) * 0.999 + 1e-3, RNG.uniform(1.01, 4, 2000)
-    conductor = fresnel.conductor(number(cos_i), number(eta), number(np.zeros(2000))).numpy()
+    conductor = exact.conductor(number(cos_i), number(eta), number(np.zeros(2000))).numpy()
     np.testing.assert_allclose(conductor, dielectric(cos_i, eta), rtol=1e-9)
 
 
@@ -51,7 +54,7 @@ def test_normal_incidence_is_equations_11_and_12_of_the_sheet() -> None:
     r0 = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
     one = number(np.ones(100))
     np.testing.assert_allclose(fresnel.r0_conductor(number(eta), number(k)).numpy(), r0, rtol=1e-14)
-    np.testing.assert_allclose(fresnel.conductor(one, number(eta), number(k)).numpy(), r0, rtol=1e-12)
+    np.testing.assert_allclose(exact.conductor(one, number(eta), number(k)).numpy(), r0, rtol=1e-12)
     r0 = ((eta - 1) / (eta + 1)) ** 2
     np.testing.assert_allclose(fresnel.r0_dielectric(number(eta)).numpy(), r0, rtol=1e-14)
     np.testing.assert_allclose(dielectric(np.ones(100), eta), r0, rtol=1e-11, atol=1e-15)
@@ -74,7 +77,7 @@ def test_beyond_the_critical_angle_all_is_reflected() -> None:
 def test_grazing_light_is_all_reflected() -> None:
     assert dielectric(0.0, 1.5) == pytest.approx(1.0, abs=1e-15)
     assert dielectric(1e-9, 1.5) == pytest.approx(1.0, abs=1e-8)
-    assert fresnel.conductor(number(0.0), number(0.2), number(3.0)).numpy() == pytest.approx(1.0)
+    assert exact.conductor(number(0.0), number(0.2), number(3.0)).numpy() == pytest.approx(1.0)
 
 
 def test_reflectance_is_the_same_from_both_sides() -> None:
@@ -89,19 +92,45 @@ def test_equal_indices_reflect_nothing() -> None:
 
 def test_schlick_meets_r0_and_one() -> None:
     r0 = number([0.04, 0.5, 0.95])
-    np.testing.assert_allclose(fresnel.schlick(number(np.ones(3)), r0).numpy(), [0.04, 0.5, 0.95])
-    np.testing.assert_allclose(fresnel.schlick(number(np.zeros(3)), r0).numpy(), 1.0)
-    half = fresnel.schlick(number(0.5), number(0.04)).numpy()
+    np.testing.assert_allclose(schlick(number(np.ones(3)), r0).numpy(), [0.04, 0.5, 0.95])
+    np.testing.assert_allclose(schlick(number(np.zeros(3)), r0).numpy(), 1.0)
+    half = schlick(number(0.5), number(0.04)).numpy()
     assert half == pytest.approx(0.04 + 0.96 / 32)
 
 
 def test_schlick_is_within_four_percent_of_glass() -> None:
     cos_i = np.linspace(0, 1, 500)
-    exact = dielectric(cos_i, np.full(500, 1.5))
-    assert np.abs(fresnel.schlick(number(cos_i), number(np.full(500, 0.04))).numpy() - exact).max() < 0.04
+    truth = dielectric(cos_i, np.full(500, 1.5))
+    assert np.abs(schlick(number(cos_i), number(np.full(500, 0.04))).numpy() - truth).max() < 0.04
 
 
 def test_snells_law_holds_for_the_transmitted_cosine() -> None:
     cos_i, eta = RNG.random(1000), RNG.uniform(1, 3, 1000)
     cos_t = fresnel.cos_transmitted(number(cos_i), number(eta)).numpy()
     np.testing.assert_allclose(eta**2 * (1 - cos_t**2), 1 - cos_i**2, rtol=1e-10, atol=1e-14)
+
+
+def test_average_fresnel_has_its_closed_forms() -> None:
+    assert schlick_average(0.04) == pytest.approx(0.04 + 0.96 / 21)
+    n = 1.5  # Walsh1926, as Duntley1942 gives it
+    closed = 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2)
+    closed += n**2 * (n**2 - 1) ** 2 / (n**2 + 1) ** 3 * np.log((n - 1) / (n + 1))
+    closed -= 2 * n**3 * (n**2 + 2 * n - 1) / ((n**2 + 1) * (n**4 - 1))
+    closed += 8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n)
+    assert fresnel.kind("exact").dielectric_average(n) == pytest.approx(closed, abs=1e-7)
+
+
+def test_the_imageworks_fit_is_within_a_percent_of_the_integral() -> None:
+    for metal in ("Au", "Ag", "Cu", "Al", "Fe", "Ti"):
+        m = go.Conductor.preset(metal)
+        for eta, k in zip(m.eta, m.k, strict=True):
+            average = fresnel.kind("exact").conductor_average(eta, k)
+            assert artist.imageworks(*artist.edge_tint(eta, k)) == pytest.approx(average, abs=0.01)
+
+
+def test_an_artists_two_colours_name_a_metal_and_come_back() -> None:
+    r, g = np.array([0.944, 0.776, 0.373]), np.array([0.9, 0.6, 0.2])
+    metal = go.Conductor(*artist.index_of(r, g))
+    for eta, k, reflectivity, tint in zip(metal.eta, metal.k, r, g, strict=True):
+        found = artist.edge_tint(float(eta), float(k))
+        assert found == pytest.approx((reflectivity, tint), abs=1e-9)

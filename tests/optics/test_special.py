@@ -93,7 +93,7 @@ def test_rotating_back_undoes_a_rotation() -> None:
     )
 
 
-@pytest.mark.parametrize("kind", masking.KINDS)
+@pytest.mark.parametrize("kind", masking.Masking.family.all())
 def test_masking_lies_between_zero_and_one_and_is_symmetric(kind: str) -> None:
     wo, wi = random_directions(5000, 64, upper=True), random_directions(5000, 65, upper=True)
     m = wo + wi

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..optics.masking import term
+from ..optics.ndf import distribution
 from . import curves, quadrature
 
 LAYOUTS = ("linear", "stretched")
@@ -119,9 +121,9 @@ class Axes:
 
 def stretch(ndf: str, masking: str) -> tuple[curves.Form, str]:
     """How the stretched axis bends mu into s, and the same in words."""
-    if masking.startswith("schlick"):
+    if not term(masking).smith:
         return curves.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
-    if ndf == "ggx":
+    if distribution(ndf).long_tailed:
         return curves.Form(0, 1, 4.0), "sqrt(mu / (mu + 4 alpha))"
     return curves.Form(1, 2, 4.0), "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))"
 

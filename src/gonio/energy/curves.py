@@ -27,6 +27,8 @@ import numpy as np
 
 from .. import ops
 from ..ops import Table, sqr, sqrt
+from ..optics.masking import term
+from ..optics.ndf import distribution
 from . import cache, quadrature
 from .quadrature import gauss
 
@@ -72,19 +74,21 @@ FORMS = {
 
 def form_of(ndf: str, masking: str, side: str = "") -> Form:
     """The form of a table: of a metal, or of a side of glass."""
-    if masking.startswith("schlick"):
+    if not term(masking).smith:
         return FORMS["schlick-glass" if side else "schlick"]
-    kind = "ggx" if ndf == "ggx" else "narrow"
+    kind = "ggx" if distribution(ndf).long_tailed else "narrow"
     return FORMS[f"{side}-{kind}" if side else kind]
 
 
 def knee(form: Form, masking: str, alpha: Any) -> Any:
     """The bend: the cosine about which masking sets in."""
-    return _bend(form, 0.25 * sqr(sqrt(alpha) + 1.0) if masking == "schlick-direct" else alpha)
+    return _bend(form, term(masking).onset(alpha))
 
 
 def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
-    return _bend(form, 0.25 * (np.sqrt(alpha) + 1.0) ** 2 if masking == "schlick-direct" else alpha)
+    """The same of an array."""
+    found: Any = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
+    return _bend(form, np.asarray(found.numpy()).reshape(np.shape(alpha)))
 
 
 def _bend(form: Form, width: Any) -> Any:
@@ -341,8 +345,8 @@ def turn(found: tuple[Any, ...], along: Any, across: Any) -> tuple[Any, ...]:
 def _weigh(factors: tuple[Any, ...], terms: tuple[Any, ...]) -> Any:
     """Sum of the terms, each times its factor."""
     total = factors[0] * terms[0]
-    for factor, term in zip(factors[1:], terms[1:], strict=True):
-        total = ops.fma(factor, term, total)
+    for factor, value in zip(factors[1:], terms[1:], strict=True):
+        total = ops.fma(factor, value, total)
     return total
 
 

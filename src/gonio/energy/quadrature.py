@@ -40,10 +40,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import ops
-from ..errors import InputError, did_you_mean
 from ..ops import backend
 from ..optics import frame, fresnel, masking
 from ..optics.ndf import NDF, distribution
+from ..optics.special import gauss
 
 # Gauss-Legendre nodes over (chi, x). Measured: the worst texel of a 128 x 128 table with roughness >= 0.05 is then met
 # to 2e-7, and to 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.
@@ -76,13 +76,6 @@ class TwoWays(NamedTuple):
 
 
 @lru_cache
-def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights of Gauss-Legendre on [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(count)
-    return 0.5 * (x + 1.0), 0.5 * w
-
-
-@lru_cache
 def longest_slope(name: str) -> float:
     """The stretched slope t beyond which a distribution holds less than about 1e-9 of its normals."""
     t = np.logspace(-1, 8, 400)
@@ -96,9 +89,7 @@ def longest_slope(name: str) -> float:
 
 def known_masking(name: str) -> str:
     """The name itself; InputError where no masking is called so."""
-    if name not in masking.KINDS:
-        raise InputError(f"unknown masking '{name}'", "masking", did_you_mean(str(name), list(masking.KINDS)))
-    return name
+    return masking.term(name).name
 
 
 def moments(
@@ -155,13 +146,11 @@ def glass(
     eta  index on the far side over index on wo's side: above 1 light enters the denser medium, below 1 it leaves it
     """
     known_masking(masking_name)
-    from ..models.dielectric import Dielectric
-
-    model = Dielectric(fresnel=fresnel_name)
+    kind = fresnel.kind(fresnel_name)
 
     def terms(chosen: NDF, wo: Any, m: Any, o_m: Any, widths: Any, eta_: Any) -> tuple[Any, ...]:
         cos_t = fresnel.cos_transmitted(o_m, eta_)
-        f = model.reflectance(o_m, cos_t, eta_)
+        f = kind.dielectric(o_m, cos_t, eta_)
         mirrored, through = frame.reflect(wo, m), frame.refract(wo, m, cos_t, eta_)
         g = masking.masking_shadowing(masking_name, chosen, wo, mirrored, m, widths)
         g_through = masking.masking_shadowing(masking_name, chosen, wo, through, m, widths, transmits=True)

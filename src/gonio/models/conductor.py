@@ -24,7 +24,7 @@ class Conductor(BSDF):
     rotation: Value = angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
     ndf: str = choice(default="ggx", doc="distribution of microfacet normals", choices=microfacet.NDFS)
     masking: str = choice(default="smith-correlated", doc="masking and shadowing", choices=microfacet.MASKINGS)
-    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=fresnel.KINDS)
+    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=microfacet.FRESNELS)
     albedo: Value = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
     sampling: str = choice(default="visible", doc="which normals are sampled", choices=microfacet.SAMPLINGS)
 
@@ -37,11 +37,7 @@ class Conductor(BSDF):
     @function
     def reflectance(self, cos_theta: Any) -> Any:
         """F by name, times albedo, at a facet seen under cos_theta."""
-        if self.fresnel == "one":
-            return self.albedo * 1.0
-        if self.fresnel == "schlick":
-            return self.albedo * fresnel.schlick(cos_theta, fresnel.r0_conductor(self.eta, self.k))
-        return self.albedo * fresnel.conductor(cos_theta, self.eta, self.k)
+        return self.albedo * fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, self.k)
 
     def _facet(self, wo: Any, wi: Any) -> tuple[Any, Any, Any, Any, Any]:
         """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all

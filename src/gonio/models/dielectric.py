@@ -50,7 +50,7 @@ class Dielectric(BSDF):
     rotation: Value = angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
     ndf: str = choice(default="ggx", doc="distribution of microfacet normals", choices=microfacet.NDFS)
     masking: str = choice(default="smith-correlated", doc="masking and shadowing", choices=microfacet.MASKINGS)
-    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=fresnel.KINDS)
+    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=microfacet.FRESNELS)
     albedo: Value = spectrum(
         default=1.0, doc="factor on everything reflected or transmitted", low=0.0, high=1.0, soft_high=True
     )
@@ -65,13 +65,7 @@ class Dielectric(BSDF):
     @function
     def reflectance(self, cos_o: Any, cos_t: Any, eta: Any) -> Any:
         """F by name at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
-        if self.fresnel == "one":
-            return 1.0 + 0.0 * cos_o
-        if self.fresnel == "schlick":
-            # from the denser side Schlick's angle is the transmitted one: the curve is 1 at the critical angle
-            cos_theta = where(eta < 1.0, cos_t, cos_o)
-            return where(cos_t > 0.0, fresnel.schlick(cos_theta, fresnel.r0_dielectric(eta)), 1.0)
-        return fresnel.dielectric(cos_o, cos_t, eta)
+        return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
     def _relative_eta(self, wo: Any) -> Any:

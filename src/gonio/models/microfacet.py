@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..ops import abs, backend, dot, function, maximum, safe_div, vec2, where
-from ..optics import masking
-from ..optics.ndf import distribution, distributions
+from ..optics import fresnel, masking
+from ..optics.ndf import NDF, distribution
 
-NDFS = {name: ndf.title for name, ndf in distributions().items()}
-MASKINGS = masking.KINDS
+NDFS = NDF.family.titles()
+MASKINGS = masking.Masking.family.titles()
+FRESNELS = fresnel.Fresnel.family.titles()
 SAMPLINGS = {
     "visible": "normals as wo sees them",
     "bounded": "visible normals whose reflection can lie above the surface (GGX; glass that transmits: as visible)",

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .. import ops
 from ..ops import exp, function, log, minimum, sqr, sqrt, where
@@ -18,6 +22,13 @@ _TAIL = (
     -0.0076224613, 0.00943887047, 1.00167406, 2.83297682,
 )
 # fmt: on
+
+
+@lru_cache
+def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Nodes and weights of Gauss-Legendre on [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (x + 1.0), 0.5 * w
 
 
 @function

@@ -146,16 +146,16 @@ def presets(bsdf: BSDF) -> list[dict[str, Any]]:
         stem = path.removesuffix("eta")
         if "k" in owner.parameters():
             for metal in indices.METALS.values():
-                f0 = fresnel.r0_conductor(np.array(metal.eta), np.array(metal.k))
+                f0 = [fresnel.r0_conductor(*index) for index in zip(metal.eta, metal.k, strict=True)]
                 values = {f"{stem}eta": list(metal.eta), f"{stem}k": list(metal.k)}
-                found.append({"name": metal.name, "set": values, "f0": [round(float(x), 6) for x in f0]})
+                found.append({"name": metal.name, "set": values, "f0": [round(x, 6) for x in f0]})
             # index 0 with any k reflects everything, at every angle
             white = {f"{stem}eta": [0.0] * 3, f"{stem}k": [1.0] * 3}
             found.append({"name": "F = 1", "set": white, "f0": [1.0] * 3})
         else:
             for medium in indices.MEDIA.values():
                 if medium.eta > 1.0:
-                    f0 = [round(float(fresnel.r0_dielectric(medium.eta)), 6)] * 3
+                    f0 = [round(fresnel.r0_dielectric(medium.eta), 6)] * 3
                     found.append({"name": medium.name, "set": {path: medium.eta}, "f0": f0})
         return found
     return found

@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 from ... import ops
 from ...models.base import Breach
 from ...ops import abs, maximum, where
-from .. import fresnel_average, missing, split_sum
+from ...optics.fresnel.schlick import schlick_average
+from .. import missing, split_sum
 from ..missing import Metal
 from ._added import _Added
 
@@ -29,7 +30,7 @@ class FdezAguera(_Added):
     def derive(self) -> Any:
         """What does not depend on directions."""
         f0 = missing.normal_reflectance(self.base)
-        return {**Metal.derive(self), "f0": f0, "f_avg": fresnel_average.schlick(f0)}
+        return {**Metal.derive(self), "f0": f0, "f_avg": schlick_average(f0)}
 
     def _extra(self, found: Any, wo: Any, wi: Any, mode: str) -> Any:
         lost = Metal.missing(self, found, wo)

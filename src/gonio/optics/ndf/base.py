@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any, ClassVar
 
+from ...members import Family, instances_of
 from ...ops import abs, dot, maximum, safe_div
 
 
@@ -12,15 +12,16 @@ class NDF:
     """Distribution of microfacet normals with widths alpha = (alpha_x, alpha_y).
 
     All methods take unit vectors of the local frame. m lies above the surface (m.z > 0); a direction v may lie on
-    either side, Smith's terms depend on |v.z|.
+    either side, Smith's terms depend on |v.z|. The first line of a member's docstring is its title in the manual.
+
+    long_tailed  whether Lambda falls off so slowly with the cosine, as 1 / cos^2, that something is masked at any angle
+                 (GGX); False: a few alpha from grazing nothing is. Tables of what single scattering misses choose their
+                 axes by it
     """
 
     name: ClassVar[str] = ""
-
-    @property
-    def title(self) -> str:
-        """First line of the member's file, for the manual."""
-        return (sys.modules[type(self).__module__].__doc__ or self.name).splitlines()[0].rstrip(".")
+    family: ClassVar[Family[NDF]]
+    long_tailed: ClassVar[bool] = False
 
     def D(self, m: Any, alpha: Any) -> Any:
         """Density of normals, 1/sr: its integral over D(m) m.z is 1."""
@@ -69,3 +70,6 @@ class NDF:
     def bounded_per_cosine(self, v: Any, m: Any, alpha: Any) -> Any:
         """`pdf_bounded` over |v.m|."""
         return self.visible_per_cosine(v, m, alpha)
+
+
+NDF.family = Family("microfacet distribution", "gonio.distributions", (__package__,), instances_of(NDF), "ndf")

@@ -52,7 +52,9 @@ def _horner(x: Any, coefficients: tuple[float, ...]) -> Any:
 
 
 class Beckmann(NDF):
-    """D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4).
+    """Beckmann: Gaussian slopes.
+
+    D = exp(-(m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / m_z^2) / (pi alpha_x alpha_y m_z^4).
 
     Heitz2014; isotropic: Walter2007, eq. 25.
     """

@@ -35,12 +35,15 @@ def slant2(v: Any, alpha: Any) -> Any:
 
 
 class GGX(NDF):
-    """D = 1 / (pi alpha_x alpha_y (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2 + m_z^2)^2).
+    """GGX (Trowbridge-Reitz).
+
+    D = 1 / (pi alpha_x alpha_y (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2 + m_z^2)^2).
 
     Heitz2014; isotropic: Walter2007, eq. 33.
     """
 
     name = "ggx"
+    long_tailed = True
 
     @function
     def D(self, m: Any, alpha: Any) -> Any:

@@ -11,7 +11,9 @@ from .ggx import slant2
 
 
 class StudentT(NDF):
-    """D = 1 / (pi alpha_x alpha_y m_z^4 (1 + (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / (2 m_z^2))^3) (Ribardiere2017).
+    """Student-T with gamma = 3: a tail between GGX (gamma = 2) and Beckmann (gamma -> infinity).
+
+    D = 1 / (pi alpha_x alpha_y m_z^4 (1 + (m_x^2 / alpha_x^2 + m_y^2 / alpha_y^2) / (2 m_z^2))^3) (Ribardiere2017).
 
     At gamma = 3 all is algebraic. The slope along a direction has density 3 / (4 s) (1 + x^2 / s^2)^(-5/2) with
     s^2 = 2 alpha^2, and Smith's integral of it is closed.

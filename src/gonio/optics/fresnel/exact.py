@@ -1,34 +1,36 @@
-"""Fresnel reflectance of unpolarized light, exact and by Schlick.
-
-`eta` is the index on the far side over the index on the side of the incident direction; for conductors eta and k are
-those of the metal over the index of the dielectric outside. Cosines, >= 0, are to the facet's normal.
-"""
+"""The Fresnel equations."""
 
 from __future__ import annotations
 
-from typing import Any
+from ... import ops
+from ...ops import Scalar, Spectrum, fma, function, rsqrt, sqr, sqrt
+from .base import Fresnel, r0_conductor, r0_dielectric
 
-from .. import ops
-from ..ops import fma, function, rsqrt, safe_sqrt, sqr, sqrt
 
-KINDS = {
-    "exact": "the Fresnel equations (Born1999)",
-    "schlick": "Schlick's approximation (Schlick1994) with R0 of the exact equations at normal incidence",
-    "one": "F = 1: a perfect mirror, for furnaces and tables",
-}
+class Exact(Fresnel):
+    """The Fresnel equations (Born1999)."""
+
+    name = "exact"
+
+    def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """Mean of R_s and R_p at a complex index."""
+        return conductor(cos_i, eta, k)
+
+    def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
+        """Mean of R_s and R_p at a real index."""
+        return dielectric(cos_i, cos_t, eta)
+
+    def conductor_normal(self, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """|n - 1|^2 / |n + 1|^2."""
+        return r0_conductor(eta, k)
+
+    def dielectric_normal(self, eta: Scalar) -> Scalar:
+        """((eta - 1) / (eta + 1))^2."""
+        return r0_dielectric(eta)
 
 
 @function
-def cos_transmitted(cos_i: Any, eta: Any) -> Any:
-    """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle.
-
-    1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels nowhere but at the critical angle.
-    """
-    return safe_sqrt(fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))) / eta
-
-
-@function
-def dielectric(cos_i: Any, cos_t: Any, eta: Any) -> Any:
+def dielectric(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
     """Exact reflectance of a dielectric: mean of the s and p polarized ones; 1 where cos_t = 0 (total reflection).
 
     With q = eta cos_t:  r_s = (cos_i - q) / (cos_i + q),  r_p = (eta^2 cos_i - q) / (eta^2 cos_i + q), both multiplied
@@ -46,7 +48,7 @@ def dielectric(cos_i: Any, cos_t: Any, eta: Any) -> Any:
 
 
 @function
-def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
+def conductor(cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
     """Exact reflectance of a conductor with complex index eta + i k (Born1999, ch. 14).
 
     With n = eta + i k, sin^2 = s, cos^2 = c and w = a + i b = sqrt(n^2 - s):  t = eta^2 - k^2 - s,
@@ -54,7 +56,7 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     R_s = |cos - w|^2 / |cos + w|^2 = |n^2 - 1|^2 / |cos + w|^4, as cos^2 - w^2 = 1 - n^2: nothing cancels,
     R_p / R_s = (c (a^2 + b^2) + s^2 - 2 a cos s) / (c (a^2 + b^2) + s^2 + 2 a cos s).
     """
-    cos2 = sqr(cos_i)
+    cos2 = cos_i * cos_i
     sin2 = 1.0 - cos2
     t = sqr(eta) - sqr(k) - sin2
     eta_k = eta * k
@@ -63,7 +65,7 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
     a = rsqrt(larger) * ops.where(t > 0.0, larger, eta_k)
     sum2 = fma(2.0 * cos_i, a, a2_b2 + cos2)
     contrast = fma(eta - 1.0, eta - 1.0, sqr(k)) * fma(eta + 1.0, eta + 1.0, sqr(k))
-    p1 = fma(cos2, a2_b2, sqr(sin2))
+    p1 = fma(cos2, a2_b2, sin2 * sin2)
     p2 = 2.0 * cos_i * sin2 * a
     # one division for both: R_s (1 + R_p / R_s) / 2; 0/0 is index 0 at normal incidence, which reflects all
     return fma(contrast, p1, VANISHING) / fma(sqr(sum2), p1 + p2, VANISHING)
@@ -72,23 +74,3 @@ def conductor(cos_i: Any, eta: Any, k: Any) -> Any:
 # Makes 0/0 a 1. Index 1e-4 has 1e-8 below, so it is lost beside any other value; its inverse squared, in the gradient,
 # stays in float32 times the peak of D.
 VANISHING = 1e-15
-
-
-@function
-def r0_dielectric(eta: Any) -> Any:
-    """Reflectance at normal incidence, ((eta - 1) / (eta + 1))^2 (course sheet, eq. 12)."""
-    return sqr((eta - 1.0) / (eta + 1.0))
-
-
-@function
-def r0_conductor(eta: Any, k: Any) -> Any:
-    """Reflectance at normal incidence, ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2) (course sheet, eq. 11)."""
-    return (sqr(eta - 1.0) + sqr(k)) / (sqr(eta + 1.0) + sqr(k))
-
-
-@function
-def schlick(cos_i: Any, r0: Any) -> Any:
-    """R0 + (1 - R0) (1 - cos)^5 (Schlick1994; course sheet, eq. 10)."""
-    c = ops.maximum(1.0 - cos_i, 0.0)
-    c5 = sqr(sqr(c)) * c
-    return r0 + (1.0 - r0) * c5

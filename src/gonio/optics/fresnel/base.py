@@ -1,0 +1,108 @@
+"""What every Fresnel kind offers; a member must give `curve`, or both `conductor` and `dielectric`.
+
+`eta` is the index on the far side over the index on the side of the incident direction; for conductors eta and k are
+those of the metal over the index of the dielectric outside. Cosines, >= 0, are to the facet's normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar, TypeVar
+
+from ...members import Family, instances_of
+from ...ops import Scalar, Spectrum, fma, function, maximum, safe_sqrt, sqr, where
+from ..special import gauss
+
+R = TypeVar("R", Scalar, Spectrum)
+N = TypeVar("N", float, Scalar, Spectrum)
+
+# Gauss-Legendre in sqrt(mu). Metals: 2e-7 from the integral over every preset; glass of eta 1.05 to 3: 4e-8
+NODES = 10
+
+
+class Fresnel:
+    """Reflectance of unpolarized light at a smooth interface: at an angle, at normal incidence, and on average.
+
+    The first line of a member's docstring is its title in the manual.
+
+    white  whether everything is reflected, at any angle and index: the kind that furnaces and tables need
+    """
+
+    name: ClassVar[str] = ""
+    family: ClassVar[Family[Fresnel]]
+    white: ClassVar[bool] = False
+
+    def curve(self, cos_i: Scalar | float, r0: R) -> R:
+        """Reflectance under cos_i of an interface that reflects r0 at normal incidence."""
+        raise NotImplementedError(f"{type(self).__name__} has neither `curve` nor `conductor` and `dielectric`")
+
+    def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """Reflectance of a metal of complex index eta + i k; here the curve from R0."""
+        return self.curve(cos_i, r0_conductor(eta, k))
+
+    def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
+        """Reflectance of a dielectric, with transmitted cosine cos_t (0: total reflection); here the curve from R0.
+
+        From the denser side the curve's angle is the transmitted one: it is 1 at the critical angle.
+        """
+        return where(cos_t > 0.0, self.curve(where(eta < 1.0, cos_t, cos_i), r0_dielectric(eta)), 1.0)
+
+    def conductor_normal(self, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """Reflectance of a metal at normal incidence."""
+        return self.conductor(1.0, eta, k)
+
+    def dielectric_normal(self, eta: Scalar) -> Scalar:
+        """Reflectance of a dielectric at normal incidence."""
+        one = 1.0 + 0.0 * eta
+        return self.dielectric(one, one, eta)
+
+    def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """F_avg = 2 int F mu dmu of a metal: Gauss's rule in sqrt(mu), error 2e-7."""
+        return average(lambda mu: self.conductor(mu, eta, k))
+
+    def dielectric_average(self, eta: Scalar) -> Scalar:
+        """F_avg of a dielectric from its less dense side, eta or 1 / eta: Gauss's rule in sqrt(mu), error 4e-8.
+
+        From the denser side it is 1 - (1 - F_avg) / eta^2, eta > 1, by reciprocity.
+        """
+        eta = maximum(eta, 1.0 / eta)
+        return average(lambda mu: self.dielectric(mu + 0.0 * eta, cos_transmitted(mu + 0.0 * eta, eta), eta))
+
+
+Fresnel.family = Family("Fresnel kind", "gonio.fresnels", (__package__,), instances_of(Fresnel), "fresnel")
+
+
+def kind(name: str) -> Fresnel:
+    """The Fresnel kind of that name; InputError where there is none."""
+    return Fresnel.family.get(name)
+
+
+def average(reflectance: Callable[[float], R]) -> R:
+    """2 int F(mu) mu dmu of a function of the cosine; a static sum, so it can be recorded."""
+    rule = [(float(x), float(w)) for x, w in zip(*gauss(NODES), strict=True)]  # plain: NumPy's would swallow Dr.Jit's
+    (x, w), *others = rule
+    total = reflectance(x * x) * (4.0 * w * x**3)
+    for x, w in others:
+        total = total + reflectance(x * x) * (4.0 * w * x**3)
+    return total
+
+
+@function
+def cos_transmitted(cos_i: Scalar, eta: Scalar) -> Scalar:
+    """Cosine of the refracted direction by Snell's law; 0 at and beyond the critical angle.
+
+    1 - (1 - cos^2) / eta^2, with eta^2 - 1 as a product: it cancels nowhere but at the critical angle.
+    """
+    return safe_sqrt(fma(cos_i, cos_i, (eta - 1.0) * (eta + 1.0))) / eta
+
+
+@function
+def r0_dielectric(eta: N) -> N:
+    """Reflectance at normal incidence, ((eta - 1) / (eta + 1))^2 (course sheet, eq. 12)."""
+    return sqr((eta - 1.0) / (eta + 1.0))
+
+
+@function
+def r0_conductor(eta: N, k: N) -> N:
+    """Reflectance at normal incidence, ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2) (course sheet, eq. 11)."""
+    return (sqr(eta - 1.0) + sqr(k)) / (sqr(eta + 1.0) + sqr(k))

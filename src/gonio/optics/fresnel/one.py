@@ -1,0 +1,29 @@
+"""No loss at all."""
+
+from __future__ import annotations
+
+from ...ops import Scalar, Spectrum
+from .base import Fresnel
+
+
+class One(Fresnel):
+    """F = 1: a perfect mirror, for furnaces and tables."""
+
+    name = "one"
+    white = True
+
+    def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """1."""
+        return 1.0 + 0.0 * eta
+
+    def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
+        """1: nothing is transmitted."""
+        return 1.0 + 0.0 * eta
+
+    def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """1."""
+        return 1.0 + 0.0 * eta
+
+    def dielectric_average(self, eta: Scalar) -> Scalar:
+        """1."""
+        return 1.0 + 0.0 * eta

@@ -1,0 +1,17 @@
+"""Smith's separable masking by the exact Lambda."""
+
+from __future__ import annotations
+
+from ...ops import Direction, Pair, Scalar
+from ..ndf import NDF
+from .base import Masking
+
+
+class SmithSeparableExact(Masking):
+    """Smith G1 G1 with the exact Lambda."""
+
+    name = "smith-separable-exact"
+
+    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
+        """G1(wo) G1(wi) (Walter2007, eq. 23)."""
+        return ndf.G1(wo, alpha) * ndf.G1(wi, alpha)
