@@ -37,7 +37,7 @@ SCENE = {
     },
 }
 
-VERBS = ("render", "study", "compare", "plot", "models", "explain", "schema", "doctor")
+VERBS = tuple(cli.Verb.family.all())
 
 
 @pytest.fixture
@@ -77,7 +77,8 @@ def test_help_loads_nothing_heavy() -> None:
         "import sys; from gonio import cli\n"
         "try: cli.main(['--help'])\n"
         "except SystemExit: pass\n"
-        "print([m for m in ('mitsuba', 'drjit', 'numpy', 'matplotlib', 'pydantic', 'scipy') if m in sys.modules])"
+        "heavy = ['mitsuba', 'drjit', 'numpy', 'matplotlib', 'pydantic', 'scipy', 'rich', 'importlib.metadata']\n"
+        "print([m for m in heavy if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout.strip().splitlines()[-1] == "[]"
@@ -104,9 +105,11 @@ def test_every_verb_has_an_example(verb: str, capsys: pytest.CaptureFixture[str]
 def test_help_groups_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("--help") == 0
     text = capsys.readouterr().out
-    for heading in ("Pictures", "Materials", "Support", "Exit codes"):
+    for heading in ("Pictures:", "Materials:", "Support:", "Exit codes:"):
         assert heading in text
-    assert all(re.search(rf"\b{verb}\b", text) for verb in VERBS)
+    assert "\x1b" not in text  # no terminal, no colours
+    assert text.index("  render ") < text.index("  study ") < text.index("  plot ") < text.index("  schema ")
+    assert all(re.search(rf"^  {verb}  ", text, re.MULTILINE) for verb in VERBS)
 
 
 def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -114,6 +117,84 @@ def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
 
     assert gonio("--version") == 0
     assert capsys.readouterr().out == f"gonio {package.__version__}\n"
+
+
+SHEEN = '''
+from dataclasses import dataclass
+from typing import Annotated
+from typer import Option
+from gonio.cli import verb
+
+@dataclass(frozen=True)
+class Fabric:
+    weave: Annotated[str, Option(help="How it is woven.")] = "twill"
+    threads: Annotated[int, Option("-n", metavar="N")] = 8
+
+@verb("Cloth")
+def sheen(name: str, *, loud: bool = False, fabric: Fabric) -> None:
+    """Print a fabric.
+
+    Examples:
+      gonio sheen wool --weave satin
+    """
+    print(name, loud, fabric)
+'''
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A folder with an installed package that brings a verb."""
+    folder = tmp_path / "site"
+    (folder / "sheen-1.dist-info").mkdir(parents=True)
+    (folder / "sheen-1.dist-info/METADATA").write_text("Metadata-Version: 2.1\nName: sheen\nVersion: 1\n")
+    (folder / "sheen-1.dist-info/entry_points.txt").write_text("[gonio.verbs]\nsheen = sheen_package:sheen\n")
+    (folder / "sheen_package.py").write_text(SHEEN)
+    return folder
+
+
+def _in_another_process(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([str(folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return subprocess.run(
+        [sys.executable, "-m", "gonio.cli", *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path, **environment},
+    )
+
+
+def test_a_package_adds_a_verb_by_one_file(package: Path) -> None:
+    done = _in_another_process(package, "sheen", "wool", "--loud", "-n", "3")
+    assert (done.returncode, done.stdout) == (0, "wool True Fabric(weave='twill', threads=3)\n"), done.stderr
+    done = _in_another_process(package, "--help")
+    assert re.search(r"^Cloth:\n  sheen  +Print a fabric\.$", done.stdout, re.MULTILINE), done.stdout
+    done = _in_another_process(package, "sheen", "--help")
+    assert "gonio sheen wool --weave satin" in done.stdout and "-n N  " in done.stdout
+    done = _in_another_process(package, "sheeen")
+    assert done.returncode == 2 and "did you mean 'sheen'?" in done.stderr
+
+
+def test_a_broken_package_costs_a_warning(package: Path) -> None:
+    (package / "sheen_package.py").write_text("import no_such_thing")
+    done = _in_another_process(package, "--version")
+    assert done.returncode == 0 and "no_such_thing" not in done.stderr
+    done = _in_another_process(package, "--help")
+    assert done.returncode == 0 and "sheen_package:sheen is left out: ModuleNotFoundError" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("gonio ren", "render"),
+        ("gonio plot cond", "conductor"),
+        ("gonio bake beck", "beckmann"),
+        ("gonio render --dev", "--device"),
+    ],
+)
+def test_the_shell_completes_without_loading_drjit(tmp_path: Path, line: str, offered: str) -> None:
+    words = {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" ")), "PYTHONPROFILEIMPORTTIME": "1"}
+    done = _in_another_process(tmp_path, _GONIO_COMPLETE="complete_bash", **words)
+    assert done.stdout.split() == [offered]
+    assert "gonio.cli" in done.stderr and "drjit" not in done.stderr and "mitsuba" not in done.stderr
 
 
 # --- errors --------------------------------------------------------------------------------------------
@@ -126,7 +207,7 @@ def test_no_arguments_print_the_help(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_a_misspelt_verb_or_option_gets_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "'render'" in failure(capsys, "rendr")
+    assert "did you mean 'render'?" in failure(capsys, "rendr")
     assert "--spp" in failure(capsys, "render", "x", "--sp", 3)
     assert "gonio compare --help" in failure(capsys, "compare", "a.exr")
 
@@ -233,6 +314,59 @@ def test_exposure_brightens_a_png(scene: Path) -> None:
     assert dim.mean() == pytest.approx(2 * dimmer.mean(), rel=0.02)
 
 
+def test_an_exposure_is_chosen_by_the_picture(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("render", scene, "-o", "a.exr") == 0
+    capsys.readouterr()
+    assert gonio("render", scene, "-o", "a.png", "--exposure", "auto") == 0
+    told = capsys.readouterr()
+    chosen = images.read("a.png").metadata["exposure"]
+    assert f"exposure {chosen:+g} EV" in told.out and told.err == ""
+    assert gonio("convert", "a.exr", "b.png", "--exposure", "auto", "--json") == 0
+    assert json.loads(capsys.readouterr().out) == {"output": "b.png", "exposure": chosen, "notice": ""}
+    np.testing.assert_array_equal(images.read("a.png").pixels, images.read("b.png").pixels)
+    vary = ["--vary", "scene.shapes.0.material.p=8", "--exposure", "auto", "--json"]
+    assert gonio("study", scene, *vary) == 0
+    assert json.loads(capsys.readouterr().out)["exposure"] == chosen
+
+
+def test_what_clips_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert gonio("render", scene, "-o", "a.exr", "--exposure", "1") == 0
+    assert ".exr keeps radiance as it is" in capsys.readouterr().err
+    for arguments in (["render", scene, "-o", "a.png"], ["convert", "a.exr", "a.png"]):
+        assert gonio(*arguments, "--exposure", "9") == 0
+        told = re.search(
+            r"warning: (\d+)% of the pixels .* try --exposure (-?[\d.]+), or auto", capsys.readouterr().err
+        )
+        assert told and int(told[1]) > 1
+        assert gonio(*arguments, "--exposure", told[2]) == 0
+        assert capsys.readouterr().err == ""
+    assert gonio("study", scene, "--vary", "scene.shapes.0.material.p=8", "--exposure", "9") == 0
+    assert "are brighter than white" in capsys.readouterr().err
+
+
+def test_convert_keeps_the_picture_and_its_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pixels = np.random.default_rng(1).random((5, 7, 3), np.float32)
+    images.write("a.exr", pixels, {"spp": 4})
+    for source, output, tolerance in (("a.exr", "a.npz", 0.0), ("a.npz", "a.hdr", 0.005), ("a.exr", "a.png", 0.02)):
+        assert gonio("convert", source, output) == 0
+        assert capsys.readouterr().out.startswith(output)
+        got = images.read(output)
+        np.testing.assert_allclose(got.pixels, pixels, atol=tolerance)
+        assert got.metadata["spp"] == 4
+    assert gonio("convert", "a.png", "a.png", "--exposure", "-1") == 0
+    np.testing.assert_allclose(images.read("a.png").pixels, pixels / 2, atol=0.02)
+    capsys.readouterr()
+    before = Path("a.png").read_bytes()
+    assert "unknown picture format '.jpg'" in failure(capsys, "convert", "a.exr", "a.jpg")
+    assert "cannot read" in failure(capsys, "convert", "b.exr", "a.png")
+    assert "no exposure" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "bright")
+    assert "-100 to 100" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "nan")
+    assert Path("a.png").read_bytes() == before
+
+
 def test_study_lays_out_every_combination(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     vary = ["--vary", "scene.shapes.0.material.p=4,16", "--vary", "scene.shapes.0.material.kd=[.1,.1,.1],[0.5,0,0],.9"]
     assert gonio("study", scene, *vary, "-o", "sheet.png", "--json") == 0
@@ -287,7 +421,11 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
         assert [row["name"] for row in page["parameters"]] == list(cls.parameters())
         assert page["doc"]
     assert gonio("explain", "conductor") == 0
-    assert "alpha" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "alpha" in text and "Mitsuba plugin: gonio_conductor" in text
+    assert "Source: src/gonio/models/conductor.py" in text
+    assert gonio("explain", "phong") == 0
+    assert "Breaks reciprocity by nature: " in capsys.readouterr().out
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")
 
 
@@ -317,6 +455,15 @@ def test_the_doctor_finds_something_to_render_with() -> None:
     assert code == 0 and report["can_render"] is True
     subjects = [finding["subject"] for finding in report["findings"]]  # type: ignore[attr-defined]
     assert {"Mitsuba", "Dr.Jit", "threads", "denoiser", "render on cpu"} <= set(subjects)
+
+
+def test_the_doctor_prints_brackets(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from gonio.render import doctor
+
+    finding = doctor.Finding("missing", "denoiser", "pip install 'gonio[denoise]' :smile:")
+    monkeypatch.setattr(doctor, "examine", lambda: doctor.Report((finding,), {"cpu": ""}))
+    assert gonio("doctor") == 0
+    assert "pip install 'gonio[denoise]' :smile:" in capsys.readouterr().out
 
 
 def test_the_doctor_survives_a_library_that_is_none(tmp_path: Path) -> None:

@@ -17,11 +17,13 @@ import pkgutil
 import sys
 import warnings
 from collections.abc import Callable, Iterable
-from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from .errors import GonioWarning, InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 Member = TypeVar("Member")
 
@@ -57,7 +59,7 @@ class Family(Generic[Member]):
                 for name, member in self._in_package(folder):
                     found[name] = member
             self._found = found
-            for point in entry_points(group=self.group):
+            for point in _entry_points(self.group):
                 self._announced(point)
         return dict(sorted({**self._found, **self._added}.items()))
 
@@ -89,7 +91,7 @@ class Family(Generic[Member]):
         """Take back what `add` added."""
         self._added.pop(name, None)
 
-    def _announced(self, point: Any) -> None:
+    def _announced(self, point: EntryPoint) -> None:
         """What an installed package brings; a broken one costs a warning and nothing else."""
         where = f"entry point {self.group}: {point.name} = {point.value}"
         try:
@@ -105,6 +107,19 @@ class Family(Generic[Member]):
                 # what a module imports from another is that other's
                 if getattr(thing, "__module__", name) == name and (found := self._member(thing)) is not None:
                     yield found
+
+
+def _entry_points(group: str) -> Iterable[EntryPoint]:
+    """The entry points of a group. Where no installed package names the group, which a look into their files tells,
+    importlib.metadata is not even loaded: that takes longer than the rest of `gonio --help`."""
+    for place in map(Path, sys.path):
+        files = place.glob("*-info/entry_points.txt")
+        # a zip is left to importlib.metadata, which can look inside
+        if place.is_file() or any(group.encode() in file.read_bytes() for file in files):
+            from importlib.metadata import entry_points
+
+            return entry_points(group=group)
+    return ()
 
 
 def _source(member: object) -> tuple[str, str]:

@@ -4,25 +4,72 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from ..errors import GonioError, GonioWarning, InputError
+from .verbs.base import INTERRUPTED, MATERIALS, PICTURES, SUPPORT, Verb
+
+_HEADINGS = re.compile(r"^\S[^:]*:", re.MULTILINE)
+_NAMES = re.compile(r"^  (-\S+(?:, --\S+)?(?= |$)|[a-z][\w-]*(?=  ))", re.MULTILINE)
+
+
+def _styled(text: str) -> str:
+    """Help with bold headings and coloured names. Typer's own way, by Rich, takes longer than all else together."""
+    return _NAMES.sub("  \x1b[36m\\1\x1b[0m", _HEADINGS.sub("\x1b[1m\\g<0>\x1b[0m", text))
+
+
+class _Command(TyperCommand):
+    def get_help(self, ctx: typer.Context) -> str:  # type: ignore[override]  # Typer has its own Click
+        return _styled(super().get_help(ctx))
+
+
+class _Verbs(TyperGroup):
+    """The verbs as commands, each made when it is asked for."""
+
+    def list_commands(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]
+        return [verb.name for verbs in _by_panel().values() for verb in verbs]
+
+    def get_command(self, ctx: typer.Context, cmd_name: str) -> TyperCommand | None:  # type: ignore[override]
+        if ctx.resilient_parsing and cmd_name not in Verb.family.all():
+            return None
+        one = typer.Typer(add_completion=False, rich_markup_mode=None)
+        one.command(cmd_name, cls=_Command)(Verb.family.get(cmd_name).with_single_options())
+        command = typer.main.get_command(one)
+        assert isinstance(command, TyperCommand)
+        return command
+
+    def format_commands(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]
+        panels = _by_panel()
+        width = max(len(verb.name) for verbs in panels.values() for verb in verbs)
+        for panel, verbs in panels.items():
+            with formatter.section(panel):  # type: ignore[attr-defined]
+                formatter.write_dl([(f"{verb.name:{width}}", verb.doc) for verb in verbs])  # type: ignore[attr-defined]
+
+    def get_help(self, ctx: typer.Context) -> str:  # type: ignore[override]
+        return _styled(super().get_help(ctx))
+
+
+def _by_panel() -> dict[str, list[Verb]]:
+    """The verbs under the headings of the help, in its order."""
+    panels: dict[str, list[Verb]] = {PICTURES: [], MATERIALS: [], SUPPORT: []}
+    for verb in sorted(Verb.family.all().values(), key=lambda verb: verb.place):
+        panels.setdefault(verb.panel, []).append(verb)
+    return panels
+
 
 app = typer.Typer(
     name="gonio",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=_Verbs,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Exit codes: 0 done, 1 verdict fails, 2 bad usage or input, 3 fault of the machine, 130 Ctrl-C.",
 )
-
-INTERRUPTED = 130  # what a shell reports of a program that Ctrl-C ended: 128 + SIGINT
-
-PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
 
 
 def _version(wanted: bool) -> None:
@@ -62,20 +109,21 @@ def _fail(error: GonioError, as_json: bool) -> int:
     return error.code
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+def _show_warning(message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
     """Our own warnings are for the user, in one line; those of libraries are for their authors."""
     if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
         print(f"warning: {message}", file=sys.stderr)
 
 
 def run(arguments: list[str] | None) -> int:
-    as_json = "--json" in (sys.argv[1:] if arguments is None else arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    as_json = "--json" in given
     try:
-        code = app(arguments, prog_name="gonio", standalone_mode=False)
+        code = app(given or ["--help"], prog_name="gonio", standalone_mode=False)
         sys.stdout.flush()
         if code == INTERRUPTED:  # Typer's answer to a KeyboardInterrupt; a render that kept its picture exits itself
             print("ended by Ctrl-C; nothing was written", file=sys.stderr)
-        return code if isinstance(code, int) else 0
+        return InputError.code if not given else code if isinstance(code, int) else 0
     except GonioError as error:
         return _fail(error, as_json)
     except BrokenPipeError:  # `gonio schema | head`: whoever read us has seen enough
@@ -83,8 +131,6 @@ def run(arguments: list[str] | None) -> int:
         return 0
     except Exception as error:
         if hasattr(error, "format_message"):  # a usage error of the argument parser
-            if not error.format_message():  # `gonio` alone: the help has been printed
-                return 2
             return _fail(_usage_error(error), as_json)
         if os.environ.get("GONIO_DEBUG"):
             raise
@@ -94,9 +140,10 @@ def run(arguments: list[str] | None) -> int:
         return _fail(failure, as_json)
 
 
-def _usage_error(error: Any) -> InputError:
-    command = error.ctx.command_path if getattr(error, "ctx", None) else "gonio"
-    message = error.format_message()
+def _usage_error(error: Exception) -> InputError:
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "gonio"
+    message = error.format_message()  # type: ignore[attr-defined]
     return InputError(message, "", "" if "Did you mean" in message else f"see `{command} --help`")
 
 

@@ -1,22 +1,76 @@
-"""Options and arguments that several verbs take, declared once."""
+"""Options and arguments that several verbs take, declared once: one by one, or as a dataclass of those that belong
+together, whose fields a verb gets as one parameter."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-Size = Annotated[str | None, typer.Option(metavar="WxH", help="Film size in pixels, such as 640x480.")]
-Spp = Annotated[int | None, typer.Option(metavar="N", help="Samples per pixel.")]
-Exposure = Annotated[float, typer.Option(metavar="EV", help="Stops of brightness, for .png.")]
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene's folder or .json; or a Mitsuba .xml.")]
-Integrator = Annotated[str | None, typer.Option(metavar="NAME", help="direct, path, whitted, normal, ...")]
-MaxDepth = Annotated[int | None, typer.Option(metavar="N", help="Longest path, for the integrator path.")]
-Sampler = Annotated[str | None, typer.Option(metavar="NAME", help="Where random numbers come from.")]
-Seed = Annotated[int | None, typer.Option(metavar="N", help="Same seed, same picture, to the bit.")]
-Device = Annotated[str, typer.Option(metavar="cpu|cuda|auto", help="Where to compute.")]
-Threads = Annotated[int | None, typer.Option(metavar="N", help="CPU cores to use; all if not given.")]
-Denoise = Annotated[bool, typer.Option("--denoise", help="Remove noise with Open Image Denoise.")]
-Outside = Annotated[bool, typer.Option("--allow-outside", help="Let the scene read files outside its folder.")]
+from . import completion
+
+if TYPE_CHECKING:
+    from ..models import BSDF
+    from ..render.run import Request
+
+Model = Annotated[
+    str,
+    Argument(metavar="MODEL", help="A material's name; see `gonio models`.", autocompletion=completion.materials),
+]
+Parameters = Annotated[list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")]
+SceneFile = Annotated[Path, Argument(metavar="SCENE", help="A scene's folder or .json; or a Mitsuba .xml.")]
+Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
+Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
+Device = Annotated[str, Option(metavar="cpu|cuda|auto", help="Where to compute.")]
+Exposure = Annotated[str, Option(metavar="EV|auto", help="Stops of brightness, for .png.")]
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a material that is named on the command line is set up."""
+
+    param: Parameters = None
+    preset: Annotated[
+        str,
+        Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets),
+    ] = ""
+
+    def of(self, model: str) -> BSDF:
+        """The material. Raises InputError for what is unknown or out of range."""
+        from ..models import notation
+
+        return notation.named(model, self.param or [], self.preset)[0]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """How a scene is rendered; None means: as the scene says."""
+
+    spp: Annotated[int | None, Option(metavar="N", help="Samples per pixel.")] = None
+    size: Annotated[str | None, Option(metavar="WxH", help="Film size in pixels, such as 640x480.")] = None
+    integrator: Annotated[str | None, Option(metavar="NAME", help="direct, path, whitted, normal, ...")] = None
+    max_depth: Annotated[int | None, Option(metavar="N", help="Longest path, for the integrator path.")] = None
+    sampler: Annotated[str | None, Option(metavar="NAME", help="Where random numbers come from.")] = None
+    seed: Annotated[int | None, Option(metavar="N", help="Same seed, same picture, to the bit.")] = None
+    device: Device = "cpu"
+    threads: Annotated[int | None, Option(metavar="N", help="CPU cores to use; all if not given.")] = None
+    denoise: Annotated[bool, Option("--denoise", help="Remove noise with Open Image Denoise.")] = False
+    exposure: Exposure = "0"
+    allow_outside: Outside = False
+
+    def request(self, scene: Path, output: Path | None = None, timeout: float | None = None) -> Request:
+        """The request to render a scene. Raises InputError for a size or an exposure that is none."""
+        from ..render import exposures, run
+
+        return run.Request(
+            scene,
+            output,
+            timeout=timeout,
+            **vars(self)
+            | {
+                "size": None if self.size is None else run.parse_size(self.size),
+                "exposure": exposures.parse(self.exposure),
+            },
+        )

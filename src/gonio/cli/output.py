@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
     from ..render.passes import Progress
 
 
@@ -23,12 +30,11 @@ class Bar:
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
         self._console = Console(stderr=True)
-        columns = "[cyan]{task.description}", "{task.fields[state]}"
         self._bar = Progress(
             SpinnerColumn(),
-            TextColumn(columns[0]),
+            TextColumn("{task.description}", style="cyan", markup=False),  # a material's text has brackets
             BarColumn(),
-            TextColumn(columns[1]),
+            TextColumn("{task.fields[state]}", markup=False),
             console=self._console,
             transient=True,
             disable=not self._console.is_terminal,
@@ -39,8 +45,10 @@ class Bar:
         self._bar.__enter__()
         return self
 
-    def __exit__(self, *exc: Any) -> None:
-        self._bar.__exit__(*exc)
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.__exit__(kind, error, trace)
 
     def update(self, progress: Progress) -> None:
         minutes, seconds = divmod(round(progress.remaining), 60)
@@ -55,8 +63,8 @@ class Bar:
         self._console.print("Ctrl-C: ending in a moment; again to end at once")
 
 
-def listing(*headings: str) -> Any:
-    """A table for the terminal."""
+def listing(*headings: str) -> Table:
+    """A table for the terminal; for `print_rich`."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -66,8 +74,26 @@ def listing(*headings: str) -> Any:
     return found
 
 
-def print_rich(what: Any) -> None:
-    """Print with colours where the terminal has them."""
+def print_rich(what: RenderableType) -> None:
+    """Print with colours where the terminal has them. Brackets are text, never markup."""
     from rich.console import Console
 
-    Console().print(what)
+    Console(markup=False, emoji=False).print(what)
+
+
+def print_tables(manifest: Mapping[str, Any], path: Path, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"path": str(path), **manifest}))
+        return
+    facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
+    facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
+    print(f"{path}: {', '.join(filter(None, facts))}")
+    table = listing("table", "shape", "max error", "rms", "between")
+    for name, shape in manifest["tables"].items():
+        error = manifest["error"].get(name, {})
+        figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
+        dims = [*manifest["dims"][name], ""]
+        table.add_row(name, " x ".join(f"{n} {axis}".strip() for n, axis in zip(shape, dims, strict=False)), *figures)
+    print_rich(table)
+    for axis, text in manifest["axes"].items():
+        print(f"{axis:10} {text}")

@@ -15,14 +15,18 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import files
 from ..errors import InputError, did_you_mean
-from . import engine
+from . import engine, exposures
 
 Value = str | int | float
+RGB = NDArray[np.float32]
+Number = TypeVar("Number", bound=np.generic)
 Metadata = Mapping[str, Value]
 
 SUFFIXES = (".exr", ".hdr", ".png", ".npz")
@@ -38,7 +42,7 @@ _MOST_PIXELS = 1 << 28  # 16384 x 16384: 3 GiB as float32 RGB
 class Picture:
     """A picture read from `path`; `hdr` is False where the file holds a screen's values (.png)."""
 
-    pixels: np.ndarray
+    pixels: RGB
     path: Path
     hdr: bool = True
     metadata: dict[str, Value] = field(default_factory=dict)
@@ -56,7 +60,7 @@ def check_writable(path: str | Path) -> Path:
     return files.check_file(target)
 
 
-def write(path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
+def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format its suffix names, whole or not at all.
 
     exposure  stops; PNG only, since the other formats keep radiance as it is
@@ -78,19 +82,48 @@ def write(path: str | Path, pixels: np.ndarray, metadata: Metadata | None = None
     return files.write_whole(path, content)
 
 
-def to_screen(pixels: np.ndarray, exposure: float = 0.0) -> np.ndarray:
+class Shown(NamedTuple):
+    """How a picture was written: the stops of a .png, None of other formats; what there is to say about it, or ""."""
+
+    exposure: float | None
+    notice: str
+
+
+def show(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0) -> Shown:
+    """Write a picture as `write` does, by an exposure that may be "auto", and say where a screen clips it."""
+    if Path(path).suffix.lower() != ".png":
+        write(path, pixels, metadata)
+        kept = f"{Path(path).suffix} keeps radiance as it is: --exposure is for .png"
+        return Shown(None, "" if exposure == 0 else kept)
+    chosen = exposures.stops(exposure, pixels)
+    write(path, pixels, {**(metadata or {}), "exposure": chosen}, chosen)
+    return Shown(chosen, exposures.clipping(chosen, pixels))
+
+
+def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure = 0.0) -> Shown:
+    """Write a picture again in the format that the suffix names, its settings kept; a .png by `exposure`, in stops.
+
+    A .png as source is decoded from sRGB, and what it clipped stays so. Raises InputError as `read` and `write` do.
+    """
+    check_writable(output)
+    picture = read(source)
+    metadata = {key: value for key, value in picture.metadata.items() if key != "exposure"}
+    return show(output, picture.pixels, metadata, exposure)
+
+
+def to_screen(pixels: RGB, exposure: float = 0.0) -> NDArray[np.uint8]:
     """Linear radiance to a screen's 8-bit values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
     x = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0) * np.float32(2.0**exposure), 0, 1)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
     return (encoded * 255 + 0.5).astype(np.uint8)
 
 
-def from_screen(values: np.ndarray) -> np.ndarray:
+def from_screen(values: NDArray[np.floating]) -> RGB:
     """sRGB-encoded values in [0, 1] to linear ones; the inverse of `to_screen` at exposure 0."""
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def png_bytes(values: np.ndarray, metadata: Metadata | None = None) -> bytes:
+def png_bytes(values: NDArray[np.uint8], metadata: Metadata | None = None) -> bytes:
     """An 8-bit RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks."""
     height, width = values.shape[:2]
     rows = values.reshape(height, width * 3)
@@ -118,7 +151,7 @@ def png_bytes(values: np.ndarray, metadata: Metadata | None = None) -> bytes:
     )
 
 
-def _bitmap_bytes(picture: np.ndarray, metadata: Metadata, file_format: str) -> bytes:
+def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
     mi = engine.load()
     bitmap = mi.Bitmap(picture)
     for key, value in metadata.items():
@@ -135,7 +168,7 @@ def _with_comments(radiance: bytes, metadata: Metadata) -> bytes:
     return b"\n".join([b"#?RADIANCE", *lines, rest])
 
 
-def _npz_bytes(picture: np.ndarray, metadata: Metadata) -> bytes:
+def _npz_bytes(picture: RGB, metadata: Metadata) -> bytes:
     import io
 
     stream = io.BytesIO()
@@ -215,7 +248,7 @@ def _claimed_size(content: bytes, suffix: str) -> tuple[int, int] | None:
     return (int(match[2]), int(match[1])) if match else None
 
 
-def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[np.ndarray, dict[str, Value]]:
+def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[RGB, dict[str, Value]]:
     mi, path = engine.load(), str(source)
     try:
         bitmap = mi.Bitmap(str(source), _mitsuba_format(mi, suffix))
@@ -235,7 +268,7 @@ def _mitsuba_format(mi: object, suffix: str) -> object:
     return getattr(mi.Bitmap.FileFormat, names[suffix])  # type: ignore[attr-defined]
 
 
-def _three_channels(values: np.ndarray, path: str | Path) -> np.ndarray:
+def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number]:
     grey = values if values.ndim == 3 else values[..., None]
     if grey.shape[2] in (1, 2):  # luminance, with or without alpha
         return np.repeat(grey[..., :1], 3, axis=2)
@@ -286,7 +319,7 @@ def _parsed(key: str, value: str) -> tuple[str, Value]:
             return key, value
 
 
-def _read_npz(source: Path) -> tuple[np.ndarray, dict[str, Value]]:
+def _read_npz(source: Path) -> tuple[RGB, dict[str, Value]]:
     where = str(source)
     try:
         with np.load(source, allow_pickle=False) as archive:

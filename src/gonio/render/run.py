@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError, did_you_mean
-from . import denoise, engine, images, mitsuba_scene
+from . import denoise, engine, exposures, images, mitsuba_scene
 from .passes import Interrupts, Progress, Renders, run
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Request:
     threads: int | None = None
     timeout: float | None = None
     denoise: bool = False
-    exposure: float = 0.0
+    exposure: exposures.Exposure = 0.0
     allow_outside: bool = False
     overrides: dict[str, Any] = field(default_factory=dict)
 
@@ -59,8 +59,7 @@ class Request:
             raise InputError(f"{self.threads} threads asked for", "--threads", "give 1 or more")
         if self.timeout is not None and not self.timeout > 0:
             raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
-        if not abs(self.exposure) <= 100:
-            raise InputError(f"{self.exposure:g} stops", "--exposure", "give -100 to 100; 1 doubles the brightness")
+        exposures.check(self.exposure)
         if self.size is not None:
             check_film(self.size, "--size")
         if self.denoise:
@@ -83,7 +82,7 @@ class Prepared:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a render; `stopped` is "", "interrupt" or "timeout", and `spp` what was done."""
+    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's."""
 
     output: Path
     spp: int
@@ -93,6 +92,7 @@ class Result:
     stopped: str
     settings: dict[str, images.Value]
     warnings: tuple[str, ...]
+    exposure: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return {**asdict(self), "output": str(self.output)}
@@ -284,7 +284,7 @@ def render(
     if stopped:
         settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
     seconds = time.perf_counter() - started
-    images.write(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
+    shown = images.show(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
     return Result(
         prepared.output,
         prepared.render.done,
@@ -293,7 +293,8 @@ def render(
         seconds,
         stopped,
         settings,
-        prepared.warnings,
+        (*prepared.warnings, *filter(None, [shown.notice])),
+        shown.exposure,
     )
 
 

@@ -123,16 +123,17 @@ def pair(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> dict[str, Any]:
 def show_pair(subject: Subject, wo: np.ndarray, wi: np.ndarray, console: Any) -> None:
     """Print `pair`."""
     from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
     from rich.table import Table
 
     found = pair(subject, wo, wi)
     title = f"{subject.title}: wo {found.pop('wo')}, wi {found.pop('wi')} (theta, phi in degrees)"
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, title=title, title_justify="left")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, title=escape(title), title_justify="left")
     for heading in ("", "f, 1/sr", "eval", "pdf, 1/sr"):
         table.add_column(heading)
     for label, row in found.items():
         if "fault" in row:
-            table.add_row(label, row["fault"], "", "")
+            table.add_row(label, escape(row["fault"]), "", "")
         else:
             digits = 7 if label.startswith("float32") else 15
             values = ["  ".join(f"{v:.{digits}g}" for v in row[key]) for key in ("f", "eval")]

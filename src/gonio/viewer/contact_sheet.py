@@ -10,7 +10,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..models import notation
-from ..render import images, passes, run
+from ..render import exposures, images, passes, run
 from . import figures
 
 MOST_CELLS = 256  # a sheet of more is no longer looked at, and is a typing error more often than not
@@ -59,17 +59,11 @@ class Sheet:
     spp: int
     size: tuple[int, int]
     seconds: float
+    exposure: float
     warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        return {
-            "output": str(self.output),
-            "cells": list(self.cells),
-            "spp": self.spp,
-            "size": list(self.size),
-            "seconds": self.seconds,
-            "warnings": list(self.warnings),
-        }
+        return asdict(self) | {"output": str(self.output)}
 
 
 def parse_variation(text: str) -> Variation:
@@ -108,14 +102,16 @@ def study(
             width, height = prepared.size
             passes.run(prepared.render, prepared.spp, width * height, interrupted=lambda: interrupts.asked)
             interrupts.check()
-            pictures.append(images.to_screen(run.finished(prepared.render, request.denoise), request.exposure))
+            pictures.append(run.finished(prepared.render, request.denoise))
     report(len(cells), len(cells), "drawing")
+    exposure = exposures.stops(request.exposure, *pictures)
+    warnings |= dict.fromkeys(filter(None, [exposures.clipping(exposure, *pictures)]))
     heading = title or _scene_name(request.scene)
     settings = prepared.settings
     subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {settings['integrator']}"  # noqa: RUF001
-    draw(pictures, variations, heading, subtitle, output)
+    draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle, output)
     seconds = round(time.perf_counter() - started, 2)
-    return Sheet(output, cells, prepared.spp, prepared.size, seconds, tuple(warnings))
+    return Sheet(output, cells, prepared.spp, prepared.size, seconds, exposure, tuple(warnings))
 
 
 def _scene_name(scene: Path) -> str:

@@ -1,0 +1,40 @@
+"""What the shell offers after Tab, without loading Dr.Jit: materials, distributions, presets."""
+
+from __future__ import annotations
+
+import typer
+
+Offers = list[tuple[str, str]]  # what may stand here, and what it is
+
+
+def materials(incomplete: str) -> Offers:
+    from ..models import models
+
+    return _starting(incomplete, {name: _first_line(cls) for name, cls in models().items()})
+
+
+def materials_and_distributions(incomplete: str) -> Offers:
+    from ..optics.ndf import distributions
+
+    return _starting(incomplete, {name: _first_line(type(d)) for name, d in distributions().items()}) + materials(
+        incomplete
+    )
+
+
+def presets(context: typer.Context, incomplete: str) -> Offers:
+    """The presets of the material that is named earlier on the line; without one, those of all."""
+    from ..models import models
+
+    first = next(iter(context.params.values()), None)
+    names = [first] if isinstance(first, str) else first if isinstance(first, list) else []
+    known = models()
+    chosen = [known[name] for name in names if name in known] or list(known.values())
+    return _starting(incomplete, {name: cls.name for cls in chosen for name in getattr(cls, "presets", ())})
+
+
+def _starting(incomplete: str, known: dict[str, str]) -> Offers:
+    return [(name, text) for name, text in known.items() if name.startswith(incomplete)]
+
+
+def _first_line(cls: type) -> str:
+    return (cls.__doc__ or "").strip().partition("\n")[0]

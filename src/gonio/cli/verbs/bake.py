@@ -1,0 +1,76 @@
+"""`gonio bake`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from typer import Argument, Option
+
+from ...errors import InputError, did_you_mean
+from .. import completion
+from ..options import Json, Material
+from ..output import print_tables
+from .base import MATERIALS, verb
+
+
+@verb(MATERIALS, place=6)
+def bake(
+    target: Annotated[
+        str,
+        Argument(
+            metavar="TARGET",
+            help="A distribution (ggx, beckmann), or a material.",
+            autocompletion=completion.materials_and_distributions,
+        ),
+    ],
+    *,
+    output: Annotated[Path, Option("-o", "--output", metavar="DIR", help="Folder to write.")] = Path("tables"),
+    made: Material,
+    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass", help="Which tables.")] = "",
+    size: Annotated[int, Option(metavar="N", help="Texels along each axis.")] = 128,
+    method: Annotated[str, Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature",
+    masking: Annotated[str | None, Option(metavar="NAME", help="Of a distribution: smith-correlated, ...")] = None,
+    spp: Annotated[int, Option(metavar="N", help="Samples a texel, where sampled.")] = 1024,
+    points: Annotated[str, Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley",
+    seed: Annotated[int, Option(metavar="N", help="Of independent points.")] = 0,
+    layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear",
+    aspect: Annotated[
+        float | None, Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds the axis phi.")
+    ] = None,
+    azimuths: Annotated[int, Option(metavar="N", help="Slices along phi, with two widths.")] = 24,
+    store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E",
+    flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
+
+    With two widths the tables have a third axis, the azimuth. Of a material without a width: E over the cosine.
+
+    \b
+    Examples:
+      gonio bake ggx -o tables
+      gonio bake ggx --aspect 0.25 --layout stretched -o brushed
+      gonio bake ggx --lut glass --size 32 -o glass
+      gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
+      gonio bake conductor --preset Au --lut E,Eavg -o gold
+    """
+    from ...models import models as known_models
+    from ...optics.ndf import distributions
+    from ...render import tables
+
+    if target in distributions():
+        what: Any = target
+        if made.param or made.preset:
+            hint = "bake a material, such as conductor; alpha is an axis of the table"
+            raise InputError(f"'{target}' is a distribution, without parameters", "--param", hint)
+    else:
+        known = [*distributions(), *known_models()]
+        if target.replace("_", "-") not in known:
+            raise InputError(f"unknown distribution or material '{target}'", "TARGET", did_you_mean(target, known))
+        what = made.of(target)
+    options: dict[str, Any] = {"lut": lut.split(",")} if lut else {}
+    options |= {"size": size, "method": method, "masking": masking, "spp": spp, "points": points, "seed": seed}
+    options |= {"aspect": aspect, "azimuths": azimuths}
+    baked = tables.bake(what, output, layout=layout, store=store, flip=flip, **options)
+    print_tables(baked.manifest, output, as_json)

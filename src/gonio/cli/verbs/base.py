@@ -1,0 +1,84 @@
+"""What a verb of the command line is: a function with Typer's annotations, and its place in the help.
+
+    @verb(MATERIALS)
+    def sheen(model: Model, made: Material, as_json: Json = False) -> None:
+        \"\"\"Print the sheen of a material.\"\"\"
+
+The file stands in `cli/verbs`; a package of its own names the verb as an entry point of the group `gonio.verbs`.
+A parameter whose type is a dataclass of options, such as `Material`, becomes one option for each of its fields.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+from collections.abc import Callable
+from typing import ClassVar, get_type_hints
+
+from ...members import Family
+
+PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
+INTERRUPTED = 130  # what a shell reports of a program that Ctrl-C ended: 128 + SIGINT
+
+
+class Verb:
+    """A verb: `name` and `doc` as the help shows them, under the heading `panel`, in the order of `place` and name."""
+
+    family: ClassVar[Family[Verb]]
+
+    def __init__(self, function: Callable[..., None], panel: str, place: int) -> None:
+        self.function, self.panel, self.place = function, panel, place
+        self.name = function.__name__.replace("_", "-")
+        functools.update_wrapper(self, function)  # the file that it stands in is that of its function
+
+    def __call__(self, *args: object, **options: object) -> None:
+        self.function(*args, **options)
+
+    @property
+    def doc(self) -> str:
+        """The first line of the docstring."""
+        return inspect.cleandoc(self.function.__doc__ or "").partition("\n")[0]
+
+    def with_single_options(self) -> Callable[..., None]:
+        """The function with an option for each field of each dataclass that it takes: what Typer can read."""
+        hints = get_type_hints(self.function, include_extras=True)
+        groups: dict[str, type] = {}
+        single: list[inspect.Parameter] = []
+        for parameter in inspect.signature(self.function).parameters.values():
+            kind = hints[parameter.name]
+            if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+                groups[parameter.name] = kind
+                types = get_type_hints(kind, include_extras=True)
+                for field in dataclasses.fields(kind):
+                    single.append(
+                        parameter.replace(name=field.name, annotation=types[field.name], default=field.default)
+                    )
+            else:
+                single.append(parameter.replace(annotation=kind))
+
+        def verb(**values: object) -> None:
+            for name, kind in groups.items():
+                values[name] = kind(**{field.name: values.pop(field.name) for field in dataclasses.fields(kind)})
+            self.function(**values)
+
+        verb.__doc__ = self.function.__doc__
+        verb.__annotations__ = {parameter.name: parameter.annotation for parameter in single}
+        verb.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in single]
+        )
+        return verb
+
+
+def verb(panel: str, place: int = 100) -> Callable[[Callable[..., None]], Verb]:
+    """Make a function a verb; `place` orders the verbs under one heading, and those of packages come last."""
+    return lambda function: Verb(function, panel, place)
+
+
+Verb.family = Family(
+    "verb",
+    "gonio.verbs",
+    ["gonio.cli.verbs"],
+    lambda thing: (thing.name, thing) if isinstance(thing, Verb) else None,
+    "gonio",
+)

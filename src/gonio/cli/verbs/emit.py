@@ -1,0 +1,56 @@
+"""`gonio emit`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from typer import Option
+
+from ..options import Json, Material, Model
+from .base import MATERIALS, verb
+
+
+@verb(MATERIALS, place=3)
+def emit(
+    model: Model,
+    *,
+    lang: Annotated[str, Option(metavar="glsl|wgsl|hlsl", help="The shader language.")] = "glsl",
+    functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample",
+    made: Material,
+    output: Annotated[
+        Path | None, Option("-o", "--output", metavar="FILE", help="Where to write; else it is printed.")
+    ] = None,
+    bundle: Annotated[
+        Path | None, Option(metavar="DIR", help="Write shader, manifest.json and tables (raw float32) there.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a material as shader code, traced from its own source: GLSL ES 3.00, WGSL or HLSL.
+
+    \b
+    Examples:
+      gonio emit conductor --preset Au
+      gonio emit dielectric --lang wgsl --functions eval -o glass.wgsl
+      gonio emit kulla-conty -p base=conductor --bundle shaders
+    """
+    from ... import files
+    from ...emit import bundle as make_bundle
+
+    if output is not None:  # before anything is computed or written
+        files.check_file(output)
+    if bundle is not None:
+        files.check_folder(bundle)
+    shader = make_bundle(made.of(model), lang, functions)
+    written = [str(path) for path in shader.write(bundle)] if bundle is not None else []
+    if output is not None:
+        files.write_whole(output, shader.text.encode())
+        written.append(str(output))
+    if as_json:
+        print(json.dumps({"text": shader.text, "manifest": shader.manifest, "written": written}))
+    elif written:
+        print("\n".join(written))
+    else:
+        sys.stdout.write(shader.text)

@@ -1,0 +1,65 @@
+"""`gonio render`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
+
+from ..options import Json, Rendering, SceneFile
+from ..output import Bar, print_warnings
+from .base import INTERRUPTED, PICTURES, verb
+
+if TYPE_CHECKING:
+    from ...render.run import Result
+
+
+@verb(PICTURES, place=1)
+def render(
+    scene: SceneFile,
+    *,
+    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help=".exr, .hdr, .png or .npz.")] = None,
+    how: Rendering,
+    timeout: Annotated[
+        float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Render a scene to a picture.
+
+    Without -o the picture gets the name that the scene gives it, in the current folder.
+    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once.
+
+    \b
+    Examples:
+      gonio render examples/phong
+      gonio render examples/phong -o phong.exr --spp 256 --size 640x480
+      gonio render examples/phong -o phong.png --exposure auto
+      gonio render scene.xml --integrator path --max-depth 5 --denoise
+    """
+    from ...render import run
+
+    request = how.request(scene, output, timeout)
+    with Bar(scene.name) as bar:
+        result = run.render(request, report=bar.update, notice=bar.stopping)
+    if as_json:
+        print(json.dumps(result.as_dict()))
+    else:
+        _print(result, how.exposure)
+    if result.stopped == "interrupt":
+        sys.exit(INTERRUPTED)
+
+
+def _print(result: Result, exposure: str) -> None:
+    width, height = result.size
+    text = f"{result.output}  {width}x{height}, {result.spp} spp, {result.seconds:.1f} s"
+    if exposure == "auto" and result.exposure is not None:
+        text += f", exposure {result.exposure:+g} EV"
+    print_warnings(result.warnings)
+    if result.stopped:
+        why = "stopped by Ctrl-C" if result.stopped == "interrupt" else "stopped at the time limit"
+        text += f"; {why}, {result.wanted_spp} spp were asked for"
+    print(text)

@@ -1,0 +1,98 @@
+"""A material's manual page, from its docstring and its declared facts: for `gonio explain` and for docs/models."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from dataclasses import asdict, dataclass
+
+from ..models import BSDF
+
+_WIDTH = 100
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is declared of one parameter; `default` is "required" where there is none."""
+
+    name: str
+    doc: str
+    kind: str
+    range: str
+    unit: str
+    default: str
+    choices: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Page:
+    """All that the manual says of a material; `breaks` has the reason by the name of the law."""
+
+    name: str
+    title: str
+    doc: str
+    parameters: tuple[Row, ...]
+    breaks: dict[str, str]
+    plugin: str
+    source: str
+
+    def as_dict(self) -> dict[str, object]:
+        return asdict(self)
+
+    def markdown(self) -> str:
+        lines = [f"# {self.title}", "", "```text", self.doc, "```", ""]
+        lines += ["| parameter | kind | range | unit | default | meaning |", "|---|---|---|---|---|---|"]
+        for row in self.parameters:
+            default = row.default if row.default == "required" else f"`{row.default}`"
+            allowed = "<br>".join(f"`{key}`: {text}" for key, text in row.choices.items()) or row.range
+            lines.append(f"| `{row.name}` | {row.kind} | {allowed} | {row.unit or '-'} | {default} | {row.doc} |")
+        for law, reason in self.breaks.items():
+            lines += ["", f"Breaks **{law}** by nature: {reason}."]
+        return "\n".join([*lines, "", f"Mitsuba plugin `{self.plugin}`. Source: `{self.source}`.", ""])
+
+    def text(self, width: int = _WIDTH) -> str:
+        """For a terminal of so many columns."""
+        indent = max((len(row.name) for row in self.parameters), default=0) + 4
+
+        def filled(text: str, at: int, first: str = "") -> str:
+            return textwrap.fill(text, min(width, _WIDTH), initial_indent=f"{first:<{at}}", subsequent_indent=" " * at)
+
+        lines = [self.name, "=" * len(self.name), self.doc, ""]
+        for row in self.parameters:
+            facts = [
+                row.kind,
+                *([row.range] * (not row.choices and row.range != row.kind)),
+                *([row.unit] * bool(row.unit)),
+            ]
+            facts.append(row.default if row.default == "required" else f"default {row.default}")
+            lines += [filled(row.doc, indent, f"  {row.name}"), " " * indent + ", ".join(facts)]
+            lines += [filled(f"{choice}: {meaning}", indent + 2) for choice, meaning in row.choices.items()]
+        lines += [""] * bool(self.parameters)
+        lines += [filled(f"Breaks {law} by nature: {reason}.", 0) for law, reason in self.breaks.items()]
+        return "\n".join([*lines, f"Mitsuba plugin: {self.plugin}", f"Source: {self.source}"])
+
+
+def page(model: type[BSDF]) -> Page:
+    """The manual page of a material's class."""
+    rows = tuple(
+        Row(
+            parameter.name,
+            parameter.doc,
+            parameter.kind,
+            parameter.range,
+            parameter.unit,
+            "required" if parameter.required else str(parameter.default),
+            dict(parameter.choices),
+        )
+        for parameter in model.parameters().values()
+    )
+    own = model.__module__.startswith("gonio.")
+    return Page(
+        name=model.name,
+        title=model.__name__,
+        doc=inspect.getdoc(model) or "",
+        parameters=rows,
+        breaks={law: breach.reason for law, breach in model.breaks.items()},
+        plugin="gonio_" + model.name.replace("-", "_"),
+        source="src/" + model.__module__.replace(".", "/") + ".py" if own else inspect.getfile(model),
+    )
