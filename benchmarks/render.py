@@ -244,7 +244,7 @@ def stages(bsdf: Any, rounds: int, clock: Callable[[], float]) -> None:
 
         def draw(seed: int) -> np.ndarray:
             render = Render(drawn, Settings("directSampleLight", seed=seed))
-            render._transport = type("Cut", (_Stage,), {"stage": name})(
+            render._integrator = type("Cut", (_Stage,), {"stage": name})(
                 mi, drawn, render.sensor, render.settings, False
             )
             render.advance(SPP)

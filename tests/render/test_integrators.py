@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.render import engine, lights
-from gonio.render.integrators import INTEGRATORS, SAMPLERS, Render, Settings
+from gonio.render.integrators import Integrator, Render, Settings
+from gonio.render.integrators.base import SAMPLERS
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -376,7 +377,7 @@ def test_zero_samples_and_a_scene_without_a_camera_are_errors() -> None:
 
 def test_every_name_renders() -> None:
     scene = mi.load_dict(scene_dict(size=4))
-    for integrator in INTEGRATORS:
+    for integrator in Integrator.family.all():
         assert np.isfinite(picture(scene, 1, integrator=integrator)).all()
     for sampler in SAMPLERS:
         assert np.isfinite(picture(scene, 1, sampler=sampler)).all()

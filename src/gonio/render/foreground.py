@@ -13,14 +13,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from types import ModuleType
+from typing import ClassVar
 
 import drjit as dr
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from .integrators import Render, Settings, Transport
+from .integrators import Integrator, Render, Settings, Transport
 from .lights import Lights
+from .types import Float, Mask, Point, Radiance, Ray, Record, Scene, Sensor, SurfaceInteraction, UInt
 
 
 class Foreground(Render):
@@ -32,43 +35,45 @@ class Foreground(Render):
 
     features = 1
 
-    def __init__(self, scene: Any, settings: Settings, sensor: Any = None, lights: Any = None):
-        if settings.integrator in ("normal", "uv"):
+    def __init__(self, scene: Scene, settings: Settings, sensor: Sensor | None = None, lights: Scene | None = None):
+        program = settings.program
+        if not issubclass(program, Transport):
             raise InputError(f"'{settings.integrator}' shows no light", "integrator", "give one that does")
-        if lights is not None and settings.integrator == "path":
+        if lights is not None and program.depth(settings) > 2:
             raise InputError("paths meet other surfaces", "integrator", "give direct, or put the lights in the scene")
-        self._lights = lights
+        self._surfaces = type("Surfaces", (_Surfaces, program), {"apart": lights})
         super().__init__(scene, settings, sensor)
 
-    def _program(self, mi: Any) -> Transport:
-        return _Foreground(mi, self.scene, self.sensor, self.settings, self._lights)
+    def _program(self) -> Integrator:
+        return self._surfaces(self.mi, self.scene, self.sensor, self.settings, aovs=False)
 
-    def image(self) -> np.ndarray:
+    def image(self) -> NDArray[np.float32]:
         """(height, width, 4) float32: linear RGB, averaged over the whole pixel, and coverage; row 0 on top."""
         sums = self._sums
         nothing = [np.zeros(1)]
         return self._mean([*sums.near[0:3], sums.near[3]], [*sums.far, *nothing])
 
 
-class _Foreground(Transport):
-    """The program of `Foreground`."""
+class _Surfaces(Transport):
+    """What `Foreground` changes in an integrator; `apart` is the scene of the lights, where they have their own."""
 
-    def __init__(self, mi: Any, scene: Any, sensor: Any, settings: Settings, lights: Any):
-        super().__init__(mi, scene, sensor, settings, aovs=False)
-        self.alone = lights is not None
-        if self.alone:
-            self.lights = _Transparent(mi, lights)
+    apart: ClassVar[Scene | None] = None
 
-    def begin(self, pixel: Any, key: Any, index: Any) -> tuple[Any, list[Any]]:
+    def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
+        super().__init__(mi, scene, sensor, settings, aovs)
+        if self.apart is not None:
+            self.lights = _Transparent(mi, self.apart)
+
+    def begin(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Record, list[Float]]:
         """As the base's, for lanes that meet a surface; the feature is 1 there."""
         path = self.first(pixel, key, index)
         met = path.hit.is_valid()
         path = self.extend(dataclasses.replace(path, active=met), key, [])
         return path, [*self.rgb(path.radiance, path.ray.wavelengths), dr.select(met, self.mi.Float(1), 0)]
 
-    def unoccluded(self, si: Any, point: Any, active: Any) -> Any:
+    def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
         """All lights are in sight where they stand apart."""
-        return active if self.alone else super().unoccluded(si, point, active)
+        return active if self.apart is not None else super().unoccluded(si, point, active)
 
 
 class _Transparent(Lights):
@@ -77,7 +82,9 @@ class _Transparent(Lights):
     Light sampling traces no shadow ray here, so what a sampled direction finds must not be hidden either.
     """
 
-    def last_hit(self, ray: Any, solid_angle: Any, active: Any, weigh: Callable[[Any, Any], Any]) -> Any:
+    def last_hit(
+        self, ray: Ray, solid_angle: Float, active: Mask, weigh: Callable[[Radiance, Float], Radiance]
+    ) -> Radiance:
         """The sum over all lights on the ray, each weighed with its own density."""
         if self.rectangle is not None or self.count == 0:
             return super().last_hit(ray, solid_angle, active, weigh)
@@ -94,7 +101,14 @@ class _Transparent(Lights):
             found += self._arriving(origin, beyond, solid_angle, active, weigh)
         return found
 
-    def _arriving(self, origin: Any, si: Any, solid_angle: Any, active: Any, weigh: Callable[[Any, Any], Any]) -> Any:
+    def _arriving(
+        self,
+        origin: Point,
+        si: SurfaceInteraction,
+        solid_angle: Float,
+        active: Mask,
+        weigh: Callable[[Radiance, Float], Radiance],
+    ) -> Radiance:
         radiance = dr.select(active, self.emitted(si, active), 0)
         pdf = self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
         return dr.select(active, weigh(radiance, pdf), 0)

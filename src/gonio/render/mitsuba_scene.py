@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from .passes import power_of_two
-
-if TYPE_CHECKING:
-    from .run import Request
+from .request import Request
+from .types import Plugin, Scene
 
 # Samples in flight of Mitsuba's own integrators, which hold one in each lane: half a second or so on a CPU.
 WAVEFRONT = 1 << 21
@@ -28,12 +28,12 @@ class MitsubaRender:
     samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
     """
 
-    def __init__(self, mi: ModuleType, scene: Any, spp: int, seed: int = 0, integrator: Any = None) -> None:
+    def __init__(self, mi: ModuleType, scene: Scene, spp: int, seed: int = 0, integrator: Plugin | None = None) -> None:
         self._mi, self._scene, self._integrator, self._seed = mi, scene, integrator or scene.integrator(), seed
         self._sensor = scene.sensors()[0]
         width, height = self._sensor.film().crop_size()
         self.pass_size = min(spp, power_of_two(max(1, WAVEFRONT // (int(width) * int(height)))))
-        self._sum: np.ndarray | None = None
+        self._sum: NDArray[np.float64] | None = None
         self._passes = 0
         self._done = 0
 
@@ -51,23 +51,23 @@ class MitsubaRender:
         self._passes += 1
         self._done += taken
 
-    def _render(self, integrator: Any, spp: int, seed: int) -> np.ndarray:
+    def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
         tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
         return np.array(tensor, dtype=np.float32)
 
-    def image(self) -> np.ndarray:
+    def image(self) -> NDArray[np.float32]:
         assert self._sum is not None, "advance() comes first"
         mean = (self._sum / self._done).astype(np.float32)
         return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
 
-    def aov(self) -> dict[str, np.ndarray]:
+    def aov(self) -> dict[str, NDArray[np.float32]]:
         """Guides for the denoiser: 16 samples see every surface of a pixel that matters to an edge."""
         aovs = self._mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
         channels = self._render(aovs, 16, self._seed)[..., -6:]
         return {"albedo": channels[..., :3], "normal": channels[..., 3:]}
 
 
-def load(request: Request, mi: ModuleType) -> Any:
+def load(request: Request, mi: ModuleType) -> Scene:
     """The scene of a Mitsuba XML file; the request's overrides are its `$parameters`."""
     where = str(request.scene)
     if not request.allow_outside:
@@ -91,7 +91,7 @@ def load(request: Request, mi: ModuleType) -> Any:
     return scene
 
 
-def _as_xml(value: Any) -> str:
+def _as_xml(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
@@ -107,7 +107,7 @@ def _mitsuba_text(error: Exception) -> str:
     return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
 
 
-def _check_inside(file: Path, parameters: dict[str, Any]) -> None:
+def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
     """Raise InputError where a Mitsuba scene, or a file it includes, names a file outside the scene's folder."""
     folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
     while waiting:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 PASS_SECONDS = 0.5  # long enough that a pass's start-up (some 10 ms) is small, short enough for Ctrl-C
 
@@ -35,9 +36,9 @@ class Renders(Protocol):
 
     def advance(self, count: int) -> None: ...
 
-    def image(self) -> np.ndarray: ...
+    def image(self) -> NDArray[np.float32]: ...
 
-    def aov(self) -> dict[str, np.ndarray]: ...
+    def aov(self) -> dict[str, NDArray[np.float32]]: ...
 
 
 @dataclass(frozen=True)

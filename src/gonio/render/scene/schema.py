@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from ...errors import InputError, did_you_mean
 from ..images import SUFFIXES
+from ..request import check_film
 from .materials import Material
 from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
+
+if TYPE_CHECKING:
+    from .. import integrators as program
 
 MAX_SAMPLES = 2**30  # samples per pixel; a picture of one pixel could still be counted in 32 bits
 
@@ -126,10 +130,8 @@ class Film(Part):
 
     @model_validator(mode="after")
     def _fits(self) -> Film:
-        from ..run import check_film  # the same limit as `--size`
-
         try:
-            check_film(self.size, "size")
+            check_film(self.size, "size")  # the same limit as `--size`
         except InputError as error:
             raise invalid(error.what, error.hint, "size") from None
         return self
@@ -159,25 +161,41 @@ class Camera(Part):
         return self
 
 
-class SimpleIntegrator(Part):
-    """directSampleLight and directSampleBSDF sample one of the two; direct weighs both; normal shows (n+1)/2."""
+def integrators() -> dict[str, type[program.Integrator]]:
+    """The integrators by name, those of other packages too."""
+    from ..integrators import Integrator
 
-    type: Literal["directSampleLight", "directSampleBSDF", "direct", "whitted", "normal", "uv"]
-
-    @property
-    def max_depth(self) -> int | None:
-        return None
+    return Integrator.family.all()
 
 
-class PathIntegrator(Part):
-    """All of the light's paths up to a length."""
+def _list_integrators(schema: dict[str, Any]) -> None:
+    """The names in the JSON Schema, each with what it shows, and which of them need a depth."""
+    known = integrators()
+    names = [{"const": name, "description": member.title()} for name, member in known.items()]
+    schema["properties"]["type"] = {"oneOf": names, "title": "Type"}
+    deep = {"properties": {"type": {"enum": [name for name, member in known.items() if member.takes_depth]}}}
+    schema |= {"if": deep, "then": {"required": ["maxDepth"]}, "else": {"properties": {"maxDepth": False}}}
 
-    type: Literal["path"]
-    max_depth: Whole = Field(alias="maxDepth", ge=1, le=100_000)
+
+class Integrator(Part):
+    """What the picture shows."""
+
+    model_config = ConfigDict(json_schema_extra=_list_integrators)
+
+    type: str
+    max_depth: Whole | None = Field(None, alias="maxDepth", ge=1, le=100_000)
     """N means N - 1 shaded vertices: 1 shows lights only, 2 is direct light."""
 
-
-Integrator = Annotated[SimpleIntegrator | PathIntegrator, Field(discriminator="type")]
+    @model_validator(mode="after")
+    def _known_type(self) -> Integrator:
+        known = integrators()
+        if self.type not in known:
+            raise invalid(f"unknown type '{self.type}'", did_you_mean(self.type, list(known)), "type")
+        if known[self.type].takes_depth and self.max_depth is None:
+            raise invalid("key 'maxDepth' is missing", 'add "maxDepth"')
+        if self.max_depth is not None and not known[self.type].takes_depth:
+            raise invalid(f"'{self.type}' takes no maxDepth", "remove it, or use path", "maxDepth")
+        return self
 
 
 class Rotation(Part):

@@ -1,0 +1,41 @@
+"""What the lanes of a picture add up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+import drjit as dr
+
+from ..types import Float, Mask, UInt
+
+
+@dataclass
+class Sums:
+    """Sums in 64 bits, one entry a lane: radiance and features of first vertices, radiance of the rest of the paths.
+
+    A value that is not finite (a BSDF's overflow) is left out and counted, so that it does not cost the pixel.
+    """
+
+    near: list[Float]
+    far: list[Float]
+    invalid: UInt
+
+    @staticmethod
+    def zeros(mi: ModuleType, lanes: int, features: int) -> Sums:
+        near = [dr.zeros(mi.Float64, lanes) for _ in range(3 + features)]
+        return Sums(near, [dr.zeros(mi.Float64, lanes) for _ in range(3)], dr.zeros(mi.UInt32, lanes))
+
+    def add_near(self, values: Sequence[Float]) -> Sums:
+        near, invalid = self._add(self.near, values, True)
+        return Sums(near, self.far, invalid)
+
+    def add_far(self, values: Sequence[Float], active: Mask) -> Sums:
+        far, invalid = self._add(self.far, values, active)
+        return Sums(self.near, far, invalid)
+
+    def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], UInt]:
+        finite = dr.isfinite(sum(values))
+        add = [s + type(s)(dr.select(finite & active, v, 0)) for s, v in zip(sums, values, strict=True)]
+        return add, self.invalid + dr.select(finite | ~dr.mask_t(finite)(active), type(self.invalid)(0), 1)

@@ -1,0 +1,310 @@
+"""Light transport along paths: what all integrators share that follow light.
+
+How it is fast, beside what `progressive` does:
+
+- A vertex costs one BSDF call, which evaluates the light's direction and samples the next; shadow rays that would
+  carry nothing are not traced; the last ray of a path is traced only where it points at the light.
+- Sampler and lights: see `sampler.py`, `lights.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, make_dataclass
+from functools import cache
+from types import ModuleType
+from typing import ClassVar
+
+import drjit as dr
+
+from .. import engine, sampler
+from ..lights import Lights
+from ..types import (
+    BSDFSample,
+    Float,
+    Hit,
+    Mask,
+    MitsubaBSDF,
+    Radiance,
+    Ray,
+    Record,
+    Scene,
+    Sensor,
+    SurfaceInteraction,
+    Texture,
+    UInt,
+)
+from .base import FIRST_FREE, Integrator, Settings
+from .sums import Sums
+
+# Russian roulette begins at this depth, as in Mitsuba's `path`: before it, paths are rarely dim enough to pay.
+ROULETTE_DEPTH = 5
+
+# Dimensions of a path: each vertex takes VERTEX_DIMENSIONS of them.
+FIRST_VERTEX = FIRST_FREE
+LIGHT, LOBE, CHOICE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
+
+# Samples whose paths wait for each other, see Transport.accumulate.
+BATCH = 16
+
+
+@dataclass
+class _Path:
+    """A path on its way, one a lane."""
+
+    index: UInt  # of the sample
+    depth: UInt  # segments traced so far
+    ray: Ray  # the next segment, and
+    hit: Hit  # what it meets
+    throughput: Radiance
+    eta: Float  # product of the relative indices on the way
+    pdf: Float  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
+    solid_angle: Float  # LightSample.solid_angle at its origin
+    radiance: Radiance  # found so far
+    active: Mask
+
+
+@cache
+def _waiting_type(variant: str) -> Record:
+    """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a _Path.
+
+    A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
+    cannot hold masks (in Dr.Jit 1.5 they do not compile for the CPU), so what an intersection found is kept
+    without its mask `valid`; the distance says the same.
+    """
+    mi = engine.load()
+    found = {name: kind for name, kind in mi.PreliminaryIntersection3f.DRJIT_STRUCT.items() if name != "valid"}
+    kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
+    kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
+
+    def pack(path: _Path) -> Record:
+        hit = {name: getattr(path.hit, name) for name in found}
+        return waiting(**{name: getattr(path, name) for name in kept}, **hit)
+
+    def unpack(rest: Record) -> _Path:
+        hit = dr.zeros(mi.PreliminaryIntersection3f)
+        for name in found:
+            setattr(hit, name, getattr(rest, name))
+        hit.valid = rest.t < dr.inf
+        fields = {name: kind(getattr(rest, name)) for name, kind in kept.items()}
+        return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
+
+    waiting: Record = make_dataclass("Waiting", [*kept.items(), *found.items()])
+    waiting.pack, waiting.unpack = staticmethod(pack), unpack
+    return waiting
+
+
+class Transport(Integrator):
+    """An integrator that follows light along paths. A subclass says how:
+
+    samples_lights  whether each vertex looks for light by sampling the lights
+    samples_lobes   whether it does by sampling the BSDF's lobes; delta lobes are always followed
+    plays_roulette  whether dim paths are ended by chance
+    depth           the longest path in segments, a method
+    """
+
+    samples_lights: ClassVar[bool] = True
+    samples_lobes: ClassVar[bool] = True
+    plays_roulette: ClassVar[bool] = False
+
+    def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
+        super().__init__(mi, scene, sensor, settings, aovs)
+        self.Waiting = _waiting_type(mi.variant())
+        self.context = mi.BSDFContext()
+        self.lights = Lights(mi, scene)
+        depth = self.depth(settings)
+        self.max_depth = dr.opaque(mi.UInt32, depth)
+        self.ambient = self._ambient()
+        self.follows_delta = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta) for shape in scene.shapes())
+        # Whether any path has a second vertex to shade.
+        self.goes_on = depth > 2 and (self.samples_lobes or self.follows_delta)
+
+    @classmethod
+    def depth(cls, settings: Settings) -> int:
+        """The longest path in segments; 2 is direct light."""
+        return 2
+
+    def _ambient(self) -> Texture | None:
+        """The ambient light as a texture of radiance, None where nothing would take it."""
+        colour = self.settings.ambient
+        if colour is None or not any(colour):
+            return None
+        if not any(dr.any(shape.bsdf().has_attribute("ambient")) for shape in self.scene.shapes()):
+            return None
+        # An rgb texture alone is a reflectance and ends at 1; d65 times one is a light, also in spectral variants.
+        scale = max(colour)
+        tint = {"type": "rgb", "value": [c / scale for c in colour]}
+        return self.mi.load_dict({"type": "d65", "color": tint, "scale": scale})
+
+    def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
+        """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples.
+
+        Samples go in batches of BATCH. The first vertices of a batch are done one sample after the other: their rays
+        are coherent, every lane is busy. The paths that go on from there are put by, and then followed in a flat
+        loop over vertices: a lane whose path has ended takes its next one at once, instead of idling until the
+        longest of its 16 neighbours' has ended. What comes after the first vertex is summed apart, so that the
+        order of additions, and hence the last bit, does not depend on where passes cut the batches.
+        """
+        mi = self.mi
+        lanes = dr.width(pixel)
+        # Counters of local memory start as full-width opaque arrays: Dr.Jit 1.5 takes a loop variable that starts as
+        # one number to be the same in all lanes, and then writes every lane's entry at one lane's place.
+        none = dr.opaque(mi.UInt32, 0, lanes)
+
+        def batch(index: UInt, sums: Sums) -> tuple[UInt, Sums]:
+            end = dr.minimum(index + BATCH, last)
+            waiting = dr.alloc_local(self.Waiting, BATCH if self.goes_on else 1, value=dr.zeros(self.Waiting))
+
+            def begin(index: UInt, sums: Sums, waiting: Record, count: UInt) -> tuple[UInt, Sums, Record, UInt]:
+                path, values = self.begin(pixel, key, index)
+                sums = sums.add_near(values)
+                if self.goes_on:
+                    waiting.write(self.Waiting.pack(path), count, path.active)
+                    count = count + dr.select(path.active, mi.UInt32(1), mi.UInt32(0))
+                return index + 1, sums, waiting, count
+
+            state = (index, sums, waiting, none)
+            state = dr.while_loop(state, lambda i, *_: i < end, begin, mode="symbolic", label="first vertices")
+            index, sums, waiting, count = state
+            if self.goes_on:
+                sums = self.follow(key, waiting, count, none, sums)
+            return index, sums
+
+        start = first + dr.zeros(mi.UInt32, lanes)
+        state = dr.while_loop((start, sums), lambda i, _: i < last, batch, mode="symbolic", label="batches")
+        return state[1]
+
+    def follow(self, key: UInt, waiting: Record, count: UInt, none: UInt, sums: Sums) -> Sums:
+        """Follow the paths put by in `waiting[0:count]` to their ends and add what they find."""
+        mi = self.mi
+
+        def body(slot: UInt, path: _Path, waiting: Record, sums: Sums) -> tuple[UInt, _Path, Record, Sums]:
+            path = dr.select(path.active, path, waiting.read(slot).unpack())
+            path = self.extend(path, key)
+            ended = ~path.active
+            sums = sums.add_far(self.rgb(path.radiance, path.ray.wavelengths), ended)
+            return slot + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, waiting, sums
+
+        idle = dr.zeros(self.Waiting).unpack()
+        idle.active = mi.Bool(False)
+        state = (none, idle, waiting, sums)
+        loop = dr.while_loop(state, lambda slot, *_: slot < count, body, mode="symbolic", label="further vertices")
+        return loop[3]
+
+    def begin(self, pixel: UInt, key: UInt, index: UInt) -> tuple[_Path, list[Float]]:
+        """The first vertex of a sample: (the path that goes on from it, [r, g, b, features of this vertex])."""
+        path, features = self.first(pixel, key, index), list[Float]()
+        path = self.extend(path, key, features)
+        return path, [*self.rgb(path.radiance, path.ray.wavelengths), *features]
+
+    def first(self, pixel: UInt, key: UInt, index: UInt) -> _Path:
+        """A sample's path up to the first thing that it meets."""
+        mi = self.mi
+        ray, weight, hit = self.first_hit(pixel, key, index)
+        return _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
+                     mi.Float(0), mi.Spectrum(0), mi.Bool(True))  # fmt: skip
+
+    def extend(self, path: _Path, key: UInt, features: list[Float] | None = None) -> _Path:
+        """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
+
+        features  given at the first vertex: a list that gets its albedo and normal, if they are wanted
+        """
+        mi, lights = self.mi, self.lights
+        first = features is not None
+        ray, throughput, radiance, active = path.ray, path.throughput, path.radiance, path.active
+        depth = mi.UInt32(0) if first else path.depth
+        dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
+        last = depth + 2 >= self.max_depth
+
+        si = path.hit.compute_surface_interaction(ray, mi.RayFlags.All, active)
+        emitted = lights.emitted(si, active)
+        if self.samples_lights and not first:
+            compete = active & (path.pdf > 0) & dr.any(emitted != 0)
+            weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
+            emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
+        radiance = radiance + throughput * dr.select(active, emitted, 0)
+        active = active & si.is_valid() & (depth + 1 < self.max_depth)
+
+        bsdf = si.bsdf(ray)
+        gathered, solid_angle, bs, weight = self.scatter(path.index, key, dimension, si, bsdf, active)
+        radiance = radiance + throughput * dr.select(active, gathered, 0)
+        if self.ambient is not None:
+            radiance = radiance + throughput * self.ambient_light(self.ambient, bsdf, si, active)
+        throughput = throughput * weight
+        if features is not None and self.aovs:
+            seen = (*self.rgb(throughput, ray.wavelengths), *si.sh_frame.n)
+            features += [dr.select(active, v, 0) for v in seen]
+
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        active = active & dr.any(throughput != 0) & (self.samples_lobes | delta)
+        pdf = dr.select(delta, 0, bs.pdf) if self.samples_lights else mi.Float(0)
+        eta = path.eta * dr.select(active, bs.eta, 1)
+        if self.plays_roulette:
+            throughput, active = self.roulette(path.index, key, dimension, depth, throughput, eta, active)
+
+        ray = si.spawn_ray(si.to_world(bs.wo))
+        # The last ray can only find light: no surface beyond it is shaded.
+        end = active & last
+
+        def weigh(light: Radiance, light_pdf: Float) -> Radiance:
+            return dr.select(pdf > 0, light * mis(pdf, light_pdf), light) if self.samples_lights else light
+
+        radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
+
+        active = active & ~last
+        hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        if not lights.has_environment:  # else the path goes on to meet it
+            active = active & hit.is_valid()
+        return _Path(path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, active)
+
+    def scatter(
+        self, index: UInt, key: UInt, dimension: UInt, si: SurfaceInteraction, bsdf: MitsubaBSDF, active: Mask
+    ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
+        """Ask the BSDF, in one call, what it does with a light's direction, and for a direction of its own.
+
+        Returns (light gathered from the lights, solid angle of the light, BSDF sample, its weight).
+        """
+        mi, lights, context = self.mi, self.lights, self.context
+        lobe, pick = self.pair(key, index, dimension + CHOICE)
+        u = mi.Point2f(*self.pair(key, index, dimension + LOBE))
+        if not self.samples_lights or lights.count == 0:
+            return mi.Spectrum(0), mi.Float(0), *bsdf.sample(context, si, lobe, u, active)
+        light = lights.sample(si, mi.Point2f(*self.pair(key, index, dimension + LIGHT)), pick, active)
+        toward = si.to_local(light.ds.d)
+        if self.samples_lobes or self.follows_delta or self.aovs:
+            value, pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
+        else:
+            value, pdf = bsdf.eval(context, si, toward, active), mi.Float(0)
+            bs, weight = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
+        gathered = value * light.weight
+        if self.samples_lobes:
+            gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
+        visible = active & dr.any(gathered != 0)
+        visible = self.unoccluded(si, light.ds.p, visible)
+        return dr.select(visible, gathered, 0), light.solid_angle, bs, weight
+
+    def ambient_light(self, light: Texture, bsdf: MitsubaBSDF, si: SurfaceInteraction, active: Mask) -> Radiance:
+        """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
+        if self.mi.is_rgb:
+            reflected = bsdf.eval_attribute_3("ambient", si, active)
+        else:
+            reflected = bsdf.eval_attribute("ambient", si, active)
+        return dr.select(active, reflected * light.eval(si, active), 0)
+
+    def roulette(
+        self, index: UInt, key: UInt, dimension: UInt, depth: UInt, throughput: Radiance, eta: Float, active: Mask
+    ) -> tuple[Radiance, Mask]:
+        """End dim paths by chance: survive with the throughput's largest channel, at most 0.95, and weigh by it.
+
+        Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
+        """
+        survive = dr.clip(dr.max(throughput) * dr.square(eta), 1e-6, 0.95)
+        u, _ = sampler.independent_pair(key, index, dimension + ROULETTE)
+        plays = depth + 1 >= ROULETTE_DEPTH
+        active = active & (~plays | (u < survive))
+        return dr.select(plays, throughput / survive, throughput), active
+
+
+def mis(pdf: Float, other: Float) -> Float:
+    """Power heuristic with exponent 2 for two strategies of one sample each (Veach 1995): p^2 / (p^2 + q^2)."""
+    ratio = other / pdf  # first the ratio: p^2 itself overflows for sharp lobes
+    return dr.select(pdf > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)

@@ -1,0 +1,85 @@
+"""What to render and how, as the command line and `go.render` ask for it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..errors import InputError
+from . import denoise, exposures, images
+
+# Per pixel: 9 sums in float64, twice (before and after a pass), lane order, picture as float64 and float32, the
+# file's bytes. It is the estimate by which a film is refused as too large.
+BYTES_PER_PIXEL = 250
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to render and how; None means: as the scene says."""
+
+    scene: Path
+    output: Path | None = None
+    spp: int | None = None
+    size: tuple[int, int] | None = None
+    integrator: str | None = None
+    max_depth: int | None = None
+    sampler: str | None = None
+    seed: int | None = None
+    device: str = "cpu"
+    threads: int | None = None
+    timeout: float | None = None
+    denoise: bool = False
+    exposure: exposures.Exposure = 0.0
+    allow_outside: bool = False
+    overrides: Mapping[str, object] = field(default_factory=dict)
+
+    def check(self) -> None:
+        """Raise InputError for an option that cannot be, before anything is loaded."""
+        if self.spp is not None and self.spp < 1:
+            raise InputError(f"{self.spp} samples per pixel", "--spp", "give 1 or more")
+        if self.max_depth is not None and self.max_depth < 1:
+            raise InputError(f"depth {self.max_depth}", "--max-depth", "give 1 or more")
+        if self.seed is not None and not 0 <= self.seed < 1 << 32:
+            raise InputError(f"seed {self.seed} is out of range", "--seed", "give 0 to 4294967295")
+        if self.threads is not None and self.threads < 1:
+            raise InputError(f"{self.threads} threads asked for", "--threads", "give 1 or more")
+        if self.timeout is not None and not self.timeout > 0:
+            raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
+        exposures.check(self.exposure)
+        if self.size is not None:
+            check_film(self.size, "--size")
+        if self.denoise:
+            denoise.require()
+        if self.output is not None:
+            images.check_writable(self.output)
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """(width, height) of "640x480"."""
+    match = re.fullmatch(r"\s*(\d{1,9})\s*[xX×]\s*(\d{1,9})\s*", text)  # noqa: RUF001 - people paste it
+    if not match:
+        raise InputError(f"'{text}' is no size", "--size", "give width x height in pixels, such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def check_film(size: tuple[int, int], where: str) -> None:
+    """Raise InputError for a film without pixels, or one that one sample per pixel would not fit the memory."""
+    width, height = size
+    if width < 1 or height < 1:
+        raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
+    needed = width * height * BYTES_PER_PIXEL
+    if needed > memory():
+        gib = 1 << 30
+        what = f"a film of {width}x{height} needs about {needed / gib:.0f} GiB"
+        raise InputError(f"{what}, this machine has {memory() / gib:.0f} GiB", where, "give a smaller size")
+
+
+def memory() -> int:
+    """Bytes of memory in this machine; a guess of 8 GiB where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 8 << 30

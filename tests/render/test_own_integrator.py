@@ -1,0 +1,134 @@
+"""An integrator from outside the package: registered by a program, or brought by an installed package."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gonio.errors import InputError
+from gonio.render import engine, images, integrators, run
+
+mi = engine.load()
+
+OCCLUSION = '''
+import drjit as dr
+from gonio.render.integrators import Integrator, Transport
+from gonio.render.integrators.base import FIRST_FREE
+
+
+class Occlusion(Integrator):
+    """The share of the sky that a surface sees, weighted by the cosine."""
+
+    name = "occlusion"
+
+    def show(self, si, key, index):
+        local = self.mi.warp.square_to_cosine_hemisphere(self.mi.Point2f(*self.pair(key, index, FIRST_FREE)))
+        hidden = self.scene.ray_test(si.spawn_ray(si.to_world(local)), si.is_valid())
+        return self.mi.Color3f(dr.select(hidden, 0.0, 1.0))
+
+
+class Shallow(Transport):
+    """Paths that end at a third surface, whatever they carry."""
+
+    name = "shallow"
+    takes_depth = True
+
+    @classmethod
+    def depth(cls, settings):
+        return min(settings.max_depth, 3)
+'''
+
+SCENE = {
+    "output": {"filename": "picture.exr"},
+    "sampler": {"type": "independent", "samples": 64},
+    "camera": {
+        "type": "pinhole",
+        "transform": {"position": [0, 0, 3], "lookAt": [0, 0, 0], "up": [0, 1, 0]},
+        "verticalFov": 20,
+        "film": {"size": [8, 8]},
+    },
+    "integrator": {"type": "occlusion"},
+    "scene": {
+        "shapes": [{"type": "parallelogram", "base": [-9, -9, 0], "edge0": [18, 0, 0], "edge1": [0, 18, 0]}],
+        "lights": [{"type": "environmentLight", "radiance": 1}],
+    },
+}
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(SCENE))
+    return path
+
+
+@pytest.fixture
+def registered(tmp_path: Path) -> Iterator[dict[str, type]]:
+    space: dict[str, type] = {"__name__": "strangers"}  # type: ignore[dict-item]
+    exec(compile(OCCLUSION, str(tmp_path / "occlusion.py"), "exec"), space)
+    members = [space["Occlusion"], space["Shallow"]]
+    names = [integrators.Integrator.family.add(member) for member in members]
+    yield space
+    for name in names:
+        integrators.Integrator.family.remove(name)
+
+
+def _picture(scene: Path, **options: object) -> np.ndarray:
+    prepared = run.prepare(run.Request(scene, **options))  # type: ignore[arg-type]
+    prepared.render.advance(prepared.spp)
+    return prepared.render.image()
+
+
+def test_a_registered_integrator_renders_by_the_scenes_word_and_by_the_options(
+    scene: Path, registered: dict[str, type]
+) -> None:
+    assert np.all(_picture(scene) == 1.0), "nothing hides the sky from a plane"
+    paths = _picture(scene, integrator="path", max_depth=3)
+    assert np.array_equal(_picture(scene, integrator="shallow", max_depth=9), paths)
+    assert run.prepare(run.Request(scene, integrator="shallow")).settings["max_depth"] == 5
+
+
+def test_an_integrator_that_is_not_there_is_one_clear_error(scene: Path) -> None:
+    with pytest.raises(InputError, match=r"(?s)unknown type 'occlusion'.*known: direct"):
+        run.prepare(run.Request(scene))
+    scene.write_text(json.dumps({**SCENE, "integrator": {"type": "normal"}}))
+    with pytest.raises(InputError, match=r"(?s)--integrator: unknown integrator 'whited'.*did you mean 'whitted'"):
+        _picture(scene, integrator="whited")
+
+
+def test_names_are_taken_once(registered: dict[str, type]) -> None:
+    class Path(integrators.Transport):
+        """Another one."""
+
+        name = "path"
+
+    with pytest.raises(InputError, match="the integrator 'path' is there already"):
+        integrators.Integrator.family.add(Path)
+
+
+def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_path: Path) -> None:
+    package = tmp_path / "site"
+    metadata = package / "occlusion-1.0.dist-info"
+    metadata.mkdir(parents=True)
+    (package / "occlusion.py").write_text(OCCLUSION)
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: occlusion\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text("[gonio.integrators]\nocclusion = occlusion:Occlusion\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])}
+
+    def gonio(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "gonio.cli", *words]
+        return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path, timeout=120)
+
+    done = gonio("render", str(scene), "--integrator", "occlusion", "--spp", "4", "-o", "sky.exr")
+    assert done.returncode == 0, done.stderr
+    picture = images.read(tmp_path / "sky.exr")
+    assert np.all(picture.pixels == 1.0) and picture.metadata["integrator"] == "occlusion"
+    choices = json.loads(gonio("schema").stdout)["$defs"]["Integrator"]["properties"]["type"]["oneOf"]
+    title = "The share of the sky that a surface sees, weighted by the cosine."
+    assert {"const": "occlusion", "description": title} in choices
