@@ -156,15 +156,18 @@ def test_every_variant_that_is_asked_for_comes(monkeypatch: pytest.MonkeyPatch) 
 def test_a_scene_that_came_while_another_failed_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     with running() as one, speak(one) as client:
         show = session.Reference.show
+        begun = threading.Event()
 
         def fail_late(reference: Any, message: messages.Scene) -> None:
             if message.id == 1:
+                begun.set()
                 wait_for(lambda: one.application.sessions[0].scene is not message)
                 raise InputError("it cannot be shown", "scene")
             show(reference, message)
 
         monkeypatch.setattr(session.Reference, "show", fail_late)
         client.send(scene(1))
+        assert begun.wait(20)  # a second scene that came sooner would take the first one's place, and nothing would fail
         client.send(scene(2))
         answers = [read(client.recv(20))[0] for _ in range(2)]
         assert [answer["type"] for answer in answers] == ["ready", "error"]
