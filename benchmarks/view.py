@@ -1,4 +1,5 @@
-"""What `gonio view` costs: the page's size, its first picture, the live reference, how far the two pictures are apart.
+"""What `gonio view` costs: the page's size, its first picture, the live reference, how far the two pictures are apart,
+and how long a saved file takes to be seen.
 
     python benchmarks/view.py [--json]
 
@@ -184,6 +185,15 @@ def relmse(test: np.ndarray, reference: np.ndarray) -> tuple[float, int]:
     return float(np.mean((x - r) ** 2 / (r**2 + 0.01))), int(inside.sum())
 
 
+def fit(tab: Any) -> dict[str, int]:
+    """The window's size at which the picture has SIZE, which the tab has then; it is 1280 x 720 before."""
+    wanted = {"width": 1280 - tab.evaluate("gonio.app.canvas.clientWidth") + SIZE[0],
+              "height": 720 - tab.evaluate("gonio.app.canvas.clientHeight") + SIZE[1]}  # fmt: skip
+    tab.set_viewport_size(wanted)
+    wait(tab, f"gonio.app.canvas.width === {SIZE[0]} && gonio.app.canvas.height === {SIZE[1]}")
+    return wanted
+
+
 def page_figures(what: stage.Stage) -> Iterator[Figure]:
     """The exported file, and the live page."""
     with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
@@ -202,10 +212,7 @@ def page_figures(what: stage.Stage) -> Iterator[Figure]:
         tab = chromium.new_page(viewport={"width": 1280, "height": 720})
         tab.goto(path.as_uri())
         wait(tab, "window.gonio?.frames > 0")
-        wanted = {"width": 1280 - tab.evaluate("gonio.app.canvas.clientWidth") + SIZE[0],
-                  "height": 720 - tab.evaluate("gonio.app.canvas.clientHeight") + SIZE[1]}  # fmt: skip
-        tab.set_viewport_size(wanted)
-        wait(tab, f"gonio.app.canvas.width === {SIZE[0]} && gonio.app.canvas.height === {SIZE[1]}")
+        wanted = fit(tab)
         times = [tab.evaluate(SLIDER, 0.1 + 0.02 * i) for i in range(20)]
         yield Figure("slider to picture, 640 x 360, median", statistics.median(times), "ms", 100.0)
         yield Figure("slider to picture, 640 x 360, worst of 20", max(times), "ms")
@@ -230,6 +237,75 @@ def page_figures(what: stage.Stage) -> Iterator[Figure]:
             tab.close()
 
 
+# A material of the user's own: Ward's gloss, whose factor of 4 each save changes.
+WARD = """from gonio import ops
+from gonio.models import BSDF
+from gonio.models.base import Value, number, spectrum
+from gonio.ops import inv_pi, safe_div, sqr, where
+from gonio.optics.frame import half_vector
+
+
+class Ward(BSDF):
+    kd: Value = spectrum(0.3, "diffuse albedo", high=1.0)
+    ks: Value = spectrum(0.3, "specular albedo", high=1.0)
+    slope: Value = number(0.3, "root mean square slope", low=0.01, high=1.0)
+
+    def eval(self, wo, wi, mode="radiance"):
+        h = half_vector(wo, wi)
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        tan2 = safe_div(1.0 - sqr(h.z), sqr(h.z))
+        lobe = ops.exp(-tan2 / sqr(self.slope)) / (4.0 * sqr(self.slope))
+        lobe = lobe * safe_div(inv_pi, ops.sqrt(ops.maximum(wo.z * wi.z, 0.0)))
+        return where(above, (self.kd * inv_pi + self.ks * lobe) * wi.z, 0.0)
+"""
+SAVES = 20
+
+# When a save came and was drawn, by the clock that Python reads too. The readback waits for what the GPU still does.
+WATCH = """() => {
+  const { app } = gonio;
+  const [renew, refresh] = [app.renew.bind(app), app.onRefresh];
+  app.renew = (made) => {
+    window.came = Date.now() / 1000;
+    renew(made);
+    const { frames } = gonio;
+    app.onRefresh = (what) => {
+      if (what === "picture" && gonio.frames > frames) {
+        gonio.readPixels();
+        window.drawn = { revision: made.revision, time: Date.now() / 1000 };
+        app.onRefresh = refresh;
+      }
+      refresh(what);
+    };
+  };
+}"""
+
+
+def saving_figures() -> Iterator[Figure]:
+    """From saving a user's file to the new picture on the page, and where the time goes."""
+    with tempfile.TemporaryDirectory() as folder, browser.chromium() as chromium:
+        path = Path(folder) / "ward.py"
+        path.write_text(WARD)
+        with serving(stage.of_targets([f"{path}:Ward"])) as url:
+            tab = chromium.new_page(viewport={"width": 1280, "height": 720})
+            tab.goto(url)
+            wait(tab, "window.gonio?.live?.status.samples > 0")
+            fit(tab)
+            tab.evaluate(WATCH)
+            parts: list[tuple[float, float, float]] = []
+            for number in range(1, SAVES + 1):
+                saved = time.time()
+                path.write_text(WARD.replace("4.0 *", f"{4 + number / 100} *"))
+                wait(tab, f"window.drawn?.revision === {number}")
+                came, drawn = tab.evaluate("[came, drawn.time]")
+                wait(tab, "gonio.live.status.samples > 0 && !gonio.app.reference.stale")
+                parts.append((drawn - saved, came - saved, time.time() - saved))
+            picture, on_the_page, reference = map(statistics.median, zip(*parts, strict=True))
+            yield Figure(f"file saved to new picture, 640 x 360, median of {SAVES}", picture, "s", 0.5)
+            yield Figure("file saved to its shader on the page, median", on_the_page, "s")
+            yield Figure("file saved to the reference's first frame, median", reference, "s")
+            tab.close()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -238,7 +314,7 @@ def main() -> None:
         sys.exit(browser.missing())
     what = stage.homework()
     figures = []
-    for figure in itertools.chain(reference_figures(what), page_figures(what)):
+    for figure in itertools.chain(reference_figures(what), page_figures(what), saving_figures()):
         figures.append(figure)
         if not given.json:
             bar = (

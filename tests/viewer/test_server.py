@@ -167,7 +167,7 @@ def test_a_scene_that_came_while_another_failed_is_shown(monkeypatch: pytest.Mon
 
         monkeypatch.setattr(session.Reference, "show", fail_late)
         client.send(scene(1))
-        assert begun.wait(20)  # a second scene that came sooner would take the first one's place, and nothing would fail
+        assert begun.wait(20)  # a second scene that came sooner would take the place of the first
         client.send(scene(2))
         answers = [read(client.recv(20))[0] for _ in range(2)]
         assert [answer["type"] for answer in answers] == ["ready", "error"]

@@ -7,7 +7,7 @@ import type { App, Panel, Picked, Picture, Presenter } from "./panel";
 import { type Hit, hitBalls, hitSphere } from "./pick";
 import { type DrawnBall, Renderer, type Scene } from "./renderer";
 import { type Shader, ShaderLibrary } from "./shaders";
-import { Change, type State, Store } from "./state";
+import { Change, type State, Store, initialState } from "./state";
 import { decodeState, encodeState } from "./url";
 import { cameraFrame, cross, dot, normalize, pixelRay, sub } from "./vectors";
 
@@ -16,6 +16,13 @@ const SLOT_COLORS = ["#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#00
 /** A change counts as motion for so long: coarser pictures are drawn meanwhile where the machine is slow. */
 const MOTION = 160;
 const MOST_PIXELS = 2_400_000;
+
+/** What is wrong with the user's file, where, and what to do about it. */
+export interface Fault {
+  what: string;
+  where: string;
+  hint: string;
+}
 
 export type Refresh = Parameters<NonNullable<Panel["refresh"]>>[0];
 
@@ -33,6 +40,8 @@ export class PageApp implements App {
   onSay: (text: string, kind: "info" | "error") => void = () => {};
   /** A live page asks its server for a variant that is not here. */
   onMissingVariant: (slot: number) => void = () => {};
+  /** The user's file cannot be shown, and why; null where it can again. */
+  onFault: (fault: Fault | null) => void = () => {};
   reference: Picture | null = null;
   private meshes: Partial<Record<State["view"]["mesh"], MeshBuffers>> = {};
   private pickedAt: Picked | null = null;
@@ -88,6 +97,22 @@ export class PageApp implements App {
 
   get frames(): number {
     return this.renderer.frames;
+  }
+
+  /**
+   * Other materials and rows in the place of the page's own, after the user's file was saved. What was changed on the
+   * page stays, where what it belongs to is still there.
+   */
+  renew(made: Pick<PageData, "revision" | "materials" | "scene">): void {
+    const { lights, view } = this.state;
+    const changes = encodeState(this.state, this.store.initial);
+    Object.assign(this.data, made);
+    this.shaders.forget();
+    this.lastShader.clear();
+    this.store.initial = initialState(this.data);
+    const state = decodeState(changes, this.store.initial, this.data.materials);
+    // What a link cannot hold: files that were dropped on the page.
+    this.store.replace({ ...state, lights, view: { ...state.view, mesh: view.mesh } });
   }
 
   // ---------------------------------------------------------------- the state, resolved

@@ -69,6 +69,8 @@ export interface Manifest {
 }
 
 export interface Variant {
+  /** Same key, same text and tables. */
+  key: string;
   choices: Choices;
   manifest: Manifest;
   text: string;
@@ -149,6 +151,8 @@ export interface PageData {
   title: string;
   mode: "export" | "live";
   socket: string | null;
+  /** How often the materials were made anew since the server began: a user's file was saved. */
+  revision: number;
   materials: Material[];
   scene: { rows: Row[]; lights: SceneLight[]; camera: Camera; spacing: number; mesh: string };
   display: { tone: Tone; exposure: number };

@@ -4,8 +4,8 @@
  * One frame is in flight: the next comes after the ack of the last. A newer scene ends the older one; frames of older
  * scenes that still arrive are dropped. The connection comes back by itself, later and later.
  */
-import type { PageApp } from "./app";
-import type { Variant } from "./data";
+import type { Fault, PageApp } from "./app";
+import type { PageData, Variant } from "./data";
 import { actingLights } from "./lights";
 import { halfToFloat } from "./targets";
 import { fitted } from "./vectors";
@@ -42,6 +42,7 @@ export class Live {
   private id = 0;
   private wishes = 0;
   private sent = "";
+  private awaited = -1;
   private timer = 0;
   private wait = 500;
   private uploaded = new Set<string>();
@@ -62,6 +63,7 @@ export class Live {
 
   private connect(): void {
     const url = new URL(this.address, location.href);
+    url.searchParams.set("revision", String(this.app.data.revision));
     url.protocol = url.protocol.replace("http", "ws");
     const socket = new WebSocket(url);
     socket.binaryType = "arraybuffer";
@@ -113,6 +115,7 @@ export class Live {
   private send(): void {
     const { app } = this;
     if (this.socket?.readyState !== WebSocket.OPEN) return;
+    if (app.frames === this.awaited) return this.later();
     const { state } = app;
     // The server traces whole materials on balls: beside a single term or another shape its picture would mislead.
     const whole = state.view.term === "full" || state.view.term === "compensated";
@@ -133,7 +136,7 @@ export class Live {
     this.id += 1;
     if (app.reference && !app.reference.stale) app.setReference({ ...app.reference, stale: true });
     Object.assign(this.status, { samples: 0, done: false, target: TARGET });
-    this.text({ type: "scene", id: this.id, ...(JSON.parse(text) as object) });
+    this.text({ type: "scene", id: this.id, revision: app.data.revision, ...(JSON.parse(text) as object) });
     this.onStatus();
   }
 
@@ -178,7 +181,7 @@ export class Live {
     this.waiting.add(wish);
     this.wishes += 1;
     this.asked.set(this.wishes, wish);
-    this.text({ type: "choice", id: this.wishes, material: row.material, choices: row.choices });
+    this.text({ type: "choice", id: this.wishes, revision: this.app.data.revision, material: row.material, choices: row.choices });
   }
 
   private read(text: string): void {
@@ -188,7 +191,11 @@ export class Live {
     } else if (message.type === "error") {
       this.status.message = String(message["what"]);
       this.app.say([message["what"], message["where"], message["hint"]].filter(Boolean).join(" — "), "error");
-    } else if (message.type === "variant") {
+    } else if (message.type === "stage") {
+      this.renew(message as unknown as Pick<PageData, "revision" | "materials" | "scene">);
+    } else if (message.type === "fault") {
+      this.app.onFault(message as unknown as Fault);
+    } else if (message.type === "variant" && message["revision"] === this.app.data.revision) {
       const material = this.app.shaders.material(String(message["material"]));
       material.variants.push(message["variant"] as Variant);
       const wish = this.asked.get(Number(message["id"]));
@@ -197,6 +204,18 @@ export class Live {
       this.app.store.update("slots", () => {});
     }
     this.onStatus();
+  }
+
+  /** A saved file: everything that was asked for is asked for anew. */
+  private renew(made: Pick<PageData, "revision" | "materials" | "scene">): void {
+    const { app } = this;
+    this.sent = "";
+    this.id += 1;
+    this.waiting.clear();
+    this.awaited = app.frames; // the page's own picture comes first: both want all of a small machine
+    if (app.reference) app.setReference({ ...app.reference, stale: true });
+    app.renew(made);
+    app.onFault(null);
   }
 
   private frame(buffer: ArrayBuffer): void {

@@ -7,7 +7,7 @@ import type { Choices, Field, Manifest, Material, PageData, Values, Variant } fr
 import { decodeFloats } from "./data";
 
 export interface Shader {
-  /** Same key, same text: programs are kept by it. */
+  /** The variant's: programs are kept by it. */
   key: string;
   material: Material;
   variant: Variant;
@@ -60,7 +60,23 @@ export class ShaderLibrary {
 
   at(material: Material, index: number): Shader {
     const variant = material.variants[index] as Variant;
-    return { key: `${material.id}/${index}`, material, variant, manifest: variant.manifest, text: variant.text };
+    return { key: variant.key, material, variant, manifest: variant.manifest, text: variant.text };
+  }
+
+  /** Drops the programs and tables of shaders that the page has no more. */
+  forget(): void {
+    const keys = this.data.materials.flatMap((material) => material.variants.map((variant) => variant.key));
+    const gone = (name: string) => /[0-9a-f]{16}/.test(name) && !keys.some((key) => name.includes(key));
+    for (const [name, { handle }] of this.programs)
+      if (gone(name)) {
+        this.gl.deleteProgram(handle);
+        this.programs.delete(name);
+      }
+    for (const [name, texture] of this.textures)
+      if (gone(name)) {
+        this.gl.deleteTexture(texture);
+        this.textures.delete(name);
+      }
   }
 
   /** Compiles once per key. `key` must name the sources: shader key and what is drawn with it. */

@@ -85,7 +85,7 @@ export type Listener = (change: Change) => void;
 export class Store {
   state: State;
   /** What the page data says: the target of reset, and what the URL is written against. */
-  readonly initial: State;
+  initial: State;
   private listeners = new Set<Listener>();
   private pending = new Set<string>();
   private scheduled = false;

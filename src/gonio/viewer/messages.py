@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from ..errors import InputError
+from ..errors import GonioError, InputError
 
 TEXT_BYTES = 64 << 10  # a scene of 64 balls with all their parameters is a tenth of this
 UPLOAD_BYTES = 64 << 20  # an environment of 4096 x 2048 half floats in RGBA
@@ -105,6 +105,7 @@ class Scene(Part):
 
     type: Literal["scene"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
+    revision: Annotated[int, Field(ge=0, lt=2**53)] = 0
     width: Annotated[int, Field(ge=1, le=4096)]
     height: Annotated[int, Field(ge=1, le=4096)]
     state: State
@@ -138,6 +139,7 @@ class Wish(Part):
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
+    revision: Annotated[int, Field(ge=0, lt=2**53)] = 0
     material: Key
     choices: dict[Path, Choice] = Field(max_length=32)
 
@@ -191,9 +193,18 @@ def environment(upload: Upload, content: bytes) -> np.ndarray:
     return pixels
 
 
-def failure(error: Any) -> str:
-    """An error as the page shows it."""
-    return json.dumps({"type": "error", "what": error.what, "where": error.where, "hint": error.hint})
+def failure(error: GonioError, kind: str = "error") -> str:
+    """An error as the page shows it.
+
+    kind  "error", which goes by, or "fault": the user's file is broken, until the next "stage"
+    """
+    return json.dumps({"type": kind, "what": error.what, "where": error.where, "hint": error.hint})
+
+
+def stage(data: dict[str, Any]) -> str:
+    """Other materials and rows in the place of those that the page has."""
+    parts = {name: data[name] for name in ("revision", "materials", "scene")}
+    return json.dumps({"type": "stage", **parts}, allow_nan=False)
 
 
 def frame(header: dict[str, Any], pixels: np.ndarray) -> bytes:

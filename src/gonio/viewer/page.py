@@ -12,6 +12,7 @@ import html as escaping
 import itertools
 import json
 import math
+import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from . import stage
 from .stage import Stage
 
 VERSION = 1
+_recording = threading.Lock()  # the recorder is one for all threads: the server's, and the one that watches files
 STATIC = Path(__file__).parent / "static"
 # Bilinear lookups are off by 1e-3 (RMS); at low roughness, where B rises within mu < .05, by up to 6e-2.
 DFG_SIZE = 64
@@ -39,10 +41,11 @@ TABLES = {
 }
 
 
-def page_data(what: Stage, socket: str | None = None) -> dict[str, Any]:
+def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> dict[str, Any]:
     """The page's data, as JSON holds it.
 
-    socket  where the live reference is reached, such as "/ws?token=..."; None for a page without a server
+    socket    where the live reference is reached, such as "/ws?token=..."; None for a page without a server
+    revision  how often the stage was made anew before
     Raises InputError where a model cannot be written as shader code.
     """
     used = {row.material for row in what.rows}
@@ -52,6 +55,7 @@ def page_data(what: Stage, socket: str | None = None) -> dict[str, Any]:
         "title": what.title,
         "mode": "export" if socket is None else "live",
         "socket": socket,
+        "revision": revision,
         "materials": [material_data(key, m) for key, m in what.materials.items() if key in used],
         "scene": {
             "rows": [
@@ -87,14 +91,17 @@ def material_data(key: str, material: stage.Material) -> dict[str, Any]:
 
 def variant_data(bsdf: BSDF, choices: dict[str, Any]) -> dict[str, Any]:
     """Shader, manifest and tables of a model with some choices made otherwise."""
-    bundle = emit.bundle(stage.replaced(bsdf, choices, "choices"), "glsl")
+    with _recording:
+        bundle = emit.bundle(stage.replaced(bsdf, choices, "choices"), "glsl")
     tables = {name: encode(values) for name, values in bundle.tables.items()}
     manifest = _finite(bundle.manifest)
     for texture in manifest["textures"]:
         name = texture["uniform"].removeprefix("table_")
         axes, doc = next((what for start, what in TABLES.items() if name.startswith(start)), ([], ""))
         texture |= {"axes": axes, "doc": doc}
-    return {"choices": choices, "manifest": manifest, "text": bundle.text, "tables": tables}
+    code = "".join([bundle.text, *(f"{name} {data}" for name, data in sorted(tables.items()))])
+    key = hashlib.sha256(code.encode()).hexdigest()[:16]
+    return {"key": key, "choices": choices, "manifest": manifest, "text": bundle.text, "tables": tables}
 
 
 def _finite(value: Any) -> Any:

@@ -38,11 +38,12 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from ..errors import InputError, MachineError
+from ..errors import GonioError, InputError, MachineError
 from ..render import engine
 from . import messages, page
 from .session import Renderer, Session
 from .stage import Stage
+from .watch import Watch
 
 LOOPBACK = "127.0.0.1"
 MOST_SESSIONS = 8  # each holds a scene and a picture in memory
@@ -121,12 +122,34 @@ class Application:
         self.door = door
         self.renderer = Renderer(what, device)
         self.sessions: list[Session] = []
-        data = page.page_data(what, f"/ws?token={door.token}")
-        self._html = page.html(data, policy=False)
+        self.fault: GonioError | None = None  # of the user's files, since the stage that is shown
+        self.watch = Watch(what.code, self.renew, self.complain) if what.code else None
+        self._data = self._written(what, 0)
+        self._html = page.html(self._data, policy=False)
         self.asgi = Starlette(
             routes=[Route("/", self.show), WebSocketRoute("/ws", self.talk)],
             exception_handlers={404: _nothing_here, 405: _nothing_here},
         )
+
+    def _written(self, what: Stage, revision: int) -> dict[str, Any]:
+        return page.page_data(what, f"/ws?token={self.door.token}", revision)
+
+    def renew(self, what: Stage) -> None:
+        """Show another stage on every page; raises what its materials raise while they are written as shaders."""
+        data = self._written(what, self.renderer.revision + 1)
+        self.renderer.renew(what)
+        self._data, self.fault = data, None
+        self._tell(messages.stage(data))
+        self._html = page.html(data, policy=False)
+
+    def complain(self, fault: GonioError) -> None:
+        """Say on every page, over the last good picture, what is wrong with the user's file."""
+        self.fault = fault
+        self._tell(messages.failure(fault, "fault"))
+
+    def _tell(self, message: str) -> None:
+        for session in list(self.sessions):
+            session.send_from_thread(message)
 
     async def show(self, request: Request) -> Response:
         """The page."""
@@ -151,6 +174,10 @@ class Application:
         await websocket.accept()
         session = Session(websocket, self.renderer)
         self.sessions.append(session)
+        if websocket.query_params.get("revision", "0") != str(self.renderer.revision):
+            session.send(messages.stage(self._data))
+        if self.fault:
+            session.send(messages.failure(self.fault, "fault"))
         try:
             await session.run(STALL_SECONDS)
         finally:
@@ -316,6 +343,8 @@ class Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
+        if self.application.watch:
+            self.application.watch.start()
         if not self.quiet:
             print(f"{self.url}\nCtrl-C ends it", flush=True)
         if self.browser:
@@ -336,6 +365,8 @@ class Server(uvicorn.Server):
             self.listener.close()
             # The thread is waited for: to end amid a kernel is a crash. A second Ctrl-C makes that no faster.
             with _deaf():
+                if self.application.watch:
+                    self.application.watch.stop()
                 self.application.renderer.stop()
 
 

@@ -170,6 +170,7 @@ class Renderer:
 
     def __init__(self, what: Stage, device: str = "cpu"):
         self.stage, self.device = what, device
+        self.revision = 0  # of the stage
         self._sessions: list[Session] = []
         self._jobs: list[_Variant] = []
         self._lock = threading.Condition()
@@ -177,11 +178,22 @@ class Renderer:
         self._clock = 0.0  # the least time that a session with work has had
         self._thread: threading.Thread | None = None
 
+    def renew(self, what: Stage) -> None:
+        """Render another stage from now on: what was asked of the old one is dropped."""
+        with self._lock:
+            self.stage = what
+            self.revision += 1
+            self._jobs.clear()
+            for session in self._sessions:
+                session.scene = None
+
     # ------------------------------------------------------------------ asked by sessions
 
     def show(self, session: Session, scene: messages.Scene) -> None:
-        """Render a scene for a session from now on: the newest wins."""
+        """Render a scene for a session from now on: the newest wins; one of an older stage comes too late."""
         with self._lock:
+            if scene.revision != self.revision:
+                return
             session.scene = scene
             if session not in self._sessions:
                 self._sessions.append(session)
@@ -197,6 +209,8 @@ class Renderer:
 
     def request_variant(self, session: Session, wish: messages.Wish) -> None:
         """Write a shader with other choices and send it."""
+        if wish.revision != self.revision:
+            return  # the page will ask anew
         if wish.material not in self.stage.materials:
             known = ", ".join(self.stage.materials)
             raise InputError(f"unknown material '{wish.material}'", "material", f"known: {known}")
@@ -283,15 +297,16 @@ class Renderer:
         with self._lock:
             reference = session.reference
             pictures = dict(session.pictures)
+            stage = self.stage
         if reference is None:
-            reference = Reference(self.stage, self.device)
+            reference = Reference(stage, self.device)
             session.reference = reference
             limits = {"upload": messages.UPLOAD_BYTES, "pixels": messages.MOST_PIXELS}
             ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
             session.send_from_thread(json.dumps(ready))
             _give_way()
         if reference.scene is not scene:
-            reference.pictures = pictures
+            reference.stage, reference.pictures = stage, pictures
             reference.show(scene)
             session.shown_samples = 0
             session.started = time.perf_counter()
@@ -349,6 +364,7 @@ class _Variant:
         try:
             variant = page.variant_data(self.stage.materials[wish.material].bsdf, dict(wish.choices))
             answer = {"type": "variant", "id": wish.id, "material": wish.material, "variant": variant}
+            answer["revision"] = wish.revision
             self.session.send_from_thread(json.dumps(answer, allow_nan=False))
         except GonioError as error:
             self.session.send_from_thread(messages.failure(error))

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, Parameter, model, notation
 from ..optics import fresnel, indices
+from .watch import Code
 
 ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # of the homework's balls; alpha is its square
 # the homework's masking and the correct one; the page toggles between them
@@ -61,7 +64,10 @@ class Material:
 
 @dataclass(frozen=True)
 class Stage:
-    """Materials by key, rows from top to bottom, lights and camera as docs/viewer.md writes them."""
+    """Materials by key, rows from top to bottom, lights and camera as docs/viewer.md writes them.
+
+    code  the user's files that it was made of, to make it anew when one of them is saved
+    """
 
     title: str
     materials: dict[str, Material]
@@ -69,6 +75,7 @@ class Stage:
     lights: tuple[dict[str, Any], ...] = (SUN,)
     camera: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    code: Code[Stage] | None = None
 
     def framed(self) -> dict[str, Any]:
         """The camera, far enough away that all balls stand in a picture of 16 : 9 or wider, with some air.
@@ -198,15 +205,22 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
     parameters  "name=value" each, for every model that has it; InputError where none has
     """
+    files = [Path(file) for file in map(_file, targets) if file]
+    if not files:
+        return _of_targets(targets, parameters)
+    code = Code(files, partial(_of_targets, targets, parameters))
+    return replace(code.run(), code=code)
+
+
+def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
     wished = dict(map(notation.assignment, parameters))
     bsdfs, given, known = [], [], set()
     for target in targets:
-        made, names, fits = _named(target, wished)
-        if not isinstance(made, BSDF):
-            hint = "the page's shader code is written from Gonio's models only"
-            raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
-        bsdfs.append(made)
-        given.append(names)
+        cls, own = _class(target)
+        fits = {*cls.parameters(), *(["preset"] if hasattr(cls, "preset") else [])}
+        settings = {**{name: value for name, value in wished.items() if name in fits}, **own}
+        bsdfs.append(notation.made(cls, settings)[0])
+        given.append({*settings})
         known |= fits
     for name in wished:
         if name not in known:
@@ -214,20 +228,23 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
     return of_models(bsdfs, given)
 
 
-def _named(target: str, wished: dict[str, str]) -> tuple[Any, set[str], set[str]]:
-    """A target's material, the parameters set, and those that it knows; its own settings come before the wished."""
-    if ":" in target.partition("(")[0]:
-        from ..verify import targets as verify_targets
+def _file(target: str) -> str:
+    """The Python file of FILE.py:CLASS, "" of any other target."""
+    file, colon, _ = target.partition("(")[0].rpartition(":")
+    return file if colon and file.endswith(".py") else ""
 
-        # for a class in a file only running it tells
-        known = {*verify_targets.resolve(target)[0].model.parameters(), "preset"}
-        fitting = {name: value for name, value in wished.items() if name in known}
-        (subject,) = verify_targets.resolve(target, [f"{name}={value}" for name, value in fitting.items()])
-        return subject.model, {*fitting}, known
-    cls, own = notation.taken_apart(target)
-    known = {*cls.parameters(), *(["preset"] if hasattr(cls, "preset") else [])}
-    given = {**{name: value for name, value in wished.items() if name in known}, **own}
-    return notation.made(cls, given)[0], {*given}, known
+
+def _class(target: str) -> tuple[type[BSDF], dict[str, str]]:
+    """The class of a target, and the parameters that the target itself sets."""
+    if _file(target):
+        from ..verify import targets
+
+        file, _, name = target.rpartition(":")
+        return targets._class_in(Path(file), name), {}
+    if ":" in target.partition("(")[0]:
+        hint = "the page's shader code is written from Gonio's models only"
+        raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
+    return notation.taken_apart(target)
 
 
 def of_models(bsdfs: Sequence[BSDF], given: Sequence[set[str]] | None = None) -> Stage:

@@ -1,6 +1,6 @@
 /** The page's frame: bar on top, picture with its labels, panel at the side, dock below. */
 import { GUI } from "lil-gui";
-import type { PageApp } from "../app";
+import type { Fault, PageApp } from "../app";
 import type { Live } from "../live";
 import type { Panel } from "../panel";
 import type { Change } from "../state";
@@ -39,6 +39,7 @@ export class Layout {
   private readonly labels: Labels;
   private readonly dock: Dock;
   private readonly status = element("div", { class: "status" });
+  private readonly fault = element("div", { class: "fault", hidden: true });
   private readonly furnace: HTMLButtonElement;
   private readonly solo: HTMLButtonElement;
   live: Live | null = null;
@@ -76,7 +77,8 @@ export class Layout {
     this.lights = new LightSection(app, lights, (kind) => openFile(app, kind));
     this.view = new ViewSection(app, gui.addFolder("View"), (kind) => openFile(app, kind));
     this.terms = termBar(app);
-    parts.stage.append(this.status);
+    this.fault.setAttribute("role", "alert");
+    parts.stage.append(this.status, this.fault);
     this.dock = new Dock(app, panels);
     // Above the picture, not over it: three rows of balls fill its height.
     const top = element("div", { class: "top" }, this.terms.host, this.solo, this.terms.note);
@@ -86,6 +88,7 @@ export class Layout {
     attachKeys(app, actions, help);
     attachDrop(app, parts.stage);
     app.onSay = (text, kind) => this.say(text, kind);
+    app.onFault = (fault) => this.showFault(fault);
   }
 
   update(change: Change): void {
@@ -116,6 +119,14 @@ export class Layout {
     }
     const text = parts.join("   ");
     if (this.status.textContent !== text) this.status.textContent = text;
+  }
+
+  /** Over the last good picture, until the file is mended. */
+  private showFault(fault: Fault | null): void {
+    this.fault.hidden = fault === null;
+    this.fault.replaceChildren(
+      ...(fault ? [element("b", {}, fault.where), element("span", {}, fault.what), element("span", { class: "remedy" }, fault.hint)] : []),
+    );
   }
 
   private async copyLink(): Promise<void> {

@@ -25,7 +25,7 @@ export class ModelsSection {
     const shader = app.shaderOf(slot);
     const row = slots[slot];
     const perBall = shader.manifest.parameters.filter((p) => row && edits.perBall(row, p.path)).map((p) => p.path);
-    const key = JSON.stringify([slot, shader.key, slots.length, perBall, perBall.length ? selection.ball : 0]);
+    const key = JSON.stringify([app.data.revision, slot, shader.key, row?.material, slots.length, perBall, perBall.length ? selection.ball : 0]);
     if (key !== this.built) {
       this.built = key;
       this.build(slot);

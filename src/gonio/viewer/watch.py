@@ -1,0 +1,177 @@
+"""A user's own files, loaded anew whenever they are saved.
+
+    >>> code = Code([Path("ward.py")], make)
+    >>> stage = code.run()                   # `make()`, which loads the files and what they import from their folder
+    >>> Watch(code, show, complain).start()  # and again after each change
+
+Each run starts without the modules of the last one, so that a saved change in any of them counts, and an old module
+goes with the materials that were made of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import linecache
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Generic, TypeVar
+
+from ..errors import GonioError
+
+POLL_SECONDS = 0.03
+MISSING_POLLS = 10  # some editors delete a file and write it again: that long is no error
+
+Made = TypeVar("Made")
+Stamp = tuple[int, int, int] | None  # when it was written, its size, which file it is; None where there is none
+
+
+class Code(Generic[Made]):
+    """Python files that the user named, those that they import from their own folders, and what is made of them.
+
+    make   loads the files
+    files  all of them, as of the last run
+    """
+
+    def __init__(self, named: Iterable[Path], make: Callable[[], Made]):
+        self._make = make
+        self._named = frozenset(path.resolve() for path in named)
+        self._folders = {path.parent for path in self._named}
+        self._modules: list[str] = []
+        self.files = self._named
+        self.stamps: dict[Path, Stamp] = {}
+
+    def run(self) -> Made:
+        """What `make` makes of the files as they are now."""
+        self.stamps = self.look()
+        for name in self._modules:
+            sys.modules.pop(name, None)
+        others = set(sys.modules)
+        importlib.invalidate_caches()
+        linecache.checkcache()  # lines that errors quote
+        try:
+            with self._importable():
+                made = self._make()
+        except BaseException:
+            # what a file imports, or would if it were there, is unknown now: any file beside it may mend it
+            self._follow(others, {path for folder in self._folders for path in folder.glob("*.py")} | self.files)
+            raise
+        self._follow(others, set())
+        return made
+
+    def look(self) -> dict[Path, Stamp]:
+        """What tells whether a file was saved since."""
+        return {path: _stamp(path) for path in self.files}
+
+    @contextlib.contextmanager
+    def _importable(self) -> Iterator[None]:
+        """The folders on Python's path. And no byte code is kept: it would pass for that of a file of the same size
+        that was saved within the same second."""
+        path, keeps = list(sys.path), sys.dont_write_bytecode
+        sys.path[:0] = sorted(map(str, self._folders))
+        sys.dont_write_bytecode = True
+        try:
+            yield
+        finally:
+            sys.path[:], sys.dont_write_bytecode = path, keeps
+
+    def _follow(self, others: set[str], more: set[Path]) -> None:
+        """Note which modules came with the files: those of their folders that nothing else had loaded."""
+        packages = {name.partition(".")[0] for name in others}
+        new = {name: module for name, module in sys.modules.items() if name.partition(".")[0] not in packages}
+        files = {name: getattr(module, "__file__", None) for name, module in new.items()}
+        places = {name: Path(file).resolve() for name, file in files.items() if file}
+        own = {name: place for name, place in places.items() if self._is_own(place)}
+        self._modules = list(own)
+        self.files = self._named | set(own.values()) | more
+        self.stamps = {path: self.stamps[path] if path in self.stamps else _stamp(path) for path in self.files}
+
+    def _is_own(self, place: Path) -> bool:
+        """Whether a file stands in a folder of the user's, and not in an environment that happens to lie there."""
+        return not {"site-packages", "dist-packages"} & {*place.parts} and not self._folders.isdisjoint(place.parents)
+
+    def located(self, error: BaseException) -> GonioError:
+        """The error with the line of these files that it came from."""
+        causes = list(_causes(error))
+        first = causes[-1]
+        if isinstance(first, SyntaxError) and first.filename:
+            text = f": {first.text.strip()}" if first.text else ""
+            return GonioError(f"{first.msg}{text}", f"{Path(first.filename).name}:{first.lineno}", "mend it and save")
+        line = next((line for cause in reversed(causes) if (line := self._line(cause.__traceback__))), "")
+        place = line or min(self._named).name
+        if isinstance(error, GonioError):
+            named = not error.where or any(path.name in error.where for path in self.files)
+            return GonioError(error.what, place if named else f"{place}: {error.where}", error.hint)
+        text = str(error).strip().partition("\n")[0]
+        return GonioError(f"{type(error).__name__}: {text}", place, "mend it and save")
+
+    def _line(self, traceback: TracebackType | None) -> str:
+        """file:line of the innermost call in these files, "" where there is none."""
+        found = ""
+        while traceback is not None:
+            place = Path(traceback.tb_frame.f_code.co_filename)
+            if place.resolve() in self.files:
+                found = f"{place.name}:{traceback.tb_lineno}"
+            traceback = traceback.tb_next
+        return found
+
+
+def _causes(error: BaseException) -> Iterator[BaseException]:
+    """The error, what it was raised from, and so on to the first."""
+    next_one: BaseException | None = error
+    while next_one is not None:
+        yield next_one
+        next_one = next_one.__cause__ or next_one.__context__
+
+
+def _stamp(path: Path) -> Stamp:
+    try:
+        about = path.stat()
+    except OSError:
+        return None
+    return about.st_mtime_ns, about.st_size, about.st_ino
+
+
+class Watch(Generic[Made]):
+    """A thread that runs the code anew whenever one of its files was saved.
+
+    show      gets what was made
+    complain  gets the error of either, with its place
+    """
+
+    def __init__(self, code: Code[Made], show: Callable[[Made], None], complain: Callable[[GonioError], None]):
+        self._code, self._show, self._complain = code, show, complain
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="gonio watch", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread, after the run that it is in."""
+        self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _work(self) -> None:
+        before, quiet = self._code.stamps, 0
+        while not self._ended.wait(POLL_SECONDS):
+            now = self._code.look()
+            quiet = quiet + 1 if now == before else 0
+            before = now
+            # twice the same: it is not being written
+            if now != self._code.stamps and quiet >= (MISSING_POLLS if None in now.values() else 1):
+                self._run()
+                before = self._code.stamps
+
+    def _run(self) -> None:
+        try:
+            self._show(self._code.run())
+        except Exception as error:
+            self._complain(self._code.located(error))
+
+
+__all__ = ["Code", "Watch"]
