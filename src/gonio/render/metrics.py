@@ -12,8 +12,12 @@ import math
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
 
 from ..errors import InputError
+
+Floats = NDArray[np.floating]
 
 # The usual desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m [Andersson2020, section 6].
 PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
@@ -47,7 +51,7 @@ METRICS: dict[str, str] = {
 }
 
 
-def _pair(test: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _pair(test: Floats, reference: Floats) -> tuple[Floats, Floats]:
     a, b = np.asarray(test, np.float64), np.asarray(reference, np.float64)
     if a.shape != b.shape:
         raise InputError(f"the pictures differ in size: {_size(a)} against {_size(b)}", "", "render both at one --size")
@@ -60,34 +64,34 @@ def _pair(test: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return a, b
 
 
-def _size(picture: np.ndarray) -> str:
+def _size(picture: Floats) -> str:
     return f"{picture.shape[1]}x{picture.shape[0]}" if picture.ndim >= 2 else str(picture.shape)
 
 
-def rmse(test: np.ndarray, reference: np.ndarray) -> float:
+def rmse(test: Floats, reference: Floats) -> float:
     """sqrt(mean((x - r)^2)), over all pixels and channels."""
     a, b = _pair(test, reference)
     return float(np.sqrt(np.mean((a - b) ** 2)))
 
 
-def relmse_map(test: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def relmse_map(test: Floats, reference: Floats) -> Floats:
     """(x - r)^2 / (r^2 + 0.01), averaged over the channels: (H, W)."""
     a, b = _pair(test, reference)
     return ((a - b) ** 2 / (b**2 + RELATIVE_FLOOR)).mean(axis=2)
 
 
-def relmse(test: np.ndarray, reference: np.ndarray) -> float:
+def relmse(test: Floats, reference: Floats) -> float:
     """mean((x - r)^2 / (r^2 + 0.01)): the squared relative error, that dark pixels cannot blow up."""
     return float(relmse_map(test, reference).mean())
 
 
-def mean_ratio(test: np.ndarray, reference: np.ndarray) -> float:
+def mean_ratio(test: Floats, reference: Floats) -> float:
     """mean(x) / mean(r): 1 where no energy is lost or made; NaN where the reference is black."""
     a, b = _pair(test, reference)
     return float(a.mean() / b.mean()) if b.mean() != 0 else (1.0 if a.mean() == 0 else math.nan)
 
 
-def compare(test: np.ndarray, reference: np.ndarray, hdr: bool = True) -> Comparison:
+def compare(test: Floats, reference: Floats, hdr: bool = True) -> Comparison:
     """All measures at once; `hdr` False takes both pictures as shown on a screen, in [0, 1]."""
     exposures = exposure_range(reference) if hdr else None
     return Comparison(
@@ -100,6 +104,8 @@ def compare(test: np.ndarray, reference: np.ndarray, hdr: bool = True) -> Compar
 
 
 # --- FLIP ------------------------------------------------------------------------------------------------
+# Not NVIDIA's wheel `flip-evaluator`, whose 1.7 there is for neither Python 3.14 nor Linux on ARM. The two agree: over
+# the 16 pictures of examples/, with 20 % of noise, the means differ by at most 7e-6 and pixels by 4e-5 (it is float32).
 
 _XYZ_FROM_RGB = np.array(  # linear sRGB to CIE XYZ with the D65 white of [Andersson2020]
     [
@@ -126,11 +132,11 @@ _SENSITIVITY = (
 
 
 def flip_map(
-    test: np.ndarray,
-    reference: np.ndarray,
+    test: Floats,
+    reference: Floats,
     hdr: bool = True,
     pixels_per_degree: float = PIXELS_PER_DEGREE,
-) -> np.ndarray:
+) -> Floats:
     """FLIP per pixel, (H, W), 0 to 1.
 
     With `hdr` False both pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True
@@ -153,12 +159,12 @@ def flip_map(
 _ACES = (0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14)
 
 
-def _aces(x: np.ndarray) -> np.ndarray:
+def _aces(x: Floats) -> Floats:
     k0, k1, k2, k3, k4, k5 = _ACES
     return np.clip((k0 * x * x + k1 * x + k2) / (k3 * x * x + k4 * x + k5), 0, 1)
 
 
-def exposure_range(reference: np.ndarray) -> tuple[float, float]:
+def exposure_range(reference: Floats) -> tuple[float, float]:
     """First and last exposure in stops (powers of two): where ACES maps the reference's brightest pixel, and
     then its median, to 0.85 [Andersson2021, section 3.2]."""
     k0, k1, k2, k3, k4, k5 = _ACES
@@ -172,7 +178,7 @@ def exposure_range(reference: np.ndarray) -> tuple[float, float]:
     return math.log2(x_max / luminance.max()), math.log2(x_max / median)
 
 
-def _ldr_flip(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float) -> np.ndarray:
+def _ldr_flip(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
     """LDR-FLIP of two linear RGB pictures in [0, 1]: dE_c^(1 - dE_f) [Andersson2020, eq. 5]."""
     a, b = _opponent(test), _opponent(reference)
     distance = _colour_distance(a, b, pixels_per_degree)
@@ -180,19 +186,19 @@ def _ldr_flip(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float)
     return distance ** (1 - features)
 
 
-def _opponent(rgb: np.ndarray) -> np.ndarray:
+def _opponent(rgb: Floats) -> Floats:
     """Linear RGB to YyCxCz, the linear twin of L*a*b* in which the eye's filter acts."""
     x, y, z = np.moveaxis(rgb @ _XYZ_FROM_RGB.T / _WHITE, -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
-def _from_opponent(ycc: np.ndarray) -> np.ndarray:
+def _from_opponent(ycc: Floats) -> Floats:
     y = (ycc[..., 0] + 16) / 116
     xyz = np.stack([y + ycc[..., 1] / 500, y, y - ycc[..., 2] / 200], axis=-1) * _WHITE
     return xyz @ _RGB_FROM_XYZ.T
 
 
-def _hunt_lab(rgb: np.ndarray) -> np.ndarray:
+def _hunt_lab(rgb: Floats) -> Floats:
     """L*a*b* with the Hunt adjustment: colours seem fuller when brighter, a and b scale by 0.01 L."""
     t = rgb @ _XYZ_FROM_RGB.T / _WHITE
     delta = 6 / 29
@@ -201,14 +207,14 @@ def _hunt_lab(rgb: np.ndarray) -> np.ndarray:
     return np.stack([lightness, 5 * lightness * (x - y), 2 * lightness * (y - z)], axis=-1)
 
 
-def _hyab(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _hyab(a: Floats, b: Floats) -> Floats:
     """City-block in lightness, Euclidean in chroma: better than either for large differences."""
     difference = a - b
     return np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2])
 
 
-def _colour_distance(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float) -> np.ndarray:
-    def seen(ycc: np.ndarray) -> np.ndarray:
+def _colour_distance(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
+    def seen(ycc: Floats) -> Floats:
         filtered = np.stack(
             [_contrast_filter(ycc[..., i], *_SENSITIVITY[i], pixels_per_degree) for i in range(3)], axis=-1
         )
@@ -225,9 +231,7 @@ def _colour_distance(test: np.ndarray, reference: np.ndarray, pixels_per_degree:
     )
 
 
-def _contrast_filter(
-    channel: np.ndarray, a1: float, b1: float, a2: float, b2: float, pixels_per_degree: float
-) -> np.ndarray:
+def _contrast_filter(channel: Floats, a1: float, b1: float, a2: float, b2: float, pixels_per_degree: float) -> Floats:
     """The eye's blur, a sum of two Gaussians, each separable, which together sum to one."""
     widest = max(b for row in _SENSITIVITY for b in (row[1], row[3]))
     radius = math.ceil(3 * math.sqrt(widest / (2 * math.pi**2)) * pixels_per_degree)
@@ -238,12 +242,12 @@ def _contrast_filter(
             continue
         line = np.exp(-(math.pi**2) * x * x / b)
         scale = a * math.sqrt(math.pi / b)
-        total += scale * _along(_along(channel, line, 0), line, 1)
+        total += scale * _filtered(channel, line, line)
         weight += scale * line.sum() ** 2
     return total / weight
 
 
-def _feature_distance(test: np.ndarray, reference: np.ndarray, pixels_per_degree: float) -> np.ndarray:
+def _feature_distance(test: Floats, reference: Floats, pixels_per_degree: float) -> Floats:
     """The larger of the edge and the point difference [Andersson2020, eq. 4]."""
     sigma = 0.5 * _FEATURE_WIDTH * pixels_per_degree
     radius = math.ceil(3 * sigma)
@@ -251,31 +255,21 @@ def _feature_distance(test: np.ndarray, reference: np.ndarray, pixels_per_degree
     gauss = np.exp(-x * x / (2 * sigma * sigma))
     edge, point = -x * gauss, (x * x / sigma**2 - 1) * gauss
 
-    def strength(luminance: np.ndarray, detector: np.ndarray) -> np.ndarray:
+    def strength(luminance: Floats, detector: Floats) -> Floats:
         # Positive and negative weights each sum to one, as those of the two-dimensional filter do.
         across = gauss / gauss.sum()
         along = np.where(detector < 0, detector / -detector[detector < 0].sum(), 0)
         along = along + np.where(detector > 0, detector / detector[detector > 0].sum(), 0)
-        horizontal = _along(_along(luminance, along, 1), across, 0)
-        vertical = _along(_along(luminance, along, 0), across, 1)
-        return np.hypot(horizontal, vertical)
+        return np.hypot(_filtered(luminance, across, along), _filtered(luminance, along, across))
 
     edges, points = (np.abs(strength(reference, x) - strength(test, x)) for x in (edge, point))
     return np.clip((np.maximum(edges, points) / math.sqrt(2)) ** _FEATURE_POWER, 0, 1)
 
 
-def _along(channel: np.ndarray, weights: np.ndarray, axis: int) -> np.ndarray:
-    """Correlate along one axis, the border pixels repeated outward.
+def _filtered(channel: Floats, down: Floats, right: Floats) -> Floats:
+    """Correlate with a filter of that column and that row, the border pixels repeated outward.
 
     Correlation and convolution differ by a reflection; of our filters only the edge detector is odd, and of
     it only the absolute value is used.
     """
-    radius = len(weights) // 2
-    padding = [(0, 0), (0, 0)]
-    padding[axis] = (radius, radius)
-    padded = np.pad(channel, padding, mode="edge")
-    length = channel.shape[axis]
-    total = np.zeros_like(channel)
-    for i, weight in enumerate(weights):
-        total += weight * (padded[i : i + length] if axis == 0 else padded[:, i : i + length])
-    return total
+    return correlate1d(correlate1d(channel, down, 0, mode="nearest"), right, 1, mode="nearest")
