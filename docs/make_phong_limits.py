@@ -121,14 +121,14 @@ def energy() -> tuple[str, list[str]]:
     for p, color in zip((1.0, 4.0, 16.0, 64.0), COLORS, strict=True):
         model = go.Phong(kd=0.0, ks=1.0, p=p)
         report = verify(model, effort="quick", laws=["energy", "reciprocity"])
-        data = report["energy"].data
-        angle = directions.angles(data["wo"])[:, 0]
+        curves = report["energy"].evidence
+        angle = directions.angles(curves.wo)[:, 0]
         order = np.argsort(angle)
-        axes[0].plot(angle[order], data["quadrature"][order].mean(1), color=color, label=f"p = {p:g}")
+        axes[0].plot(angle[order], curves.quadrature[order].mean(1), color=color, label=f"p = {p:g}")
         power = reflected_power(model, theta)
         axes[1].plot(theta, power, color=color, label=f"p = {p:g}")
         v = report["energy"]
-        most = float(data["quadrature"].max())
+        most = float(curves.quadrature.max())
         rows.append(
             f"| {p:g} | {most:.3f} | {power[0]:.3f} | {power[-1]:.2f} | {v.status} | {report['reciprocity'].status} |"
         )
@@ -148,7 +148,7 @@ def reciprocity() -> str:
     report = verify(go.Phong(), effort="quick", laws=["reciprocity"])
     figure, axes = canvas(1, 3.6)
     image = axes[0].imshow(
-        report["reciprocity"].data["map"], origin="lower", extent=(0, 90, 0, 90), cmap="magma", vmin=0, vmax=1
+        report["reciprocity"].evidence.difference, origin="lower", extent=(0, 90, 0, 90), cmap="magma", vmin=0, vmax=1
     )
     axes[0].set_xlabel("angle of wi, degrees", fontsize=9)
     axes[0].set_ylabel("angle of wo, degrees", fontsize=9)

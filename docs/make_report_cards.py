@@ -18,13 +18,14 @@ from typing import Any
 import gonio as go
 from gonio.render import foreign
 from gonio.verify import Report, verify
-from gonio.verify.report import DECLARED, FAIL, NOT_APPLICABLE, PASS, Verdict
+from gonio.verify.laws import laws
 from gonio.verify.targets import resolve
+from gonio.verify.verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Verdict
 
 FOLDER = Path(__file__).parent / "report-cards"
 WIDTHS = "0.05,0.2,0.5,1"
 MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: "-"}
-SHORT = ("positivity", "reciprocity", "energy", "pdf", "weight", "isotropy", "linearity", "gradients", "precision")
+SHORT = [name for name in laws() if name != "shader"]  # which the browser judges
 
 # what is judged besides the defaults: roughness, and the distribution that a user of either renderer picks
 SWEPT = {

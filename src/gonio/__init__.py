@@ -16,9 +16,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from . import llvm
+from ._version import __version__ as __version__
 from .errors import MachineError
-
-__version__ = "0.1.0"
 
 # Before Dr.Jit looks for one. Where there is none, whoever computes on the CPU says so; a GPU does without.
 with contextlib.suppress(MachineError):

@@ -12,11 +12,13 @@ import pytest
 from gonio import ops
 from gonio.models.base import Breach
 from gonio.verify import report, verify
-from gonio.verify.report import Finding, Trial, decide
+from gonio.verify.laws import Law
+from gonio.verify.run import decide
 from gonio.verify.subject import of
+from gonio.verify.verdict import Finding, Trial, Verdict
 
 
-class Law:
+class Idle(Law):
     """A law of no consequence."""
 
     number, name, title, meaning = 99, "energy", "a law", "nothing"
@@ -26,12 +28,12 @@ def finding(figure: float = 0.0, **more: Any) -> Finding:
     return Finding(figure=figure, tolerance=0.1, reason="because", **more)
 
 
-def verdict(found: Finding, breaks: dict[str, Breach] | None = None, threshold: float = 1e-3) -> report.Verdict:
+def verdict(found: Finding, breaks: dict[str, Breach] | None = None, threshold: float = 1e-3) -> Verdict:
     class Declares(go.Lambert):
         """Lambert with declared breaches."""
 
     Declares.breaks = breaks or {}
-    return decide(Law, of(Declares(0.5)), found, threshold, 1)
+    return decide(Idle(), of(Declares(0.5)), found, threshold, 1)
 
 
 def test_a_figure_within_its_tolerance_passes_and_one_over_it_fails() -> None:

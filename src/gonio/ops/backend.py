@@ -8,12 +8,15 @@ from __future__ import annotations
 import sys
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from .. import llvm
 from ..errors import InputError
+
+# A Dr.Jit array. Dr.Jit's stubs describe one device and precision, our code is written for all.
+Array: TypeAlias = Any
 
 PRECISIONS = ("float32", "float64")
 _precision = "float32"

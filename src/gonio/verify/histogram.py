@@ -7,16 +7,20 @@ the tails. The coordinates are (1 - |z|, a pseudo-angle of (x, y)): equal areas,
 cancellation near the pole. Sampling, binning and counting are one kernel, in which nothing is stored but the counts.
 
 What fails, is a delta sample, or lands where no cell is, is counted too: its expectation is 1 - int pdf.
+
+    grid = place(subject, wo, seed)
+    outcome = compare(expect(subject.pdf, grid, tolerance), count(subject, grid, log_samples, seed), row)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from ..ops import backend
+from ..ops.backend import Array, Types
 from ..render.sampler import mix, unit
 from . import directions, statistics
 from .subject import Subject, guarded
@@ -25,6 +29,8 @@ ROWS, COLUMNS = 100, 200  # a side of the surface: 20 000 cells
 COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
 PILOT = 1 << 15
 LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
+
+Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
 
 _NODES = {n: np.polynomial.legendre.leggauss(n) for n in (2, 3, 4)}
 
@@ -78,13 +84,18 @@ def place(subject: Subject, wo: np.ndarray, seed: int) -> Grid | None:
     good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
     if not good.any():
         return None
-    wi, good = drawn.wi.reshape(len(wo), PILOT, 3), good.reshape(len(wo), PILOT)
-    sides = tuple(s for s in (1, -1) if np.any(s * wi[good][:, 2] > 0.0) or _claims(subject, wo, s))
+    rows = zip(drawn.wi.reshape(len(wo), PILOT, 3), good.reshape(len(wo), PILOT), strict=True)
+    return place_around([wi[kept] for wi, kept in rows], wo, lambda o, i: subject.pdf(o, i, "float32"))
+
+
+def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density) -> Grid:
+    """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf claims some."""
+    sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
     rows = np.empty((len(wo), len(sides), ROWS + 1), np.float32)
     columns = np.empty((len(wo), len(sides), ROWS, COLUMNS + 1), np.float32)
-    for i in range(len(wo)):
+    for i, wi in enumerate(pilot):
         for j, side in enumerate(sides):
-            mine = wi[i][good[i] & (side * wi[i][:, 2] > 0.0)]
+            mine = wi[side * wi[:, 2] > 0.0]
             height, turn = _height(mine), _turn(mine)
             order = np.argsort(height)
             height, turn = height[order], turn[order]
@@ -96,11 +107,11 @@ def place(subject: Subject, wo: np.ndarray, seed: int) -> Grid | None:
     return Grid(wo, sides, rows, columns)
 
 
-def _claims(subject: Subject, wo: np.ndarray, side: int) -> bool:
+def _claims(pdf: Density, wo: np.ndarray, side: int) -> bool:
     """Whether the pdf claims anything on that side."""
     rng = np.random.default_rng(3)
     wi = directions.on_side(directions.uniform(rng, 256 * len(wo)), side)
-    return bool(np.any(subject.pdf(np.repeat(wo, 256, axis=0), wi, precision="float32") > 0.0))
+    return bool(np.any(pdf(np.repeat(wo, 256, axis=0), wi) > 0.0))
 
 
 def _height(w: np.ndarray) -> np.ndarray:
@@ -143,7 +154,7 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
 # --------------------------------------------------------------------------- what the pdf expects
 
 
-def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
+def expect(pdf: Density, grid: Grid, tolerance: float) -> Expectation:
     """The pdf's integral over every cell; cells whose value is off by more than their noise allows are divided.
 
     tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
@@ -159,7 +170,7 @@ def expect(subject: Subject, grid: Grid, tolerance: float) -> Expectation:
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
     for depth in range(9):
-        place = subject, grid.wo[row[owner]], side[owner], box
+        place = pdf, grid.wo[row[owner]], side[owner], box
         (two, *_), (three, *_), (four, low, high) = (_gauss(*place, order) for order in (2, 3, 4))
         # the error of four nodes is far below the difference from two: for smooth cells its square, over the value.
         # Where a step runs through the middle, two and four agree by chance, and three does not.
@@ -185,7 +196,7 @@ _RIM = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.9999
 
 
 def _has_a_step_aside(
-    subject: Subject,
+    pdf: Density,
     wo: np.ndarray,
     side: np.ndarray,
     box: np.ndarray,
@@ -198,7 +209,7 @@ def _has_a_step_aside(
     Total reflection and the horizon end a density with a step; what lies between a cell's rim and its nodes would be
     lost, or taken for lit. A dark cell is divided at any light; others where what may be wrong is not allowed.
     """
-    value = subject.pdf(np.repeat(wo, len(_RIM), axis=0), _directions(side, box, _RIM[:, 0], _RIM[:, 1]))
+    value = pdf(np.repeat(wo, len(_RIM), axis=0), _directions(side, box, _RIM[:, 0], _RIM[:, 1]))
     value = value.reshape(len(box), -1)
     most, least = value.max(1), value.min(1)
     a, b, c, d = box.T
@@ -217,7 +228,7 @@ def _directions(side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray)
 
 
 def _gauss(
-    subject: Subject, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int
+    pdf: Density, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """int pdf over boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere; least and most pdf."""
     x, w = _NODES[order]
@@ -229,7 +240,7 @@ def _gauss(
     for start in range(0, len(box), chunk):
         part = slice(start, start + chunk)
         wi = _directions(side[part], box[part], s.ravel(), t.ravel())
-        value = subject.pdf(np.repeat(wo[part], order**2, axis=0), wi).reshape(-1, order**2)
+        value = pdf(np.repeat(wo[part], order**2, axis=0), wi).reshape(-1, order**2)
         a, b, c, d = box[part].T
         result[part] = value @ weights * (b - a) * (d - c)
         low[part], high[part] = value.min(1), value.max(1)
@@ -244,16 +255,29 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
     dr = backend.drjit()
     kind = backend.types("float32")
     UInt = kind.module.UInt32
-    n, sides = len(grid.wo), len(grid.sides)
-    total = n << log_samples
     model = subject.bound()
-    index = dr.arange(UInt, total)
+    index = dr.arange(UInt, len(grid.wo) << log_samples)
     which = index >> dr.opaque(UInt, log_samples)
     table = [kind.float(np.ascontiguousarray(c)) for c in grid.wo.T]
     wo = kind.vec3(*[dr.gather(kind.float, c, which) for c in table])
     u = random_numbers(kind, index, seed)
     s = guarded(subject.model, "sample", lambda: model.sample(wo, u))
-    wi, pdf, delta = s[0], s[2], kind.bool(s[3])
+    return _counted(grid, which, s[0], (s[2] > 0.0) & ~kind.bool(s[3]), 1 << log_samples)
+
+
+def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
+    """As `count`, of samples (n, 3) that are there already, for the only wo of a grid; the others failed."""
+    kind = backend.types("float32")
+    wi = backend.vector_of(samples, 3, kind)
+    return _counted(grid, kind.module.UInt32(0), wi, kind.bool(True), drawn)
+
+
+def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> Counts:
+    """How many directions, each for the wo of a number, lie in each cell; those that are not valid lie in none."""
+    dr = backend.drjit()
+    kind = backend.types("float32")
+    UInt = kind.module.UInt32
+    n, sides = len(grid.wo), len(grid.sides)
     reach = dr.abs(wi.x) + dr.abs(wi.y)
     turn = wi.y / dr.select(reach > 0.0, reach, 1.0)
     turn = dr.select(wi.x < 0.0, 2.0 - turn, dr.select(wi.y < 0.0, 4.0 + turn, turn))
@@ -265,20 +289,18 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
     else:
         group = which
         inside = above if grid.sides[0] > 0 else wi.z < 0.0
-    counted = inside & (pdf > 0.0) & ~delta
     row_edges, column_edges = (kind.float(np.ascontiguousarray(e.ravel())) for e in (grid.rows, grid.columns))
-    row = _find(dr, kind, row_edges, group * (ROWS + 1), ROWS, height)
+    row = _find(kind, row_edges, group * (ROWS + 1), ROWS, height)
     line = group * ROWS + row
-    column = _find(dr, kind, column_edges, line * (COLUMNS + 1), COLUMNS, turn)
+    column = _find(kind, column_edges, line * (COLUMNS + 1), COLUMNS, turn)
     counts = dr.zeros(UInt, n * sides * ROWS * COLUMNS)
-    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), line * COLUMNS + column, counted)
+    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), line * COLUMNS + column, inside & valid)
     dr.eval(counts)
     cells = counts.numpy().astype(np.int64).reshape(n, sides, ROWS, COLUMNS)
-    drawn = 1 << log_samples
     return Counts(cells, drawn - cells.sum((1, 2, 3)), drawn)
 
 
-def random_numbers(kind: Any, index: Any, seed: int) -> Any:
+def random_numbers(kind: Types, index: Array, seed: int) -> Array:
     """Three independent numbers in [0, 1) for each index: counters hashed, no state; another seed, another stream."""
     dr = backend.drjit()
     UInt = kind.module.UInt32
@@ -286,8 +308,9 @@ def random_numbers(kind: Any, index: Any, seed: int) -> Any:
     return kind.vec3(*[unit(mix(key, UInt(word))) for word in (0x51633E2D, 0x68BC21EB, 0x02E5BE93)])
 
 
-def _find(dr: Any, kind: Any, edges: Any, start: Any, cells: int, value: Any) -> Any:
+def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> Array:
     """The cell of a value: the last whose lower edge is not above it."""
+    dr = backend.drjit()
     return dr.binary_search(0, cells - 1, lambda i: dr.gather(kind.float, edges, start + i + 1) <= value)
 
 
@@ -302,7 +325,7 @@ def compare(expected: Expectation, counts: Counts, row: int) -> Outcome:
     coarse = (sides, ROWS // COARSE[0], COARSE[0], COLUMNS // COARSE[1], COARSE[1])
     fine = _pearson(e.ravel(), o.ravel(), n)
     broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
-    return Outcome(fine, broad, _others(float(expected.total[row]), float(counts.others[row]), n))
+    return Outcome(fine, broad, _others(float(expected.total[row]), int(counts.others[row]), n))
 
 
 def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
@@ -331,7 +354,7 @@ def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
 QUADRATURE = 3e-5  # what float32 pdfs summed over thousands of cells may be off by
 
 
-def _others(total: float, others: float, drawn: int) -> float:
+def _others(total: float, others: int, drawn: int) -> float:
     """p-value of how many samples lie in no cell, expected 1 - int pdf.
 
     The integral is known to `QUADRATURE` only: the expectation nearest to what was seen within that counts.
@@ -340,6 +363,3 @@ def _others(total: float, others: float, drawn: int) -> float:
     if share <= 0.0:
         return 1.0 if others == 0 else 0.0
     return statistics.binomial_two_sided(others, drawn, min(share, 1.0))
-
-
-Density = Callable[[np.ndarray, np.ndarray], np.ndarray]

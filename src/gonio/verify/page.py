@@ -11,8 +11,8 @@ import json
 from pathlib import Path
 
 from .. import files
-from . import figures
-from .report import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, Report, Verdict
+from .report import Report
+from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, Verdict
 
 CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", NOT_APPLICABLE: "none"}
 
@@ -133,10 +133,9 @@ def _detail(v: Verdict, anchor: str) -> str:
     if v.failed or v.status == DECLARED:
         rows.append(("in a picture", html.escape(v.meaning)))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
-    picture = figures.draw(v.law, v.data)
     drawn = ""
-    if picture is not None:
-        svg, caption = picture
+    if v.evidence is not None:
+        svg, caption = v.evidence.draw()
         source = base64.b64encode(svg.encode()).decode()
         image = f"<img alt='{html.escape(caption)}' src='data:image/svg+xml;base64,{source}'>"
         drawn = f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>"

@@ -2,51 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from ..errors import GonioWarning, InputError, did_you_mean
-from . import laws, report, subject
-from .report import Card, DoesNotApply, Finding, Report, Verdict
+from ..models import BSDF
+from . import directions, statistics, subject
+from .effort import EFFORTS, Effort
+from .laws import Law, chosen
+from .report import SIGNIFICANCE, Report
 from .subject import Fault, Subject
+from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, Finding, Verdict
 from .watch import limited
 
 DEFAULT_SEED = 1
-
-
-@dataclasses.dataclass(frozen=True)
-class Effort:
-    """How much is spent.
-
-    pairs            pairs of directions for the pointwise laws
-    log_samples      binary logarithm of the samples of the chi-square test, for each direction
-    furnace          directions of the furnace's curve
-    furnace_samples  of `sample`, for each of them
-    accuracy         of integrals
-    widths           widths of microfacet distributions that sampling is also tried at
-    """
-
-    name: str
-    pairs: int
-    log_samples: int
-    furnace: int
-    furnace_samples: int
-    accuracy: float
-    widths: tuple[float, ...] = ()
-
-
-EFFORTS = {
-    "quick": Effort("quick", 1 << 13, 18, 12, 1 << 15, 1e-4),
-    "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0)),
-    "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0)),
-}
+CONFIRMATION = 0.001  # of the second seed's test: a real error shows there as well, chance does not
+Target = BSDF | Subject | str
 
 
 def verify(
-    target: Any,
+    target: Target | Sequence[Target],
     *,
     effort: str = "default",
     seed: int = DEFAULT_SEED,
@@ -67,29 +43,29 @@ def verify(
     """
     if effort not in EFFORTS:
         raise InputError(f"unknown effort '{effort}'", "verify: effort", did_you_mean(str(effort), list(EFFORTS)))
-    chosen = _laws(laws)
+    asked = chosen(laws)
     subjects = _subjects(target)
     started = time.perf_counter()
-    steps = len(subjects) * len(chosen)
-    found: list[tuple[Subject, Any, Finding | Verdict, float]] = []
+    steps = len(subjects) * len(asked)
+    found: list[tuple[Subject, Law, Finding | Verdict, float]] = []
     for one in subjects:
-        for law in chosen:
+        for law in asked:
             if progress:
                 progress(len(found), steps, f"{one.title}: {law.name}")
             began = time.perf_counter()
             found.append((one, law, _judge(law, one, EFFORTS[effort], seed), time.perf_counter() - began))
     tests = sum(len(what.trials) for _, _, what, _ in found if isinstance(what, Finding))
-    threshold = report.threshold(tests)
+    threshold = statistics.sidak(SIGNIFICANCE, tests)
     cards: dict[int, Card] = {}
     for one, law, what, seconds in found:
         began = time.perf_counter()
-        verdict = report.decide(law, one, what, threshold, seed) if isinstance(what, Finding) else what
+        verdict = decide(law, one, what, threshold, seed) if isinstance(what, Finding) else what
         verdict.seconds = seconds + time.perf_counter() - began
         cards.setdefault(id(one), Card(one, [])).verdicts.append(verdict)
     return Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
 
 
-def _judge(law: Any, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
+def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
     """A law's finding; what goes wrong inside the BSDF is a failure of the law, and of this law only."""
 
     def verdict(status: str, why: str) -> Verdict:
@@ -101,22 +77,67 @@ def _judge(law: Any, one: Subject, effort: Effort, seed: int) -> Finding | Verdi
             warnings.simplefilter("ignore", GonioWarning)  # variants go to the ends of the ranges on purpose
             return law.judge(one, effort, seed)
     except DoesNotApply as reason:
-        return verdict(report.NOT_APPLICABLE, str(reason))
+        return verdict(NOT_APPLICABLE, str(reason))
     except (Fault, TimeoutError) as fault:
-        return verdict(report.FAIL, str(fault))
+        return verdict(FAIL, str(fault))
 
 
-def _laws(names: Sequence[str] | None) -> list[Any]:
-    known = laws.laws()
-    if names is None:
-        return list(known.values())
-    for name in names:
-        if name not in known:
-            raise InputError(f"unknown law '{name}'", "verify: laws", did_you_mean(name, list(known)))
-    return [law for name, law in known.items() if name in names]
+def decide(law: Law, one: Subject, finding: Finding, threshold: float, seed: int) -> Verdict:
+    """The verdict on a finding, once it is known how many statistical tests the report holds."""
+    why = list(finding.problems)
+    statistical: list[str] = []
+    lowest = min(finding.trials, key=lambda trial: trial.p, default=None)
+    for trial in sorted(finding.trials, key=lambda trial: trial.p):
+        if not trial.p < threshold or len(statistical) >= 3:
+            break  # three confirmed rejections say enough
+        trial.second = trial.again()
+        if trial.second < CONFIRMATION:
+            statistical.append(f"{trial.where}: p = {trial.p:.2g}, and with a second seed {trial.second:.2g}")
+        else:
+            text = f"{trial.where}: p = {trial.p:.2g} was chance: {trial.second:.2g} with a second seed"
+            finding.notes.append(text)
+    over = not finding.figure <= finding.tolerance
+    status = FAIL if why or statistical or over else PASS
+    breach = one.breaches.get(law.name)
+    if breach is not None:
+        size = finding.figure if finding.breach is None else finding.breach
+        if why or statistical:
+            pass
+        elif not over:
+            if breach.certain:
+                status, why = FAIL, ["it is declared to be broken, and is not: " + breach.reason]
+        elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
+            status = DECLARED
+            finding.notes.insert(0, f"declared: {breach.reason} (at most {breach.size:.4g})")
+        else:
+            why.append(f"{size:.4g} is more than the declared {breach.size:.4g}: {breach.reason}")
+    elif over:
+        why.append(f"{finding.shown or f'{finding.figure:.3g}'} where at most {finding.tolerance:.3g} is allowed")
+    why += statistical
+    settings = Subject(one.model, one.target, {**one.settings, **finding.settings})
+    more = ["--at", "/".join(directions.text(w) for w in finding.at)] if finding.at is not None else []
+    if finding.at is None:
+        more = ["--law", law.name, "--seed", str(seed)]
+    return Verdict(
+        number=law.number,
+        law=law.name,
+        title=law.title,
+        status=status,
+        figure=finding.figure,
+        shown=finding.shown or f"{finding.figure:.2e}",
+        tolerance=finding.tolerance,
+        reason=finding.reason,
+        p=lowest.p if lowest else None,
+        worst=finding.worst,
+        command=settings.command(*more),
+        meaning=law.meaning,
+        why=why,
+        notes=finding.notes,
+        evidence=finding.evidence,
+    )
 
 
-def _subjects(target: Any) -> list[Subject]:
+def _subjects(target: Target | Sequence[Target]) -> list[Subject]:
     if isinstance(target, list | tuple):
         return [one for item in target for one in _subjects(item)]
     if isinstance(target, str):

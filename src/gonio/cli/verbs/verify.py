@@ -80,7 +80,7 @@ def verify(
     if as_json:
         print(json.dumps(found.as_dict()))
     else:
-        terminal.show(found, Console(emoji=False))
+        found.show(Console(emoji=False))
         if report is not None:
             print(report / "report.html")
     if not found.passed:

@@ -1,26 +1,22 @@
-"""The laws, one file each. A new one is one new file in this folder: discovery finds it."""
+"""The laws, one file each. A new one is one new file in this folder, an entry point of a package, or a class that is
+registered: `gonio.members`.
+"""
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-from functools import lru_cache
+from collections.abc import Sequence
 
 from .base import Law
 
-__all__ = ["Law", "laws"]
+__all__ = ["Law", "chosen", "laws"]
 
 
-@lru_cache
 def laws() -> dict[str, Law]:
-    """Every law by name, by number."""
-    found: list[Law] = []
-    for module in pkgutil.iter_modules(__path__):
-        members = vars(importlib.import_module(f"{__name__}.{module.name}"))
-        own = [
-            m
-            for m in members.values()
-            if isinstance(m, type) and issubclass(m, Law) and m.__module__.endswith(module.name)
-        ]
-        found += [member() for member in own if member.name]
-    return {law.name: law for law in sorted(found, key=lambda law: law.number)}
+    """Every law by name, in the order of a report."""
+    return {law.name: law for law in sorted(Law.family.all().values(), key=lambda law: (law.number, law.name))}
+
+
+def chosen(names: Sequence[str] | None) -> list[Law]:
+    """The laws of these names in the order of a report, all where None; InputError where one is unknown."""
+    asked = None if names is None else {Law.family.get(name).name for name in names}
+    return [law for name, law in laws().items() if asked is None or name in asked]

@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from ...members import Family, instances_of
 from .. import directions
-from ..report import Finding
+from ..effort import Effort
 from ..subject import Fault, Subject
-
-if TYPE_CHECKING:
-    from ..run import Effort
+from ..verdict import Finding
 
 
 class Law:
     """A law: asked of a subject, it returns a Finding, or raises DoesNotApply.
 
-    number   its place in the report
+    number   its place in the report; Gonio's own are 1 to 10
     name     how it is called on the command line and in `breaks`
     title    the law as a sentence
     meaning  what its violation means for a picture
     """
 
-    number: ClassVar[int] = 0
+    family: ClassVar[Family[Law]]
+    number: ClassVar[int] = 100
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""
     meaning: ClassVar[str] = ""
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no judge")
+
+
+Law.family = Family("law", "gonio.laws", ["gonio.verify.laws"], instances_of(Law), "verify: laws")
 
 
 def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +85,7 @@ def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray
     return moved
 
 
-def relative(a: np.ndarray, b: np.ndarray, noise: Any = 0.0, floor: float = 0.0) -> np.ndarray:
+def relative(a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floor: float = 0.0) -> np.ndarray:
     """(|a - b| - noise) / max(|a|, |b|, floor), never below 0."""
     size = np.maximum(np.maximum(np.abs(a), np.abs(b)), floor)
     return np.maximum(np.abs(a - b) - noise, 0.0) / np.where(size > 0.0, size, 1.0)

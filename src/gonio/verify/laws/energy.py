@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
 from .. import cubature, directions, statistics
-from ..report import Finding, Trial
+from ..effort import Effort
+from ..figures import AlbedoCurves
 from ..subject import Subject
+from ..verdict import Finding, Trial
 from .base import Law
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 GAIN = 1e-3
 GRAZING = (85.0, 88.0, 89.0, 89.5, 89.9)  # degrees; where Fresnel and masking go wrong first
@@ -41,7 +40,7 @@ class Energy(Law):
         )
         value, error = _quadrature(subject, wo, effort, seed)
         mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed)
-        curves: dict[str, Any] = {"wo": wo, "quadrature": value, "error": error, "sampling": mean, "noise": noise}
+        curves = AlbedoCurves(wo, value, error, mean, noise)
         excess = value.max(1) - error.max(1) - 1.0
         row = int(np.argmax(excess))
         finding.figure = float(max(excess[row], 0.0))
@@ -63,15 +62,15 @@ class Energy(Law):
             self._furnace(white, wo, effort, seed, finding, curves)
         if finding.figure > GAIN:
             finding.shown = f"gain {finding.figure:.4f}"
-        finding.data = curves
+        finding.evidence = curves
         return finding
 
     def _furnace(
-        self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: dict[str, Any]
+        self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
     ) -> None:
         """The same with every albedo 1 and F = 1: its loss is what the model forgets."""
         value, error = _quadrature(white, wo, effort, seed)
-        curves["furnace"] = value
+        curves.furnace = value
         gain = float((value - error).max() - 1.0)
         theta = directions.angles(wo)[:, 0]
         if gain > finding.figure:
@@ -88,7 +87,7 @@ class Energy(Law):
         text = f"white furnace loses {average:.4f} on average, {lost[where]:.4f} at {theta[where]:.4g} degrees"
         known = float(error.max())
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
-        curves["loss"] = average
+        curves.loss = average
         claim = getattr(white.model, "lossless", None)
         if claim is not None and lost[where] > claim + float(error.max()):
             finding.problems.append(

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...models import BSDF, Parameter
 from ...models.base import converter
 from ...ops import backend
-from ..report import DoesNotApply, Finding
+from ..effort import Effort
 from ..subject import Subject, guarded
+from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 TOLERANCE = 1e-4
 STEP = 1e-4  # of the parameter's size: with five points the truncation is its fourth power, the rounding 1e-16 / 1e-4

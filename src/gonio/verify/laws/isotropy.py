@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..report import DoesNotApply, Finding
+from ..effort import Effort
 from ..subject import Subject
+from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 EXACT = 1e-6
 SINGLE = 2e-3

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...models import BSDF, models
-from ..report import DoesNotApply, Finding
+from ..effort import Effort
 from ..subject import Subject
+from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 EXACT, SINGLE = 1e-9, 1e-4
 

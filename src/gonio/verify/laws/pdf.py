@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import directions, histogram, statistics
-from ..report import Finding, Trial
+from ..effort import Effort
+from ..figures import SampleCells
 from ..subject import Subject
+from ..verdict import Finding, Trial
 from .base import Law, pair_in_words, pairs
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 ABOVE = (
     (0.0, 0.0),
@@ -38,7 +37,7 @@ class Pdf(Law):
     meaning = "Multiple importance sampling weighs samples wrongly: energy is lost or gained, or noise never ends."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        parts: list[tuple[dict[str, Any], Subject]] = [({}, subject)]
+        parts: list[tuple[dict[str, object], Subject]] = [({}, subject)]
         parts += [({"alpha": width}, subject.replace(alpha=width)) for width in _widths(subject, effort)]
         finding = Finding(
             figure=0.0,
@@ -51,29 +50,24 @@ class Pdf(Law):
             _deltas(part, name, finding, seed)
             if not part.has_density:
                 continue
-            for outcome in _chi_square(part, effort, seed):
-                wo = outcome["wo"]
+            for tested in _chi_square(part, effort, seed):
+                wo, cells = tested.wo, tested.cells
                 place = f"{name + ': ' if name else ''}wo at {_angles(wo)} degrees"
-                for kind in ("fine", "coarse", "others"):
-                    p = getattr(outcome["p"], kind)
+                for kind, p in tested.outcome._asdict().items():
                     finding.trials.append(Trial(p, f"{_KINDS[kind]}, {place}", _Again(part, wo, kind, effort, seed)))
                     if p < lowest:
-                        lowest = p
-                        finding.data = {
-                            key: outcome[key]
-                            for key in ("expected", "observed", "rows", "columns", "drawn", "wo", "sides")
-                        }
+                        lowest, finding.evidence = p, cells
                         finding.settings, finding.worst = settings, place
-                for side, e, o in zip(outcome["sides"], outcome["expected"], outcome["observed"], strict=True):
-                    claimed = float(e.sum()) / outcome["drawn"]
+                for side, e, o in zip(tested.sides, cells.expected, cells.observed, strict=True):
+                    claimed = float(e.sum()) / cells.drawn
                     if claimed > EXCESS and not o.any():
                         word = "above" if side > 0 else "below"
                         text = f"pdf puts {claimed:.2g} of all samples {word} the surface, where none falls, {place}"
                         finding.notes[:] = finding.notes or [text]
-                excess = max(outcome["total"] - 1.0, 0.0)
+                excess = max(tested.total - 1.0, 0.0)
                 if excess > finding.figure:
                     finding.figure = excess
-                    largest = f"int pdf = {outcome['total']:.4g}, {place}"
+                    largest = f"int pdf = {tested.total:.4g}, {place}"
         finding.shown = "deltas only" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
         if finding.figure > EXCESS:
             finding.shown = largest
@@ -91,8 +85,8 @@ class _Again:
         self.subject, self.wo, self.kind, self.effort, self.seed = subject, wo, kind, effort, seed
 
     def __call__(self) -> float:
-        outcomes = _chi_square(self.subject, self.effort, self.seed + 7919, self.wo[None])
-        return min((getattr(outcome["p"], self.kind) for outcome in outcomes), default=1.0)
+        tested = _chi_square(self.subject, self.effort, self.seed + 7919, self.wo[None])
+        return min((getattr(one.outcome, self.kind) for one in tested), default=1.0)
 
 
 def _angles(w: np.ndarray) -> str:
@@ -108,7 +102,17 @@ def _widths(subject: Subject, effort: Effort) -> list[float]:
     return [width for width in effort.widths if parameter.low <= width <= parameter.high]
 
 
-def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[dict[str, Any]]:
+class _Tested(NamedTuple):
+    """The chi-square test of one wo: its p-values, int pdf, and its cells on each side of the surface."""
+
+    wo: np.ndarray
+    outcome: histogram.Outcome
+    total: float
+    cells: SampleCells
+    sides: tuple[int, ...]
+
+
+def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[_Tested]:
     if wo is None:
         grid_of = [*(ABOVE if 1 in subject.sides else ()), *(BELOW if -1 in subject.sides else ())]
         wo = directions.single(np.array([directions.at(*angles) for angles in grid_of]).reshape(-1, 3))
@@ -117,22 +121,15 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
     grid = histogram.place(subject, wo, seed)
     if grid is None:
         return []
-    expected = histogram.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
+    expected = histogram.expect(subject.pdf, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
     counts = histogram.count(subject, grid, effort.log_samples, seed)
-    return [
-        {
-            "wo": wo[i],
-            "p": histogram.compare(expected, counts, i),
-            "total": float(expected.total[i]),
-            "expected": expected.cells[i] * counts.drawn,
-            "observed": counts.cells[i],
-            "rows": grid.rows[i],
-            "columns": grid.columns[i],
-            "drawn": counts.drawn,
-            "sides": grid.sides,
-        }
-        for i in range(len(wo))
-    ]
+    tested = []
+    for i in range(len(wo)):
+        expectation = expected.cells[i] * counts.drawn
+        cells = SampleCells(expectation, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn)
+        outcome = histogram.compare(expected, counts, i)
+        tested.append(_Tested(wo[i], outcome, float(expected.total[i]), cells, grid.sides))
+    return tested
 
 
 def _deltas(subject: Subject, name: str, finding: Finding, seed: int) -> None:
@@ -151,7 +148,7 @@ def _deltas(subject: Subject, name: str, finding: Finding, seed: int) -> None:
         for key in np.unique(keys, axis=0)[:8]:
             mine = np.all(keys == key, axis=1)
             probability = float(s.pdf[chosen][mine].mean())
-            found.append((key, statistics.binomial_two_sided(float(mine.sum()), count, min(probability, 1.0))))
+            found.append((key, statistics.binomial_two_sided(int(mine.sum()), count, min(probability, 1.0))))
         return found
 
     for angles in where:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,10 @@ from ...models import BSDF
 from ...models.base import converter
 from ...ops import backend
 from .. import directions
-from ..report import Finding
+from ..effort import Effort
 from ..subject import Fault, Subject, guarded
+from ..verdict import Finding
 from .base import Law, pair_in_words, pairs
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 THETA = (0.0, 1e-3, 1.0, 30.0, 60.0, 89.0, 89.9, 89.99, 89.9999, 90.0)
 PHI = (0.0, 90.0, 137.0, 180.0)

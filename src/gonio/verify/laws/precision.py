@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..report import DoesNotApply, Finding
+from ..effort import Effort
+from ..figures import RoundingErrors
 from ..subject import Subject
+from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 TOLERANCE = 1e-3
 ALLOWED = 8.0  # roundings of the directions that float32 code may show
@@ -34,7 +31,7 @@ class Precision(Law):
             raise DoesNotApply("all lobes are deltas, which have no value to compare")
         wo, wi = pairs(subject, effort.pairs, seed)
         worst, place, name, plain = -1.0, 0, "", 0.0
-        curve = None
+        curve = np.zeros(len(wo))
         for what in ("eval", "pdf"):
 
             def values(a: np.ndarray, b: np.ndarray, p: str = "float64", what: str = what) -> np.ndarray:
@@ -57,5 +54,5 @@ class Precision(Law):
             shown=f"{worst:.1e}; 99.9 % within {plain:.1e}",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
-            data={"error": curve, "cos_o": np.abs(wo[:, 2]), "cos_i": np.abs(wi[:, 2])},
+            evidence=RoundingErrors(curve, np.abs(wo[:, 2]), np.abs(wi[:, 2])),
         )

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from .. import directions, statistics
-from ..report import DoesNotApply, Finding, Trial
+from ..effort import Effort
+from ..figures import ReciprocityMap
 from ..subject import Subject
+from ..verdict import DoesNotApply, Finding, Trial
 from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 EXACT = 1e-6
 SINGLE = 2e-3
@@ -52,7 +49,7 @@ class Reciprocity(Law):
             reason="float64 rounds at 1e-16; formulas that cancel lose up to ten digits" if exact else single,
             worst=pair_in_words(wo[row], wi[row]),
             at=(wo[row], wi[row]),
-            data={"map": _map(subject, eta, exact), "below": subject.transmits},
+            evidence=ReciprocityMap(_map(subject, eta, exact), subject.transmits),
         )
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:

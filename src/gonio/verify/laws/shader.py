@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from ..report import DoesNotApply, Finding
+from ..effort import Effort
 from ..subject import Subject
+from ..verdict import DoesNotApply, Finding
 from .base import Law
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 
 class Shader(Law):

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from .. import directions, statistics
-from ..report import Finding, Trial
+from ..effort import Effort
 from ..subject import Subject
+from ..verdict import Finding, Trial
 from .base import Law, pair_in_words, relative, rounding, worst_of
-
-if TYPE_CHECKING:
-    from ..run import Effort
 
 EXACT = 1e-10
 SINGLE = 2e-3

@@ -1,0 +1,33 @@
+"""How much a trial spends: directions, samples, accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is spent.
+
+    pairs            pairs of directions for the pointwise laws
+    log_samples      binary logarithm of the samples of the chi-square test, for each direction
+    furnace          directions of the furnace's curve
+    furnace_samples  of `sample`, for each of them
+    accuracy         of integrals
+    widths           widths of microfacet distributions that sampling is also tried at
+    """
+
+    name: str
+    pairs: int
+    log_samples: int
+    furnace: int
+    furnace_samples: int
+    accuracy: float
+    widths: tuple[float, ...] = ()
+
+
+EFFORTS = {
+    "quick": Effort("quick", 1 << 13, 18, 12, 1 << 15, 1e-4),
+    "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0)),
+    "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0)),
+}

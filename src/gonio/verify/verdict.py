@@ -1,0 +1,139 @@
+"""What a law finds on a subject, and the verdicts and cards that are made of it.
+
+A law returns a `Finding`: figures, and the p-values of its statistical tests. Only once it is known how many such tests
+a whole report holds can it be decided what they mean: `gonio.verify.run`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .subject import Subject
+
+PASS, FAIL, DECLARED, NOT_APPLICABLE = "pass", "fail", "breaks as declared", "does not apply"
+
+
+class Evidence(Protocol):
+    """What a law saw, for the report's picture."""
+
+    def draw(self) -> tuple[str, str]:
+        """(SVG, caption)."""
+
+
+@dataclasses.dataclass
+class Trial:
+    """One statistical test: its p-value, what it was about, and how to repeat it with another seed."""
+
+    p: float
+    where: str
+    again: Callable[[], float]
+    second: float | None = None
+
+
+@dataclasses.dataclass
+class Finding:
+    """What a law found.
+
+    figure     the measured size of the violation; compared with `tolerance`
+    tolerance  the largest figure that passes, and `reason`, why that one
+    shown      the figure in words, where a number alone says little
+    worst      where it was found, in words; `at` the pair of directions, for the command that shows it again
+    problems   what fails the law whatever the figure
+    notes      what else is worth knowing
+    breach     the size to hold against a declared breach, where that is not the figure
+    evidence   what the report draws of it
+    """
+
+    figure: float
+    tolerance: float
+    reason: str
+    shown: str = ""
+    worst: str = ""
+    at: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    settings: dict[str, object] = dataclasses.field(default_factory=dict)
+    trials: list[Trial] = dataclasses.field(default_factory=list)
+    problems: list[str] = dataclasses.field(default_factory=list)
+    notes: list[str] = dataclasses.field(default_factory=list)
+    breach: float | None = None
+    evidence: Evidence | None = None
+
+
+class DoesNotApply(Exception):
+    """Raised by a law that cannot be asked of a subject; the text says why."""
+
+
+@dataclasses.dataclass
+class Verdict:
+    """A law's word on one subject."""
+
+    number: int
+    law: str
+    title: str
+    status: str
+    figure: float | None = None
+    shown: str = ""
+    tolerance: float | None = None
+    reason: str = ""
+    p: float | None = None
+    worst: str = ""
+    command: str = ""
+    meaning: str = ""
+    why: list[str] = dataclasses.field(default_factory=list)
+    notes: list[str] = dataclasses.field(default_factory=list)
+    seconds: float = 0.0
+    evidence: Evidence | None = dataclasses.field(default=None, repr=False)
+
+    @property
+    def failed(self) -> bool:
+        return self.status == FAIL
+
+    def as_dict(self) -> dict[str, object]:
+        """All but the evidence; numbers that JSON does not know become null."""
+        names = [field.name for field in dataclasses.fields(self) if field.name != "evidence"]
+        return {name: _plain(getattr(self, name)) for name in names}
+
+
+@dataclasses.dataclass
+class Card:
+    """All verdicts on one subject."""
+
+    subject: Subject
+    verdicts: list[Verdict]
+
+    @property
+    def title(self) -> str:
+        return self.subject.title
+
+    @property
+    def passed(self) -> bool:
+        return not any(verdict.failed for verdict in self.verdicts)
+
+    def __getitem__(self, law: str) -> Verdict:
+        for verdict in self.verdicts:
+            if verdict.law == law:
+                return verdict
+        raise KeyError(law)
+
+    def as_dict(self) -> dict[str, object]:
+        settings = {name: str(value) for name, value in self.subject.settings.items()}
+        return {
+            "title": self.title,
+            "target": self.subject.target,
+            "settings": settings,
+            "passed": self.passed,
+            "verdicts": [verdict.as_dict() for verdict in self.verdicts],
+        }
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return value
