@@ -398,7 +398,7 @@ def test_compare_judges_by_the_tolerance(capsys: pytest.CaptureFixture[str]) -> 
     assert result["rmse"] == pytest.approx(0.05) and result["mean_ratio"] == pytest.approx(1.1)
     assert gonio("compare", "a.exr", "b.exr", "--metric", "rmse", "--tolerance", "0.06") == 0
     assert gonio("compare", "a.exr", "b.exr", "--metric", "rmse", "--tolerance", "0.04", "-o", "map.png") == 1
-    assert "fails: rmse 0.05 > 0.04" in capsys.readouterr().out
+    assert "fails       rmse 0.05 > 0.04" in capsys.readouterr().out
     assert Path("map.png").is_file()
 
 

@@ -9,6 +9,7 @@ import pytest
 from gonio.errors import InputError
 from gonio.viewer import contact_sheet, figures
 from gonio.viewer.contact_sheet import Variation
+from gonio.viewer.figures import Drawing
 
 
 @pytest.mark.parametrize(
@@ -58,6 +59,12 @@ def _colours(count: int) -> list[np.ndarray]:
     return [np.full((90, 200, 3), (10 + 20 * i, 200, 60), np.uint8) for i in range(count)]
 
 
+def _saved(drawing: Drawing, path: Path) -> Path:
+    saved = drawing.save(path).path
+    assert saved is not None
+    return saved
+
+
 def _places(sheet: Path, count: int) -> list[tuple[int, int, int]]:
     """Of each picture: its upper left corner in the sheet, and its number of pixels."""
     from PIL import Image
@@ -73,7 +80,7 @@ def _places(sheet: Path, count: int) -> list[tuple[int, int, int]]:
 
 def test_the_first_of_two_goes_down_and_the_second_across(tmp_path: Path) -> None:
     variations = [Variation("kd", (1, 2)), Variation("p", (4, 16, 64))]
-    sheet = contact_sheet.draw(_colours(6), variations, "title", "about", tmp_path / "a.png")
+    sheet = _saved(contact_sheet.draw(_colours(6), variations, "title", "about"), tmp_path / "a.png")
     places = _places(sheet, 6)
     tops, lefts = [place[0] for place in places], [place[1] for place in places]
     assert tops[0] == tops[1] == tops[2] < tops[3] == tops[4] == tops[5]
@@ -84,7 +91,7 @@ def test_the_first_of_two_goes_down_and_the_second_across(tmp_path: Path) -> Non
 
 def test_no_two_pictures_overlap_in_a_sheet_of_three_parameters(tmp_path: Path) -> None:
     variations = [Variation("a", (1, 2)), Variation("b", (1, 2)), Variation("c", (1, 2, 3))]
-    places = _places(contact_sheet.draw(_colours(12), variations, "t", "s", tmp_path / "a.png"), 12)
+    places = _places(_saved(contact_sheet.draw(_colours(12), variations, "t", "s"), tmp_path / "a.png"), 12)
     assert len({place[:2] for place in places}) == 12
     assert all(size > 0.95 * 90 * 200 for *_, size in places)
     first, second = max(place[0] for place in places[:6]), min(place[0] for place in places[6:])
@@ -102,14 +109,14 @@ def test_wide_pictures_are_stacked() -> None:
 
 @pytest.mark.parametrize("suffix", [".pdf", ".svg"])
 def test_sheets_can_be_vector_files(tmp_path: Path, suffix: str) -> None:
-    path = contact_sheet.draw(_colours(2), [Variation("kd", (1, 2))], "title", "about", tmp_path / f"a{suffix}")
+    path = _saved(contact_sheet.draw(_colours(2), [Variation("kd", (1, 2))], "title", "about"), tmp_path / f"a{suffix}")
     assert path.read_bytes()[:5] in (b"%PDF-", b"<?xml")
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_same_names_are_told_apart(tmp_path: Path) -> None:
     variations = [Variation("shapes.0.material.p", (1,)), Variation("shapes.1.material.p", (1,))]
-    path = contact_sheet.draw(_colours(1), variations, "t", "s", tmp_path / "a.svg")
+    path = _saved(contact_sheet.draw(_colours(1), variations, "t", "s"), tmp_path / "a.svg")
     assert "shapes.1.material.p" in path.read_text()
 
 
@@ -118,6 +125,6 @@ def test_too_many_pictures_are_refused_before_the_first(tmp_path: Path) -> None:
 
     variations = [Variation("a", tuple(range(20))), Variation("b", tuple(range(20)))]
     with pytest.raises(InputError, match="400 pictures"):
-        contact_sheet.study(run.Request(Path("nowhere")), variations, tmp_path / "a.png")
+        contact_sheet.render_sheet(run.Request(Path("nowhere")), variations, tmp_path / "a.png")
     with pytest.raises(InputError, match="varied twice"):
-        contact_sheet.study(run.Request(Path("nowhere")), [Variation("a", (1,))] * 2, tmp_path / "a.png")
+        contact_sheet.render_sheet(run.Request(Path("nowhere")), [Variation("a", (1,))] * 2, tmp_path / "a.png")

@@ -31,7 +31,8 @@ def test_the_mean_of_the_map_is_the_metric(pictures: tuple[Picture, Picture]) ->
 def test_the_map_is_bright_where_the_error_is(pictures: tuple[Picture, Picture], tmp_path: Path, metric: str) -> None:
     from PIL import Image
 
-    path = error_map.write(tmp_path / "map.png", *pictures, metric)
+    path = error_map.draw(*pictures, metric).save(tmp_path / "map.png").path
+    assert path is not None
     pixels = np.array(Image.open(path).convert("L")).astype(float)
     drawn = pixels[58:-62, 16:-16]
     rows, columns = drawn.shape[0] / 20, drawn.shape[1] / 30
@@ -41,4 +42,5 @@ def test_the_map_is_bright_where_the_error_is(pictures: tuple[Picture, Picture],
 
 
 def test_equal_pictures_have_a_map_too(tmp_path: Path, pictures: tuple[Picture, Picture]) -> None:
-    assert error_map.write(tmp_path / "map.png", pictures[1], pictures[1], "relmse").is_file()
+    error_map.draw(pictures[1], pictures[1], "relmse").save(tmp_path / "map.png")
+    assert (tmp_path / "map.png").is_file()

@@ -8,8 +8,8 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.models import models
-from gonio.viewer import plots
+from gonio.models import models, notation
+from gonio.viewer import curves, lobes, plots
 
 METAL = '{"type": "conductor", "preset": "Au", "alpha": 0.3}'
 
@@ -26,13 +26,14 @@ def _needed(name: str) -> tuple[list[str], str]:
 @pytest.mark.parametrize("name", list(models()))
 def test_every_material_can_be_plotted(name: str, kind: str, tmp_path: Path) -> None:
     assignments, preset = _needed(name)
-    path = plots.plot(name, assignments, preset, kind, "" if kind == "albedo" else "45", tmp_path / "a.svg")
-    assert path.stat().st_size > 1000
+    material = notation.named(name, assignments, preset)[0]
+    path = plots.plot(material, kind=kind, angles=[45], output=tmp_path / "a.svg").path
+    assert path is not None and path.stat().st_size > 1000
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_curve_is_the_materials_eval_in_the_plane_of_incidence() -> None:
-    one = plots.curve(go.Lambert(albedo=0.5), view=30)
+    one = curves.curve(go.Lambert(albedo=0.5), view=30)
     assert one.angles[0] == -90 and one.angles[-1] == 90
     assert one.mean == pytest.approx(0.5 / np.pi * np.cos(np.radians(one.angles)), abs=1e-6)
     assert one.pdf == pytest.approx(np.cos(np.radians(one.angles)) / np.pi, abs=1e-6)
@@ -40,13 +41,13 @@ def test_a_curve_is_the_materials_eval_in_the_plane_of_incidence() -> None:
 
 
 def test_a_highlight_stands_on_the_mirrors_side() -> None:
-    one = plots.curve(go.Conductor.preset("Au", alpha=0.05), view=40)
+    one = curves.curve(go.Conductor.preset("Au", alpha=0.05), view=40)
     assert one.angles[one.mean.argmax()] == pytest.approx(40, abs=0.5)
     assert not one.grey
 
 
 def test_smooth_glass_splits_its_power_in_two_delta_lobes() -> None:
-    one = plots.curve(go.Dielectric(eta=1.5, alpha=0.0), view=30)
+    one = curves.curve(go.Dielectric(eta=1.5, alpha=0.0), view=30)
     (first, reflected), (second, transmitted) = sorted(one.deltas)
     assert first == pytest.approx(30, abs=0.02)
     assert second == pytest.approx(180 - np.degrees(np.arcsin(0.5 / 1.5)), abs=0.02)
@@ -56,37 +57,68 @@ def test_smooth_glass_splits_its_power_in_two_delta_lobes() -> None:
 
 def test_albedo_has_its_closed_forms() -> None:
     views = np.array([0.0, 45.0, 80.0])
-    assert plots.albedo(go.Lambert(albedo=0.3), views) == pytest.approx(0.3, abs=1e-4)
-    assert plots.albedo(go.Mirror(), views) == pytest.approx(1, abs=1e-6)
-    assert plots.albedo(go.Dielectric(eta=1.5, alpha=0.0), views) == pytest.approx(1, abs=1e-5)
+    assert curves.albedo(go.Lambert(albedo=0.3), views) == pytest.approx(0.3, abs=1e-4)
+    assert curves.albedo(go.Mirror(), views) == pytest.approx(1, abs=1e-6)
+    assert curves.albedo(go.Dielectric(eta=1.5, alpha=0.0), views) == pytest.approx(1, abs=1e-5)
 
 
 def test_rings_are_round_numbers_below_the_peak() -> None:
     for peak in (0.0123, 0.97, 1.0, 3.3, 42, 1e5):
-        ticks = plots._round_ticks(peak)
+        ticks = lobes._round_ticks(peak)
         assert 1 <= len(ticks) <= 5 and ticks[-1] <= peak and len(f"{ticks[0]:g}") <= 6
-    assert plots._round_ticks(0) == []
+    assert lobes._round_ticks(0) == []
+
+
+@pytest.mark.parametrize("kind", plots.KINDS)
+def test_materials_are_laid_over_each_other(kind: str, tmp_path: Path) -> None:
+    gold = go.Conductor.preset("Au", alpha=0.3)
+    drawing = plots.plot(gold, "dielectric(alpha=.2)", "dielectric(alpha=0)", kind=kind, angles=[0, 60])
+    assert drawing.path is None and list(tmp_path.iterdir()) == []
+    figure = drawing.figure
+    legend = figure.legends[0] if figure.legends else figure.axes[0].get_legend()
+    shown = [text.get_text() for text in legend.get_texts()]
+    assert shown[1:3] == ["dielectric(alpha=.2)", "dielectric(alpha=0)"] and shown[0].startswith("conductor(")
+    assert len(figure.axes) == (1 if kind == "albedo" else 2)
+    limits = {(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes}
+    assert len(limits) == 1  # the same axes
+    assert drawing._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_drawing_leaves_the_notebooks_windows_alone() -> None:
+    import matplotlib
+
+    before = matplotlib.get_backend(auto_select=False)
+    plots.plot("lambert")
+    assert matplotlib.get_backend(auto_select=False) == before
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message", "hint"),
+    ("materials", "options", "message", "hint"),
     [
-        (("lamberd", []), "unknown material", "did you mean 'lambert'?"),
-        (("lambert", ["albdo=1"]), "no parameter 'albdo'", "did you mean 'albedo'?"),
-        (("lambert", ["albedo"]), "NAME=VALUE expected", "alpha=0.3"),
-        (("lambert", [], "Au"), "no presets", "--param"),
-        (("mix", ["a=3", "b=lambert"]), "is no material", "such as lambert"),
-        (("lambert", [], "", "lob"), "unknown kind", "did you mean 'lobe'?"),
-        (("lambert", [], "", "lobe", "10,90"), "'90' is no angle", "below 90"),
-        (("lambert", [], "", "lobe", "x"), "'x' is no angle", "below 90"),
-        (("lambert", ["albedo=-1"]), "-1", ""),
+        (["lamberd"], {}, "unknown material", "did you mean 'lambert'?"),
+        (["lambert(albdo=1)"], {}, "no parameter 'albdo'", "did you mean 'albedo'?"),
+        (["lambert(preset=Au)"], {}, "no presets", "--param"),
+        (["mix(a=3,b=lambert)"], {}, "is no material", "such as lambert"),
+        (["lambert"], {"kind": "lob"}, "unknown kind", "did you mean 'lobe'?"),
+        (["lambert"], {"angles": [10, 90]}, "'90' is no angle", "below 90"),
+        (["lambert"], {"angles": ["x"]}, "'x' is no angle", "below 90"),
+        (["lambert"], {"angles": []}, "0 angles", "such as"),
+        (["lambert"], {"output": "a.gif"}, "figure format", ".png"),
+        (["lambert(albedo=-1)"], {}, "-1", ""),
+        (["lambert"] * 8, {}, "8 materials", "several plots"),
+        ([], {}, "0 materials", ""),
     ],
 )
 def test_what_cannot_be_plotted_is_one_clear_error(
-    arguments: tuple[object, ...], message: str, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    materials: list[str],
+    options: dict[str, object],
+    message: str,
+    hint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=message) as caught:
-        plots.plot(*arguments)  # type: ignore[arg-type]
+        plots.plot(*materials, **options)  # type: ignore[arg-type]
     assert hint in caught.value.hint
     assert list(tmp_path.iterdir()) == []

@@ -37,11 +37,22 @@ class Material:
         Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets),
     ] = ""
 
+    def text(self, model: str) -> str:
+        """The material as one text, such as "conductor(preset=Au,alpha=.3)"."""
+        from ..models import notation
+
+        settings = [f"preset={self.preset}"] if self.preset else []
+        settings += ["=".join(notation.assignment(text)) for text in self.param or ()]
+        if not settings:
+            return model
+        before, inside = (model[:-1], not model.endswith("()")) if model.endswith(")") else (f"{model}(", False)
+        return f"{before}{',' if inside else ''}{','.join(settings)})"
+
     def of(self, model: str) -> BSDF:
         """The material. Raises InputError for what is unknown or out of range."""
         from ..models import notation
 
-        return notation.named(model, self.param or [], self.preset)[0]
+        return notation.named(self.text(model))[0]
 
 
 @dataclass(frozen=True)

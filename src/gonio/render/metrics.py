@@ -8,6 +8,7 @@ exposures at which the reference can be shown.
 
 from __future__ import annotations
 
+import html
 import math
 from dataclasses import asdict, dataclass
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 Floats = NDArray[np.floating]
 
@@ -27,6 +28,27 @@ PIXELS_PER_DEGREE = 0.7 * (3840 / 0.7) * math.pi / 180
 RELATIVE_FLOOR = 0.01
 
 
+METRICS: dict[str, str] = {
+    "rmse": "root of the mean squared difference, in the picture's own unit",
+    "relmse": "mean of (x - r)^2 / (r^2 + 0.01)",
+    "flip": "mean FLIP, 0 (same) to 1: what a person sees who flips between the two",
+}
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """What a comparison is judged by: the metric, and the most that passes; None passes all."""
+
+    metric: str = "relmse"
+    most: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.metric not in METRICS:
+            raise InputError(f"unknown metric '{self.metric}'", "--metric", did_you_mean(self.metric, tuple(METRICS)))
+        if self.most is not None and not self.most >= 0:
+            raise InputError(f"a tolerance of {self.most:g}", "--tolerance", "give 0 or more")
+
+
 @dataclass(frozen=True)
 class Comparison:
     """What `gonio compare` reports; `exposures` are the stops that HDR-FLIP spans, None for LDR."""
@@ -35,20 +57,38 @@ class Comparison:
     relmse: float
     mean_ratio: float
     flip: float
-    exposures: tuple[float, float] | None = None
+    exposures: tuple[float, float] | None
+    tolerance: Tolerance
 
     def value(self, metric: str) -> float:
-        return getattr(self, metric)
+        return {"rmse": self.rmse, "relmse": self.relmse, "flip": self.flip}[metric]
+
+    @property
+    def passed(self) -> bool:
+        return self.tolerance.most is None or self.value(self.tolerance.metric) <= self.tolerance.most
 
     def as_dict(self) -> dict[str, object]:
-        return asdict(self)
+        judged = {"metric": self.tolerance.metric, "tolerance": self.tolerance.most, "passed": self.passed}
+        return {**asdict(self), **judged}
 
+    def rows(self) -> dict[str, str]:
+        """The figures in words, by name."""
+        kind = "LDR" if self.exposures is None else "HDR, {:+.1f} to {:+.1f} EV".format(*self.exposures)
+        rows = {
+            "RMSE": f"{self.rmse:.6g}",
+            "relMSE": f"{self.relmse:.6g}",
+            "mean ratio": f"{self.mean_ratio:.6f}",
+            "FLIP": f"{self.flip:.6f}  ({kind})",
+        }
+        metric, most = self.tolerance.metric, self.tolerance.most
+        if most is not None:
+            relation = "<=" if self.passed else ">"
+            rows["passes" if self.passed else "fails"] = f"{metric} {self.value(metric):.6g} {relation} {most:g}"
+        return rows
 
-METRICS: dict[str, str] = {
-    "rmse": "root of the mean squared difference, in the picture's own unit",
-    "relmse": "mean of (x - r)^2 / (r^2 + 0.01)",
-    "flip": "mean FLIP, 0 (same) to 1: what a person sees who flips between the two",
-}
+    def _repr_html_(self) -> str:
+        rows = (f"<tr><th>{name}</th><td>{html.escape(text)}</td></tr>" for name, text in self.rows().items())
+        return f"<table>{''.join(rows)}</table>"
 
 
 def _pair(test: Floats, reference: Floats) -> tuple[Floats, Floats]:
@@ -91,7 +131,9 @@ def mean_ratio(test: Floats, reference: Floats) -> float:
     return float(a.mean() / b.mean()) if b.mean() != 0 else (1.0 if a.mean() == 0 else math.nan)
 
 
-def compare(test: Floats, reference: Floats, hdr: bool = True) -> Comparison:
+def compare(
+    test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()
+) -> Comparison:
     """All measures at once; `hdr` False takes both pictures as shown on a screen, in [0, 1]."""
     exposures = exposure_range(reference) if hdr else None
     return Comparison(
@@ -100,6 +142,7 @@ def compare(test: Floats, reference: Floats, hdr: bool = True) -> Comparison:
         mean_ratio(test, reference),
         float(flip_map(test, reference, hdr).mean()),
         exposures,
+        tolerance,
     )
 
 

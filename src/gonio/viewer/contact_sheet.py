@@ -9,18 +9,24 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..models import notation
 from ..render import exposures, images, passes, run
 from . import figures
+from .figures import Drawing
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Pixels = NDArray[np.uint8]  # (H, W, 3)
 MOST_CELLS = 256  # a sheet of more is no longer looked at, and is a typing error more often than not
 WIDEST = 3200  # pixels; larger sheets are drawn at less than one picture pixel per sheet pixel
 GAP, MARGIN = 8, 20
@@ -32,7 +38,7 @@ class Variation:
     """One --vary: a path into the scene, or a $parameter of a Mitsuba XML, and its values."""
 
     path: str
-    values: tuple[Any, ...]
+    values: tuple[object, ...]
 
     @property
     def name(self) -> str:
@@ -52,18 +58,31 @@ class _FullyNamed(Variation):
 
 @dataclass(frozen=True)
 class Sheet:
-    """What came of a study; `cells` are the values of each picture, in the order of `itertools.product`."""
+    """What came of a study; `cells` are the values of each picture, in the order of `itertools.product`.
 
-    output: Path
-    cells: tuple[dict[str, Any], ...]
+    size      of each picture, pixels
+    exposure  of all of them, stops
+    output    where the sheet has been written, None where it has not
+    """
+
+    cells: tuple[dict[str, object], ...]
     spp: int
     size: tuple[int, int]
-    seconds: float
     exposure: float
-    warnings: tuple[str, ...] = ()
+    seconds: float
+    warnings: tuple[str, ...]
+    drawing: Drawing
 
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self) | {"output": str(self.output)}
+    @property
+    def output(self) -> Path | None:
+        return self.drawing.path
+
+    def as_dict(self) -> dict[str, object]:
+        kept = {name: value for name, value in vars(self).items() if name != "drawing"}
+        return {"output": str(self.output), **kept}
+
+    def _repr_png_(self) -> bytes:
+        return self.drawing._repr_png_()
 
 
 def parse_variation(text: str) -> Variation:
@@ -73,24 +92,77 @@ def parse_variation(text: str) -> Variation:
 
 
 def study(
+    scene: str | Path,
+    vary: Mapping[str, Sequence[object]],
+    *,
+    output: str | Path | None = None,
+    spp: int | None = None,
+    size: tuple[int, int] | None = None,
+    integrator: str | None = None,
+    max_depth: int | None = None,
+    sampler: str | None = None,
+    seed: int | None = None,
+    device: str = "cpu",
+    threads: int | None = None,
+    denoise: bool = False,
+    exposure: exposures.Exposure = 0.0,
+    allow_outside: bool = False,
+    title: str = "",
+) -> Sheet:
+    """Render a scene with every combination of values, and lay the pictures on one labelled sheet.
+
+        go.study("examples/phong", {"shapes.1.material.p": [4, 16, 64]}, output="p.png")
+
+    vary      values by their path in the scene, or by the parameter's name of a Mitsuba XML. One gives a row, two a
+              grid (the first goes down, the second across), more a grid each
+    output    file to write, .png, .pdf or .svg; None writes nothing
+    exposure  stops, the same for all pictures, or "auto"
+    title     heading of the sheet; the scene's name if not given
+    Other options as in `go.render`. Returns a Sheet, which a notebook shows. Raises InputError, MachineError.
+    """
+    request = run.Request(
+        Path(scene),
+        spp=spp,
+        size=size,
+        integrator=integrator,
+        max_depth=max_depth,
+        sampler=sampler,
+        seed=seed,
+        device=device,
+        threads=threads,
+        denoise=denoise,
+        exposure=exposure,
+        allow_outside=allow_outside,
+    )
+    variations = [Variation(path, tuple(values)) for path, values in vary.items()]
+    return render_sheet(request, variations, None if output is None else Path(output), title)
+
+
+def render_sheet(
     request: run.Request,
-    variations: list[Variation],
-    output: Path,
+    variations: Sequence[Variation],
+    output: Path | None,
     title: str = "",
     report: Callable[[int, int, str], None] = lambda done, total, state: None,
 ) -> Sheet:
-    """Render every combination and write the sheet; raises InputError before rendering where it can."""
+    """Render every combination and draw the sheet; raises InputError before rendering where it can.
+
+    report  called before each picture with pictures done, all pictures, and what is next
+    """
     started = time.perf_counter()
-    figures.check_output(output)
+    if output is not None:
+        figures.check_output(output)
     names = [variation.path for variation in variations]
     if len(set(names)) < len(names):
         raise InputError("the same path is varied twice", "--vary", "give all its values in one --vary")
+    if not variations or not all(variation.values for variation in variations):
+        raise InputError("nothing is varied", "--vary", "such as shapes.1.material.p=4,16,64")
     combinations = list(itertools.product(*(variation.values for variation in variations)))
     if len(combinations) > MOST_CELLS:
         what = f"{len(combinations)} pictures are more than a sheet holds ({MOST_CELLS})"
         raise InputError(what, "--vary", "give fewer values")
     cells = tuple(dict(zip(names, combination, strict=True)) for combination in combinations)
-    pictures: list[np.ndarray] = []
+    pictures: list[exposures.RGB] = []
     warnings: dict[str, None] = {}
     with passes.Interrupts() as interrupts:
         for index, cell in enumerate(cells):
@@ -107,11 +179,12 @@ def study(
     exposure = exposures.stops(request.exposure, *pictures)
     warnings |= dict.fromkeys(filter(None, [exposures.clipping(exposure, *pictures)]))
     heading = title or _scene_name(request.scene)
-    settings = prepared.settings
-    subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {settings['integrator']}"  # noqa: RUF001
-    draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle, output)
+    subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {prepared.settings['integrator']}"  # noqa: RUF001
+    drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
+    if output is not None:
+        drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
-    return Sheet(output, cells, prepared.spp, prepared.size, seconds, exposure, tuple(warnings))
+    return Sheet(cells, prepared.spp, prepared.size, exposure, seconds, tuple(warnings), drawing)
 
 
 def _scene_name(scene: Path) -> str:
@@ -129,25 +202,24 @@ class _Block:
     heading: str
     rows: list[str]
     columns: list[str]
-    pictures: list[list[np.ndarray]]
+    pictures: list[Sequence[Pixels]]
     row_name: str = ""
     column_name: str = ""
 
 
-def draw(pictures: list[np.ndarray], variations: list[Variation], title: str, subtitle: str, output: Path) -> Path:
-    """Lay out 8-bit pictures (in the order of `itertools.product`) with labels, and write the sheet.
+def draw(pictures: Sequence[Pixels], variations: Sequence[Variation], title: str, subtitle: str) -> Drawing:
+    """Lay out 8-bit pictures (in the order of `itertools.product`) with labels.
 
     One variation: a row, wrapped where it gets long. Two: the first goes down, the second across. More: a grid
     of the last two for every combination of the others.
     """
     import matplotlib
 
-    matplotlib.use("Agg")
     with matplotlib.rc_context(figures.STYLE):
-        return _draw(_blocks(pictures, variations), title, subtitle, output)
+        return Drawing(_draw(_blocks(pictures, variations), title, subtitle), f"{title}: {subtitle}", _DPI)
 
 
-def _blocks(pictures: list[np.ndarray], variations: list[Variation]) -> list[_Block]:
+def _blocks(pictures: Sequence[Pixels], variations: Sequence[Variation]) -> list[_Block]:
     names = [variation.name for variation in variations]
     if len(set(names)) < len(names):  # p of one shape and p of another
         variations = [_FullyNamed(variation.path, variation.values) for variation in variations]
@@ -186,7 +258,7 @@ def _columns_of_a_row(count: int, aspect: float) -> int:
     return min(range(1, count + 1), key=badness)
 
 
-def _draw(blocks: list[_Block], title: str, subtitle: str, output: Path) -> Path:
+def _draw(blocks: Sequence[_Block], title: str, subtitle: str) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.text import Text
@@ -260,4 +332,4 @@ def _draw(blocks: list[_Block], title: str, subtitle: str, output: Path) -> Path
                 axes.set_axis_off()
             y += cell_height + GAP
         y = bottom + between
-    return figures.save(figure, output, _DPI, f"{title}: {subtitle}")
+    return figure

@@ -25,7 +25,7 @@ class _Panel(NamedTuple):
     curve: str = ""  # the axis that it runs along
 
 
-def plot_tables(folder: str | Path, output: Path | None = None) -> Path:
+def draw_tables(folder: str | Path) -> figures.Drawing:
     """Draw a baked folder: every table over n.v and roughness, low roughness at the bottom as in the homework.
 
     Slices of a third axis stand side by side; E_avg, and what depends on the cosine alone, is a curve.
@@ -34,7 +34,6 @@ def plot_tables(folder: str | Path, output: Path | None = None) -> Path:
     from matplotlib.figure import Figure
 
     baked = load(folder)
-    path = figures.check_output(output or Path(f"{Path(folder).resolve().stem}-tables.png"))
     rows = [row for name in baked.manifest["dims"] for row in _rows(baked, name)]
     curves = [panel for row in rows for panel in row if panel.curve]
     rows = [row for row in rows if not row[0].curve] or [[]]
@@ -52,7 +51,7 @@ def plot_tables(folder: str | Path, output: Path | None = None) -> Path:
         if any(not panel.curve for row in rows for panel in row):
             scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, 1), "gray")
             figure.colorbar(scale, ax=grid, shrink=0.8 / len(rows), pad=0.01)
-        return figures.save(figure, path, 150, f"gonio plot {folder}")
+    return figures.Drawing(figure, f"gonio plot {folder}")
 
 
 def _title(manifest: dict[str, Any]) -> str:

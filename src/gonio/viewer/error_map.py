@@ -1,11 +1,13 @@
-"""`gonio compare -o`: the error of each pixel as a colour, beside a bar that names its range."""
+"""`gonio compare` and `go.compare`: how far one picture is from another, and where, as a map beside a bar."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from ..errors import InputError
 from ..render import images, metrics
 from . import figures
 
@@ -17,7 +19,45 @@ _TITLES = {
 }
 
 
-def error_of(test: images.Picture, reference: images.Picture, metric: str) -> np.ndarray:
+def compare(
+    test: str | Path | ArrayLike,
+    reference: str | Path | ArrayLike,
+    *,
+    metric: str = "relmse",
+    tolerance: float | None = None,
+    output: str | Path | None = None,
+) -> metrics.Comparison:
+    """Say how far a picture is from another.
+
+        go.compare("mine.exr", "reference.exr", metric="flip", tolerance=0.05).passed
+
+    test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top
+    metric           what `tolerance` and the map are for: "rmse", "relmse" or "flip"
+    tolerance        the most that passes
+    output           file of a map of the error, .png, .pdf or .svg; None writes nothing
+    Returns a Comparison with all metrics and whether it passed. FLIP is that of high dynamic range, unless a picture
+    is a .png. Raises InputError for pictures that cannot be read or differ in size.
+    """
+    judged = metrics.Tolerance(metric, tolerance)
+    if output is not None:
+        figures.check_output(Path(output))
+    a, b = _picture(test, "test"), _picture(reference, "reference")
+    try:
+        found = metrics.compare(a.pixels, b.pixels, a.hdr and b.hdr, judged)
+    except InputError as error:
+        raise InputError(error.what, f"{a.path}, {b.path}", error.hint) from error
+    if output is not None:
+        draw(a, b, metric).save(output)
+    return found
+
+
+def _picture(given: str | Path | ArrayLike, name: str) -> images.Picture:
+    if isinstance(given, str | Path):
+        return images.read(given)
+    return images.Picture(np.asarray(given, np.float32), Path(name))
+
+
+def error_of(test: images.Picture, reference: images.Picture, metric: str) -> NDArray[np.floating]:
     """The (H, W) map whose mean (rmse: root of the mean of squares) is the metric."""
     if metric == "flip":
         return metrics.flip_map(test.pixels, reference.pixels, test.hdr and reference.hdr)
@@ -27,12 +67,10 @@ def error_of(test: images.Picture, reference: images.Picture, metric: str) -> np
     return np.sqrt((difference**2).mean(axis=2))
 
 
-def write(path: Path, test: images.Picture, reference: images.Picture, metric: str) -> Path:
+def draw(test: images.Picture, reference: images.Picture, metric: str) -> figures.Drawing:
     """Draw the map. The range is 0 to 1 for FLIP, else 0 to the 99.5th percentile, so that a few fireflies do
     not turn the rest black; the bar shows by its arrow that there is more above."""
     import matplotlib
-
-    matplotlib.use("Agg")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -63,4 +101,4 @@ def write(path: Path, test: images.Picture, reference: images.Picture, metric: s
         figure.text(x, 1 - 26 / total_height, names, fontsize=12, fontweight="bold", va="baseline")
         about = f"{_TITLES[metric]}; mean {error.mean():.4g}, largest {error.max():.4g}"
         figure.text(x, 1 - 45 / total_height, about, fontsize=9, color=figures.SOFT, va="baseline")
-        return figures.save(figure, path, _DPI, about)
+    return figures.Drawing(figure, about, _DPI)

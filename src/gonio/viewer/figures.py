@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .. import files
 from ..errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".pdf", ".svg")
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
 CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of even weight on white
+PALETTE = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc79a7",
+    "#a6761d",
+    "#56b4e9",
+    "#1d2530",
+)  # for the colour-blind too
+DASHES = (0, (4, 2))
 STYLE: Any = {  # Matplotlib types its keys one by one
     "font.family": "sans-serif",
     "font.size": 10,
@@ -33,6 +48,31 @@ STYLE: Any = {  # Matplotlib types its keys one by one
 }
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of ours: a notebook shows it, `save` writes it.
+
+    path  where it has been written, None where it has not
+    """
+
+    figure: Figure
+    about: str
+    dpi: float = 150
+    path: Path | None = None
+
+    def save(self, path: str | Path) -> Drawing:
+        """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
+        return replace(self, path=save(self.figure, check_output(Path(path)), self.dpi, self.about))
+
+    def _repr_png_(self) -> bytes:
+        return self._as("png")
+
+    def _as(self, kind: str) -> bytes:
+        stream = io.BytesIO()
+        _fill(self.figure, stream, kind, self.dpi, self.about)
+        return stream.getvalue()
+
+
 def check_output(path: Path) -> Path:
     """Raise InputError where no figure can be written to `path`: before anything is computed."""
     if path.suffix.lower() not in SUFFIXES:
@@ -44,13 +84,40 @@ def check_output(path: Path) -> Path:
 
 def save(figure: Figure, path: Path, dpi: float, about: str) -> Path:
     """Write a figure, whole or not at all."""
-    names = {".png": "Description", ".pdf": "Subject", ".svg": "Description"}
-    metadata: dict[str, Any] = {names[path.suffix.lower()]: about}
+    return files.write_whole(path, lambda temporary: _fill(figure, temporary, path.suffix.lower()[1:], dpi, about))
 
-    def fill(temporary: Path) -> None:
-        figure.savefig(temporary, dpi=dpi, metadata=metadata, facecolor="white")
 
-    return files.write_whole(path, fill)
+def _fill(figure: Figure, file: Path | BinaryIO, kind: str, dpi: float, about: str) -> None:
+    import matplotlib
+
+    name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(file, format=kind, dpi=dpi, metadata={name: about}, facecolor="white")
+
+
+def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
+    """A figure of so many inches with a heading and nothing else; no window, whatever the notebook uses."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    left = 0.3 / width
+    figure.text(left, 1 - 0.38 / height, title, fontsize=14, fontweight="bold", va="baseline")
+    figure.text(left, 1 - 0.62 / height, subtitle, fontsize=9.5, color=SOFT, va="baseline")
+    return figure
+
+
+def legend_size(handles: Sequence[Artist], width: float) -> tuple[int, float]:
+    """The columns of a legend along the lower edge of so many inches, and the height that it takes, inches."""
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    columns = min(len(handles), max(1, int(width / (0.75 + 0.075 * longest))))
+    return columns, 0.3 + 0.2 * math.ceil(len(handles) / columns)
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    columns, _ = legend_size(handles, figure.get_figwidth())
+    figure.legend(handles=handles, loc="lower center", ncols=columns, fontsize=9.5, bbox_to_anchor=(0.5, 0.01))
 
 
 def parse_value(text: str) -> Any:

@@ -2,41 +2,52 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
-from typer import Option
+from typer import Argument, Option
 
-from ..options import Material, Model
+from .. import completion
+from ..options import Material
 from .base import MATERIALS, verb
 
 
 @verb(MATERIALS, place=1)
 def plot(
-    model: Model,
+    model: Annotated[
+        list[str],
+        Argument(
+            metavar="MODEL...",
+            help="Materials' names; see `gonio models`. Or a baked folder.",
+            autocompletion=completion.materials,
+        ),
+    ],
     *,
     made: Material,
     kind: Annotated[str, Option(metavar="lobe|slice|albedo", help="What to draw.")] = "lobe",
-    angles: Annotated[str, Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = "",
+    angles: Annotated[str | None, Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = None,
     output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help=".png, .pdf, .svg.")] = None,
 ) -> None:
-    """Draw a material: its lobes (polar), a slice over angle, or its albedo curve; or the tables in a baked folder.
+    """Draw materials: their lobes (polar), a slice over angle, or their albedo; or the tables in a baked folder.
 
-    The density it is sampled with is drawn dashed over its values.
+    The density that a material is sampled with is drawn dashed over its values. Several materials share their axes.
 
     \b
     Examples:
       gonio plot conductor --preset Au --param alpha=.3
+      gonio plot "conductor(preset=Au)" "conductor(preset=Cu)" lambert --kind slice
       gonio plot phong -p p=32 --kind slice -o phong.pdf
       gonio plot dielectric -p alpha=.2 --kind albedo
       gonio plot ./tables -o tables.png
     """
-    if os.sep in model or model.endswith(".npz") or Path(model).is_dir():
-        from ...viewer import energy_figures
+    from ...viewer import figures, plots
 
-        print(energy_figures.plot_tables(model, output))
+    views = None if angles is None else figures.split_values(angles)
+    if len(model) == 1 and plots.is_tables(model[0]):
+        output = output or Path(f"{Path(model[0]).resolve().stem}-tables.png")
+        print(plots.plot(model[0], output=output).path)
         return
-    from ...viewer import plots
-
-    print(plots.plot(model, made.param or [], made.preset, kind, angles, output))
+    texts = [made.text(name) for name in model]
+    names = dict.fromkeys(text.partition("(")[0] for text in texts)
+    output = output or Path(f"{'-'.join(names)}-{kind}.png")
+    print(plots.plot(*texts, kind=kind, angles=views, output=output).path)

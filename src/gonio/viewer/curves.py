@@ -1,0 +1,99 @@
+"""What a material does with light, as numbers to draw: values and density in the plane of incidence, albedo.
+
+`wo`, toward the viewer, leans to the left by theta_o; angles to the right of the normal, where a mirror would send the
+light, count positive.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models import BSDF
+
+Floats = NDArray[np.floating]
+
+STEP = 0.05  # degrees between directions: a GGX lobe of alpha 0.01 is 0.6 degrees wide at half its height
+SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, about 0.2 % of noise
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One view: values and density over the angle of wi (degrees), and what delta lobes reflect where."""
+
+    view: float
+    angles: Floats
+    values: Floats  # eval, (N, channels), 1/sr
+    pdf: Floats  # (N,), 1/sr
+    deltas: tuple[tuple[float, float], ...]  # (angle of wi in degrees, weight)
+
+    @property
+    def mean(self) -> Floats:
+        return self.values.mean(axis=1)
+
+    @property
+    def grey(self) -> bool:
+        spread = np.ptp(self.values, axis=1).max()
+        return bool(spread <= 1e-4 * self.values.max())
+
+    @property
+    def full(self) -> bool:
+        """Whether it goes around below the surface."""
+        return bool(self.angles[-1] > 90)
+
+    def side(self, side: int) -> NDArray[np.bool_]:
+        """Which directions lie above the surface (1), or below (-1)."""
+        above = np.abs(self.angles) <= 90
+        return above if side > 0 else ~above
+
+
+def curve(bsdf: BSDF, view: float) -> Curve:
+    """Evaluate a material in the plane of incidence, for wo at `view` degrees from the normal."""
+    reach = 180 if bsdf.transmits else 90
+    angles = np.linspace(-reach, reach, round(2 * reach / STEP) + 1)
+    theta = np.radians(angles)
+    wi = np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1)
+    wo = np.broadcast_to(_toward(view), wi.shape)
+    values, pdf = np.asarray(bsdf.eval(wo, wi)), np.asarray(bsdf.pdf(wo, wi))
+    return Curve(view, angles, values, pdf, _deltas(bsdf, view))
+
+
+def _toward(view: float) -> Floats:
+    theta = math.radians(view)
+    return np.array([-math.sin(theta), 0.0, math.cos(theta)])
+
+
+def _deltas(bsdf: BSDF, view: float) -> tuple[tuple[float, float], ...]:
+    u = (np.arange(64) + 0.5) / 64
+    drawn = bsdf.sample(np.broadcast_to(_toward(view), (64, 3)), np.stack([u, np.full(64, 0.5), np.full(64, 0.5)], 1))
+    found: dict[float, float] = {}
+    for index in np.flatnonzero(np.asarray(drawn.delta) & (np.asarray(drawn.pdf) > 0)):
+        x, _, z = np.asarray(drawn.wi)[index]
+        # A delta lobe's share of the power: its weight times the probability with which it is chosen, without
+        # the (eta_o/eta_i)^2 of transmitted radiance.
+        probability, eta = float(np.asarray(drawn.pdf)[index]), float(np.asarray(drawn.eta)[index])
+        strength = float(np.mean(np.asarray(drawn.weight)[index])) * probability * eta**2
+        found[round(math.degrees(math.atan2(x, z)), 2)] = strength
+    return tuple(found.items())
+
+
+def albedo(bsdf: BSDF, views: Floats) -> Floats:
+    """Share of the power that leaves, (views, channels): the mean weight of stratified samples.
+
+    Transmitted radiance carries (eta_o/eta_i)^2; power does not, hence the factor sample.eta^2.
+    """
+    rng = np.random.default_rng(1)
+    count = SAMPLES * SAMPLES
+    x, y = np.meshgrid(np.arange(SAMPLES), np.arange(SAMPLES))
+    cells = np.stack([x.ravel(), y.ravel()], axis=1)
+    # The lobe's number is stratified too, in an order of its own.
+    u = np.concatenate([rng.permutation(count)[:, None] / count, cells / SAMPLES], axis=1)
+    u = u + rng.random(u.shape) * [1 / count, 1 / SAMPLES, 1 / SAMPLES]
+    rows = []
+    for view in views:
+        drawn = bsdf.sample(np.broadcast_to(_toward(view), (count, 3)), np.minimum(u, 1 - 2**-24))
+        rows.append((np.asarray(drawn.weight) * np.asarray(drawn.eta)[:, None] ** 2).mean(axis=0))
+    return np.array(rows)
