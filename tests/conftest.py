@@ -1,7 +1,8 @@
-"""What every test shares: the folder of helpers on the path, and precision put back after each test."""
+"""What every test shares: the folder of helpers on the path, a scene, and precision put back after each test."""
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +12,40 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))  # `sphere`, `materials`
 
 from gonio import ops
+
+SCENE = {
+    "output": {"filename": "ball.png"},
+    "sampler": {"type": "independent", "xSamples": 2, "ySamples": 2},
+    "camera": {
+        "type": "pinhole",
+        "transform": {"position": [0, 1, 4], "lookAt": [0, 0, 0], "up": [0, 1, 0]},
+        "verticalFov": 40,
+        "film": {"size": [24, 16]},
+    },
+    "integrator": {"type": "directSampleLight"},
+    "scene": {
+        "shapes": [
+            {
+                "type": "sphere",
+                "center": [0, 0, 0],
+                "radius": 1,
+                "material": {"type": "phong", "kd": [0.2, 0.2, 0.2], "ks": [0.5, 0.5, 0.5], "p": 8},
+            }
+        ],
+        "lights": [{"type": "spotLight", "position": [2, 3, 4], "energy": [40, 40, 40]}],
+    },
+}
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A scene's folder; the current folder is an empty one beside it."""
+    folder = tmp_path / "ball"
+    folder.mkdir()
+    (folder / "scene.json").write_text(json.dumps(SCENE))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return folder
 
 
 @pytest.fixture(autouse=True)

@@ -35,23 +35,34 @@ _PLACES = {
     "model": "models",
     "Albedo": "energy",
     "albedo": "energy",
+    "bake": "render.tables",
+    "compare": "viewer.error_map",
+    "plot": "viewer.plots",
+    "study": "viewer.contact_sheet",
     "view": "viewer.widget",
 }
+_CALLABLE = ("emit", "models", "render", "verify")  # packages that can be called: go.models(), go.render(scene)
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
-    from . import emit, models, render, verify
+    from .emit import emit
     from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError
-    from .models import BSDF, Sample, model
+    from .models import BSDF, Sample, model, models
     from .ops import get_precision, set_precision
+    from .render import render
+    from .render.tables import bake
+    from .verify import verify
+    from .viewer.contact_sheet import study
+    from .viewer.error_map import compare
+    from .viewer.plots import plot
     from .viewer.widget import view
 
 
 def __getattr__(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(name)
-    if name in ("emit", "models", "render", "verify"):  # packages that can be called: go.models(), go.render(scene)
+    if name in _CALLABLE:
         return import_module("." + name, __name__)
     if name in _PLACES:
         return getattr(import_module("." + _PLACES[name], __name__), name)
@@ -66,7 +77,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     classes = import_module(".models", __name__).models().values()
-    return sorted([*globals(), *_PLACES, *_ALIASES, *(cls.__name__ for cls in classes)])
+    return sorted([*globals(), *_PLACES, *_CALLABLE, *_ALIASES, *(cls.__name__ for cls in classes)])
 
 
 __all__ = [
@@ -78,12 +89,16 @@ __all__ = [
     "MachineError",
     "Sample",
     "albedo",
+    "bake",
+    "compare",
     "emit",
     "get_precision",
     "model",
     "models",
+    "plot",
     "render",
     "set_precision",
+    "study",
     "verify",
     "view",
 ]

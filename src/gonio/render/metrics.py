@@ -131,9 +131,7 @@ def mean_ratio(test: Floats, reference: Floats) -> float:
     return float(a.mean() / b.mean()) if b.mean() != 0 else (1.0 if a.mean() == 0 else math.nan)
 
 
-def compare(
-    test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()
-) -> Comparison:
+def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()) -> Comparison:
     """All measures at once; `hdr` False takes both pictures as shown on a screen, in [0, 1]."""
     exposures = exposure_range(reference) if hdr else None
     return Comparison(

@@ -10,6 +10,7 @@ With layout "homework": E.png and E_avg.png exactly as the homework has them (`g
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,35 +19,69 @@ import numpy as np
 from .. import files
 from ..energy import bake as baking
 from ..energy.baked import Baked, homework_pictures, load
-from ..errors import InputError
-from ..models import BSDF
+from ..errors import InputError, did_you_mean
+from ..models import BSDF, models, notation
+from ..optics.ndf import distributions
 from . import images
 
 
 def bake(
     target: str | BSDF,
-    folder: str | Path,
+    output: str | Path | None = None,
     *,
+    lut: Sequence[str] | None = None,
+    size: int = 128,
+    method: str = "quadrature",
+    masking: str | None = None,
+    spp: int = 1024,
+    points: str = "hammersley",
+    seed: int = 0,
     layout: str = "linear",
+    aspect: float | None = None,
+    azimuths: int = baking.AZIMUTHS,
     store: str = "E",
     flip: bool = True,
-    size: int = 128,
-    **options: Any,
 ) -> Baked:
-    """Bake tables and write them to a folder, all files or none; options as in `gonio.energy.bake.bake`.
-    What was baked before comes from the user's cache.
+    """Bake tables of directional albedo, its average, the split sum and rough glass; see what they hold and err by.
 
-    layout  "linear", "stretched" or "homework" (linear axes, and the homework's pictures by `store` and `flip`)
+        go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
+
+    target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"
+    output    folder to write, all files or none; None writes nothing
+    lut       of "E", "Eavg", "dfg", "glass"; None is all that the target has, but glass
+    size      texels along each axis, 1 to 4096
+    method    "quadrature", or how to sample: "cosine", the distribution's name, "visible"; then `spp` samples a texel
+              at `points` "hammersley" or "independent" (of `seed`)
+    masking   of a distribution; a material brings its own
+    layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures by `store` and `flip`)
+    aspect    alpha_y / alpha_x of a distribution; other than 1 it adds the axis phi, of so many `azimuths`
+    What was baked before comes from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
-    folder = files.check_folder(folder)
+    folder = None if output is None else files.check_folder(output)
+    what = _target(target)
+    tables = tuple(lut) if lut else None
     homework = layout == "homework"
     if homework:
-        options["lut"] = options.get("lut") or ("E", "Eavg")
-        if not isinstance(target, str) or options.get("aspect") not in (None, 1.0):
-            what = "a material, or two widths, in the homework's layout"
-            raise InputError(what, "--layout", "give a distribution such as ggx, with one width")
-    baked = baking.cached(target, size=size, layout="linear" if homework else layout, **options)
+        tables = tables or ("E", "Eavg")
+        if not isinstance(what, str) or aspect not in (None, 1.0):
+            problem = "a material, or two widths, in the homework's layout"
+            raise InputError(problem, "--layout", "give a distribution such as ggx, with one width")
+    baked = baking.cached(
+        what,
+        lut=tables,
+        size=size,
+        method=method,
+        masking=masking,
+        spp=spp,
+        points=points,
+        seed=seed,
+        layout="linear" if homework else layout,
+        aspect=aspect,
+        azimuths=azimuths,
+    )
+    if folder is None:
+        return baked
     if homework:
         contents = {f"{name}.png": images.png_bytes(p) for name, p in homework_pictures(baked, store, flip).items()}
         baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
@@ -57,6 +92,22 @@ def bake(
     contents["manifest.json"] = (json.dumps(baked.manifest, indent=2) + "\n").encode()
     files.write_all(folder, contents)
     return baked
+
+
+def _target(target: str | BSDF) -> str | BSDF:
+    """A distribution's name, or a material."""
+    if isinstance(target, BSDF):
+        return target
+    name, bracket, _ = target.partition("(")
+    if name in distributions():
+        if bracket:
+            hint = "bake a material, such as conductor; alpha is an axis of the table"
+            raise InputError(f"'{name}' is a distribution, without parameters", "--param", hint)
+        return target
+    known = [*distributions(), *models()]
+    if name.replace("_", "-") not in known:
+        raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))
+    return notation.named(target)[0]
 
 
 def _pictures(baked: Baked) -> dict[str, bytes]:

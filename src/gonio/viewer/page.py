@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__, emit
+from .. import __version__
+from ..emit import bundle as written_for
 from ..energy import bake
 from ..errors import InputError, MachineError
 from ..models import BSDF
@@ -92,7 +93,7 @@ def material_data(key: str, material: stage.Material) -> dict[str, Any]:
 def variant_data(bsdf: BSDF, choices: dict[str, Any]) -> dict[str, Any]:
     """Shader, manifest and tables of a model with some choices made otherwise."""
     with _recording:
-        bundle = emit.bundle(stage.replaced(bsdf, choices, "choices"), "glsl")
+        bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl")
     tables = {name: encode(values) for name, values in bundle.tables.items()}
     manifest = _finite(bundle.manifest)
     for texture in manifest["textures"]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from typer import Argument, Option
 
-from ...errors import InputError, did_you_mean
 from .. import completion
 from ..options import Json, Material
 from ..output import print_tables
@@ -55,22 +54,22 @@ def bake(
       gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
       gonio bake conductor --preset Au --lut E,Eavg -o gold
     """
-    from ...models import models as known_models
-    from ...optics.ndf import distributions
     from ...render import tables
 
-    if target in distributions():
-        what: Any = target
-        if made.param or made.preset:
-            hint = "bake a material, such as conductor; alpha is an axis of the table"
-            raise InputError(f"'{target}' is a distribution, without parameters", "--param", hint)
-    else:
-        known = [*distributions(), *known_models()]
-        if target.replace("_", "-") not in known:
-            raise InputError(f"unknown distribution or material '{target}'", "TARGET", did_you_mean(target, known))
-        what = made.of(target)
-    options: dict[str, Any] = {"lut": lut.split(",")} if lut else {}
-    options |= {"size": size, "method": method, "masking": masking, "spp": spp, "points": points, "seed": seed}
-    options |= {"aspect": aspect, "azimuths": azimuths}
-    baked = tables.bake(what, output, layout=layout, store=store, flip=flip, **options)
+    baked = tables.bake(
+        made.text(target),
+        output,
+        lut=lut.split(",") if lut else None,
+        size=size,
+        method=method,
+        masking=masking,
+        spp=spp,
+        points=points,
+        seed=seed,
+        layout=layout,
+        aspect=aspect,
+        azimuths=azimuths,
+        store=store,
+        flip=flip,
+    )
     print_tables(baked.manifest, output, as_json)

@@ -1,0 +1,85 @@
+"""Python and the command line say the same: one name a thing, the same options, the same defaults."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio import cli, emit, render
+from gonio.errors import GonioWarning, InputError
+from gonio.render import images
+
+FUNCTIONS: dict[str, Callable[..., object]] = {
+    "bake": go.bake,
+    "compare": go.compare,
+    "emit": emit.emit,
+    "plot": go.plot,
+    "render": render.render,
+    "study": go.study,
+}
+# What only a command line needs: materials as text, and where a result goes when no variable takes it.
+TEXT = {"param", "preset", "as_json"}
+ONLY_TYPED = {"emit": {"output", "bundle"}}
+# Typed as text there, as what it is here; and a file that the command line writes anyhow.
+OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
+
+
+@pytest.mark.parametrize("name", list(FUNCTIONS))
+def test_options_have_the_same_names_and_defaults(name: str) -> None:
+    typed = inspect.signature(cli.Verb.family.get(name).with_single_options()).parameters
+    called = inspect.signature(FUNCTIONS[name]).parameters
+    assert all(p.kind is not inspect.Parameter.VAR_KEYWORD for p in called.values())
+    options = {key for key, p in typed.items() if p.default is not inspect.Parameter.empty}
+    options -= TEXT | ONLY_TYPED.get(name, set())
+    assert options <= set(called)
+    for key in sorted(options):
+        if f"{name} {key}" not in OTHER_DEFAULTS:
+            assert called[key].default == typed[key].default, key
+
+
+def test_all_of_it_stands_in_dir() -> None:
+    assert {*FUNCTIONS, "view", "models", "Conductor", "InputError"} <= set(dir(go))
+    for name in dir(go):
+        assert getattr(go, name, None) is not None or name.startswith("_")
+
+
+def test_docstrings_name_every_option() -> None:
+    for function in FUNCTIONS.values():
+        text = inspect.getdoc(function) or ""
+        for key in inspect.signature(function).parameters:
+            assert key in text or key in (inspect.getdoc(render.render) or ""), f"{function.__name__}: {key}"
+
+
+def test_a_picture_goes_to_a_file_and_back(tmp_path: Path, scene: Path) -> None:
+    picture = go.render(scene, output=tmp_path / "a.exr", overrides={"scene.shapes.0.material.p": 4})
+    assert picture.shape == (16, 24, 3) and picture.dtype == np.float32
+    np.testing.assert_array_equal(images.read(tmp_path / "a.exr").pixels, picture)
+    assert go.compare(tmp_path / "a.exr", picture, tolerance=0).passed
+    far = go.compare(picture, picture * 1.1, metric="rmse", tolerance=1e-9)
+    assert not far.passed and "<th>fails</th>" in far._repr_html_() and "&gt;" in far._repr_html_()
+    with pytest.warns(GonioWarning, match="brighter than white"):
+        go.render(scene, output=tmp_path / "a.png", exposure=9)
+
+
+def test_a_study_is_shown_and_saved(tmp_path: Path, scene: Path) -> None:
+    sheet = go.study(scene, {"scene.shapes.0.material.p": [4, 16]}, spp=1, exposure="auto")
+    assert sheet.output is None and len(sheet.cells) == 2
+    assert sheet._repr_png_().startswith(b"\x89PNG")
+    assert go.study(scene, {"scene.shapes.0.material.p": [4]}, output=tmp_path / "a.pdf").output == tmp_path / "a.pdf"
+    for vary in ({}, {"scene.shapes.0.material.p": []}):
+        with pytest.raises(InputError, match="nothing is varied"):
+            go.study(scene, vary)
+
+
+def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    baked = go.bake("ggx", size=4, lut=["E"])
+    assert baked.arrays["E"].shape == (4, 4) and list(tmp_path.iterdir()) == []
+    assert go.bake("conductor(preset=Au)", size=4, lut=["E"]).arrays["E"].shape == (4, 4, 3)
+    for target, message in (("ggxx", "unknown distribution or material"), ("ggx(alpha=.1)", "without parameters")):
+        with pytest.raises(InputError, match=message):
+            go.bake(target)
