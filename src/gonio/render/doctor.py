@@ -12,7 +12,6 @@ import platform
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from .. import __version__, llvm
 from . import denoise, engine
@@ -60,7 +59,7 @@ class Report:
         working = [device for device, problem in self.devices.items() if not problem]
         return "can render on: " + ", ".join(working) if working else "nothing to render with: see !! above"
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         return {"can_render": self.can_render, **asdict(self)}
 
 

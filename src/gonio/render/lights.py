@@ -13,9 +13,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import drjit as dr
+
+from .types import (
+    DirectionSample,
+    Emitter,
+    Float,
+    Interaction,
+    Mask,
+    Plugin,
+    Point,
+    PositionSample,
+    Properties,
+    Radiance,
+    Ray,
+    Record,
+    Scene,
+    Shape,
+    SurfaceInteraction,
+    TraversalCallback,
+    Vector,
+)
 
 # Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
 # 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing
@@ -27,14 +46,14 @@ SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
 class Rectangle:
     """A rectangle in space: corner, two perpendicular unit axes, their lengths, the normal axis0 x axis1."""
 
-    corner: Any
-    axis0: Any
-    axis1: Any
-    length0: Any
-    length1: Any
+    corner: Point
+    axis0: Vector
+    axis1: Vector
+    length0: Float
+    length1: Float
 
     @staticmethod
-    def of(mi: ModuleType, shape: Any) -> Rectangle:
+    def of(mi: ModuleType, shape: Shape) -> Rectangle:
         """The rectangle of a Mitsuba `rectangle` shape as the kernel sees it, so that moving it recompiles nothing."""
         zero, one = mi.Float(0), mi.Float(1)
         corner = shape.sample_position(zero, mi.Point2f(zero, zero)).p
@@ -44,20 +63,20 @@ class Rectangle:
         return Rectangle(corner, edge0 / length0, edge1 / length1, length0, length1)
 
     @property
-    def normal(self) -> Any:
+    def normal(self) -> Vector:
         return dr.cross(self.axis0, self.axis1)
 
     @property
-    def area(self) -> Any:
+    def area(self) -> Float:
         return self.length0 * self.length1
 
-    def pdf(self, solid_angle: Any, distance: Any, cosine: Any) -> Any:
+    def pdf(self, solid_angle: Float, distance: Float, cosine: Float) -> Float:
         """Density (1/sr) toward a point seen at `distance` under |cosine|: uniform in the solid angle where one is
         given, uniform on the area where it is 0."""
         by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
         return dr.select(solid_angle > 0, dr.rcp(solid_angle), by_area)
 
-    def hit(self, origin: Any, direction: Any) -> tuple[Any, Any, Any]:
+    def hit(self, origin: Point, direction: Vector) -> tuple[Float, tuple[Float, Float], Mask]:
         """Where a ray meets the rectangle: (distance, (u, v) in [0, 1]^2, whether it does)."""
         normal = self.normal
         distance = dr.dot(self.corner - origin, normal) / dr.dot(direction, normal)
@@ -77,7 +96,7 @@ class SphericalRectangle:
     whose numerator is a product and cancels nothing, unlike the sum of four angles less 2 pi.
     """
 
-    def __init__(self, rectangle: Rectangle, origin: Any):
+    def __init__(self, rectangle: Rectangle, origin: Point):
         self.rectangle, self.origin = rectangle, origin
         offset = rectangle.corner - origin
         self.x0, self.y0 = dr.dot(offset, rectangle.axis0), dr.dot(offset, rectangle.axis1)
@@ -93,7 +112,7 @@ class SphericalRectangle:
         self.solid_angle = self._solid_angle(zz, xx0, xx1, yy0, yy1)
         self.uniform = (self.solid_angle > SMALLEST_SOLID_ANGLE) & (self.solid_angle < LARGEST_SOLID_ANGLE)
 
-    def _solid_angle(self, zz: Any, xx0: Any, xx1: Any, yy0: Any, yy1: Any) -> Any:
+    def _solid_angle(self, zz: Float, xx0: Float, xx1: Float, yy0: Float, yy1: Float) -> Float:
         r00, r10 = dr.sqrt(xx0 + yy0 + zz), dr.sqrt(xx1 + yy0 + zz)
         r01, r11 = dr.sqrt(xx0 + yy1 + zz), dr.sqrt(xx1 + yy1 + zz)
         volume = -self.z0 * self.rectangle.area
@@ -107,11 +126,11 @@ class SphericalRectangle:
         # Each half angle is below pi/2 in sum with the other <= pi, so the sum stays inside atan2's branch.
         return 2 * dr.atan2(volume * (lower + upper), lower * upper - dr.square(volume))
 
-    def pdf(self, distance: Any, cosine: Any) -> Any:
+    def pdf(self, distance: Float, cosine: Float) -> Float:
         """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
         return self.rectangle.pdf(dr.select(self.uniform, self.solid_angle, 0), distance, cosine)
 
-    def sample(self, u: Any, v: Any) -> tuple[Any, Any, Any]:
+    def sample(self, u: Float, v: Float) -> tuple[Point, tuple[Float, Float], Float]:
         """A point of the rectangle from two numbers in [0, 1): (point, (u, v) on it in [0, 1]^2, pdf in 1/sr)."""
         sine, cosine = dr.sincos(dr.fma(u, self.solid_angle, self.k))
         fu = (cosine * self.n0 - self.n2) / sine
@@ -133,11 +152,11 @@ class SphericalRectangle:
         return point, (x / self.rectangle.length0, y / self.rectangle.length1), self.pdf(distance, cosine)
 
 
-def is_sphere(mi: ModuleType, shape: Any) -> bool:
+def is_sphere(mi: ModuleType, shape: Shape) -> bool:
     return bool(shape.shape_type() == mi.ShapeType.Sphere.value)
 
 
-def is_rectangle(mi: ModuleType, shape: Any) -> bool:
+def is_rectangle(mi: ModuleType, shape: Shape) -> bool:
     """Whether a shape is a `rectangle` whose edges are perpendicular (a sheared one is not)."""
     if shape is None or shape.shape_type() != mi.ShapeType.Rectangle.value:
         return False
@@ -146,7 +165,7 @@ def is_rectangle(mi: ModuleType, shape: Any) -> bool:
     return abs(float(dr.dot(rectangle.axis0, rectangle.axis1)[0])) < 1e-4
 
 
-def register(mi: Any) -> None:
+def register(mi: ModuleType) -> None:
     """Make `gonio_area` known to the current variant of Mitsuba. Calling it again does nothing.
 
     The plugin nests as `emitter` in any shape:
@@ -166,19 +185,23 @@ def register(mi: Any) -> None:
         return
     _registered.add(mi.variant())
 
-    class TwoSidedAreaLight(mi.Emitter):
+    base: Plugin = mi.Emitter
+
+    class TwoSidedAreaLight(base):
         two_sided = True
 
-        def __init__(self, properties: Any):
-            mi.Emitter.__init__(self, properties)
+        def __init__(self, properties: Properties):
+            base.__init__(self, properties)
             self.radiance = properties.get_emissive_texture("radiance")
             properties.get("tag", "")
             self.m_flags = mi.EmitterFlags.Surface
 
-        def eval(self, si: Any, active: Any = True) -> Any:
+        def eval(self, si: SurfaceInteraction, active: Mask = True) -> Radiance:
             return dr.select(active, self.radiance.eval(si, active), 0)
 
-        def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
+        def sample_direction(
+            self, it: Interaction, sample: Point, active: Mask = True
+        ) -> tuple[DirectionSample, Radiance]:
             shape = self.get_shape()
             if is_rectangle(mi, shape):
                 ds = _rectangle_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
@@ -191,7 +214,7 @@ def register(mi: Any) -> None:
             si = mi.SurfaceInteraction3f(ds, it.wavelengths)
             return ds, dr.select(active, self.radiance.eval(si, active) / ds.pdf, 0)
 
-        def pdf_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
+        def pdf_direction(self, it: Interaction, ds: DirectionSample, active: Mask = True) -> Float:
             shape = self.get_shape()
             cosine = dr.abs(dr.dot(ds.d, ds.n))
             if is_rectangle(mi, shape):
@@ -202,13 +225,13 @@ def register(mi: Any) -> None:
                 pdf = shape.pdf_position(ds, active) * dr.square(ds.dist) / cosine
             return dr.select(active & (cosine > 0), pdf, 0)
 
-        def eval_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
+        def eval_direction(self, it: Interaction, ds: DirectionSample, active: Mask = True) -> Radiance:
             return self.radiance.eval(mi.SurfaceInteraction3f(ds, it.wavelengths), active)
 
-        def bbox(self) -> Any:
+        def bbox(self) -> Record:
             return self.get_shape().bbox()
 
-        def traverse(self, callback: Any) -> None:
+        def traverse(self, callback: TraversalCallback) -> None:
             callback.put("radiance", self.radiance, mi.ParamFlags.Differentiable)
 
         def to_string(self) -> str:
@@ -220,7 +243,7 @@ def register(mi: Any) -> None:
 _registered: set[str] = set()
 
 
-def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Any, it: Any) -> Any:
+def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Point, it: Interaction) -> DirectionSample:
     """A Mitsuba direction sample from a spherical rectangle."""
     point, uv, pdf = seen.sample(sample.x, sample.y)
     ps = dr.zeros(mi.PositionSample3f, dr.width(point))
@@ -230,7 +253,7 @@ def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Any, it:
     return ds
 
 
-def _area_sample(mi: ModuleType, ps: Any, it: Any) -> Any:
+def _area_sample(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
     """A Mitsuba direction sample from a point sampled by area: pdf per steradian = pdf per area * r^2 / |cos|."""
     ds = _toward(mi, ps, it)
     cosine = dr.abs(dr.dot(ds.d, ds.n))
@@ -238,7 +261,7 @@ def _area_sample(mi: ModuleType, ps: Any, it: Any) -> Any:
     return ds
 
 
-def _toward(mi: ModuleType, ps: Any, it: Any) -> Any:
+def _toward(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
     ds = mi.DirectionSample3f(ps)
     away = ps.p - it.p
     ds.dist = dr.norm(away)
@@ -252,11 +275,11 @@ class Lights:
 
     A scene lit by one rectangle, as most of the lab's are, takes a short way: no choice of light, no virtual call,
     solid-angle sampling whether the emitter is `gonio_area` or Mitsuba's one-sided `area`, and for a path's last
-    ray a hit test of one rectangle. Any other scene asks the emitters themselves (point, environment, ...); one of
+    ray a hit test of one rectangle. Every other scene asks the emitters themselves (point, environment, ...); one of
     several is chosen with a probability half uniform, half proportional to the light it sends into the scene.
     """
 
-    def __init__(self, mi: ModuleType, scene: Any):
+    def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
         self.emitters = scene.emitters()
         self.count = len(self.emitters)
@@ -270,11 +293,11 @@ class Lights:
             self.choice = mi.DiscreteDistribution(self.probability)
             self.by_pointer = self._by_pointer(self.probability)
 
-    def _is_rectangle_light(self, emitter: Any) -> bool:
+    def _is_rectangle_light(self, emitter: Emitter) -> bool:
         known = getattr(emitter, "two_sided", False) or emitter.class_name() == "AreaLight"
         return known and is_rectangle(self.mi, emitter.get_shape())
 
-    def _probabilities(self) -> Any:
+    def _probabilities(self) -> Float:
         """Half uniform, half by the mean unoccluded light at 256 points spread in the scene's bounding box.
 
         The uniform half keeps every light's weight below 2 n: a dim lamp beside an object may matter most there.
@@ -299,7 +322,7 @@ class Lights:
         share = [f / total if total > 0 else 1 / self.count for f in flux]
         return mi.Float([0.5 / self.count + 0.5 * s for s in share])
 
-    def _by_pointer(self, probability: Any) -> Any:
+    def _by_pointer(self, probability: Float) -> Float:
         """The probabilities again, indexed by Dr.Jit's number of the emitter (what an EmitterPtr holds)."""
         mi = self.mi
         number = dr.reinterpret_array(mi.UInt32, self.scene.emitters_dr())
@@ -308,13 +331,13 @@ class Lights:
         dr.eval(table)
         return table
 
-    def emitted(self, si: Any, active: Any) -> Any:
+    def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
         """Radiance that the surface (or, where the ray left the scene, the environment) at `si` sends along the ray."""
         if self.count == 0:
             return dr.zeros(self.mi.Spectrum)
         return si.emitter(self.scene).eval(si, active)
 
-    def sample(self, si: Any, u: Any, pick: Any, active: Any) -> LightSample:
+    def sample(self, si: SurfaceInteraction, u: Float, pick: Float, active: Mask) -> LightSample:
         """A direction toward a light; `u` chooses the point on it, `pick` in [0, 1) the light."""
         mi = self.mi
         if self.rectangle is not None:
@@ -333,7 +356,7 @@ class Lights:
         ds.pdf *= probability
         return LightSample(ds, weight / probability, mi.Bool(ds.delta), mi.Float(0))
 
-    def pdf(self, origin: Any, solid_angle: Any, si: Any, active: Any) -> Any:
+    def pdf(self, origin: Point, solid_angle: Float, si: SurfaceInteraction, active: Mask) -> Float:
         """Density with which `sample`, asked at `origin`, would have chosen the direction in which light `si` was met.
 
         solid_angle  `LightSample.solid_angle` at that origin, so that it is not computed twice
@@ -353,7 +376,9 @@ class Lights:
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
         return ds.emitter.pdf_direction(it, ds, active) * dr.gather(mi.Float, self.by_pointer, number, active)
 
-    def last_hit(self, ray: Any, solid_angle: Any, active: Any, weigh: Callable[[Any, Any], Any]) -> Any:
+    def last_hit(
+        self, ray: Ray, solid_angle: Float, active: Mask, weigh: Callable[[Radiance, Float], Radiance]
+    ) -> Radiance:
         """What a path's last ray adds: the radiance that arrives along it, `weigh`ed with its density as in `pdf`.
 
         All that this ray can still find is a light; with one rectangle the ray is traced only where it points at it.
@@ -384,12 +409,12 @@ class LightSample:
     """A direction sample `ds`, radiance over pdf `weight`, whether the light is a point (no BSDF sample can meet it),
     and the solid angle of a rectangle sampled uniformly in it (0 where it was not)."""
 
-    ds: Any
-    weight: Any
-    delta: Any
-    solid_angle: Any
+    ds: DirectionSample
+    weight: Radiance
+    delta: Mask
+    solid_angle: Float
 
 
-def fraction(x: Any) -> Any:
+def fraction(x: Float) -> Float:
     """The part of x >= 0 behind the point."""
     return x - dr.floor(x)

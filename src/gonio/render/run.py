@@ -77,9 +77,9 @@ def _nearby(path: Path) -> str:
 def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     from . import integrators, scene
 
-    overrides = dict(request.overrides)
+    overrides: dict[str, object] = dict(request.overrides)
     if request.size is not None:
-        overrides["/camera/film/size"] = list(request.size)
+        overrides["/camera/film/size"] = [*request.size]
     description = scene.read(request.scene, allow_outside=request.allow_outside, overrides=overrides)
     of_scene = integrators.Settings(
         integrator=description.integrator.type,

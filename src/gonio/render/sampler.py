@@ -16,9 +16,13 @@ the indices, so that decisions are independent of each other while each is strat
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TypeAlias
 
 import drjit as dr
+
+from .types import Float, UInt
+
+Pair: TypeAlias = tuple[Float, Float]
 
 SAMPLERS: dict[str, str] = {
     "sobol": "Owen-scrambled Sobol pairs, shuffled per pixel and dimension: the least noise; any number of samples",
@@ -30,7 +34,7 @@ SAMPLERS: dict[str, str] = {
 DEFAULT = "sobol"
 
 
-def mix(a: Any, b: Any) -> Any:
+def mix(a: UInt, b: UInt) -> UInt:
     """Hash two 32-bit words into one (the `lowbias32` finaliser of C. Wellons: bias 0.17 bits of 32 after mixing).
 
     Multiplying `b` by the golden ratio first spreads small integers over all bits.
@@ -41,12 +45,12 @@ def mix(a: Any, b: Any) -> Any:
     return h ^ (h >> 16)
 
 
-def pixel_key(pixel: Any, seed: Any) -> Any:
+def pixel_key(pixel: UInt, seed: UInt) -> UInt:
     """The key of a pixel under a seed: 32 bits, decorrelated between pixels and between seeds."""
     return mix(mix(pixel, seed), seed ^ 0xA511E9B3)
 
 
-def owen_hash(x: Any, seed: Any) -> Any:
+def owen_hash(x: UInt, seed: UInt) -> UInt:
     """Owen scrambling of a *bit-reversed* word: bit i is flipped by a hash of the bits below it and the seed.
 
     The Laine-Karras construction: additions and multiplications by odd numbers carry only upwards, so that on
@@ -59,7 +63,7 @@ def owen_hash(x: Any, seed: Any) -> Any:
     return x ^ (x * 0x53A22864)
 
 
-def pascal(x: Any) -> Any:
+def pascal(x: UInt) -> UInt:
     """The second Sobol dimension before bit reversal: x times the Pascal matrix mod 2.
 
     That matrix is the fifth Kronecker power of [[1, 1], [0, 1]], so five masked shifts apply it to 32 bits
@@ -72,12 +76,12 @@ def pascal(x: Any) -> Any:
     return x ^ (x >> 16)
 
 
-def unit(x: Any) -> Any:
+def unit(x: UInt) -> Float:
     """A 32-bit word as a float in [0, 1): its upper 24 bits, which a float32 holds exactly, so 1 is never reached."""
     return dr.float32_array_t(x)(x >> 8) * 2.0**-24
 
 
-def sobol_pair(key: Any, index: Any, dimension: Any) -> tuple[Any, Any]:
+def sobol_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
     """The Owen-scrambled Sobol point of `index`, its order shuffled for this key and dimension (Burley2020, sec. 3)."""
     seed = mix(key, type(key)(dimension))
     shuffled = dr.brev(owen_hash(dr.brev(type(key)(index)), seed))
@@ -86,11 +90,11 @@ def sobol_pair(key: Any, index: Any, dimension: Any) -> tuple[Any, Any]:
     return unit(dr.brev(x)), unit(dr.brev(y))
 
 
-def independent_pair(key: Any, index: Any, dimension: Any) -> tuple[Any, Any]:
+def independent_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
     """Two independent numbers: a counter hashed twice, as good as a stateful generator and free of state."""
     word = mix(mix(key, type(key)(dimension)), type(key)(index))
     return unit(mix(word, type(key)(0x51633E2D))), unit(mix(word, type(key)(0x68BC21EB)))
 
 
 #: The pair function of each sampler: (key, index, dimension) -> (x, y) in [0, 1)^2.
-PAIRS: dict[str, Callable[[Any, Any, Any], tuple[Any, Any]]] = {"sobol": sobol_pair, "independent": independent_pair}
+PAIRS: dict[str, Callable[[UInt, UInt, UInt], Pair]] = {"sobol": sobol_pair, "independent": independent_pair}

@@ -1,40 +1,46 @@
 """What Mitsuba and Dr.Jit hand out, by name.
 
-Both ship types for single variants only, and this room serves all of them: so these names say what a value is, and
-check nothing. Values of materials have types of their own, in `gonio.ops.types`.
+Both ship types for single variants only, and this room serves all of them: these names say what a value is, and check
+nothing. Values of materials have types of their own, in `gonio.ops.types`.
 """
 
 from __future__ import annotations
 
 from typing import Any, TypeAlias
 
+OfVariant: TypeAlias = Any  # of a class that Mitsuba or Dr.Jit has once a variant
+
 # Mitsuba's objects
-Plugin: TypeAlias = Any  # what a dictionary or a file loads to
+Plugin: TypeAlias = OfVariant  # what a dictionary or a file loads to
 Scene: TypeAlias = Plugin
 Sensor: TypeAlias = Plugin
 Shape: TypeAlias = Plugin
 Emitter: TypeAlias = Plugin
 Texture: TypeAlias = Plugin
 MitsubaBSDF: TypeAlias = Plugin
-Properties: TypeAlias = Any  # of a plugin that is being built
-BSDFContext: TypeAlias = Any
-TraversalCallback: TypeAlias = Any
+Properties: TypeAlias = OfVariant  # of a plugin that is being built
+BSDFContext: TypeAlias = OfVariant
+TraversalCallback: TypeAlias = OfVariant
+PluginDict: TypeAlias = dict[str, Any]  # what `mi.load_dict` takes
+
+# What a scene file holds
+Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
 # Records with an entry for every lane
-Ray: TypeAlias = Any
-Hit: TypeAlias = Any  # mi.PreliminaryIntersection3f
-Interaction: TypeAlias = Any  # mi.Interaction3f
-SurfaceInteraction: TypeAlias = Any
-PositionSample: TypeAlias = Any
-DirectionSample: TypeAlias = Any
-BSDFSample: TypeAlias = Any
-Record: TypeAlias = Any  # one of our own, made for a variant
+Ray: TypeAlias = OfVariant
+Hit: TypeAlias = OfVariant  # mi.PreliminaryIntersection3f
+Interaction: TypeAlias = OfVariant  # mi.Interaction3f
+SurfaceInteraction: TypeAlias = OfVariant
+PositionSample: TypeAlias = OfVariant
+DirectionSample: TypeAlias = OfVariant
+BSDFSample: TypeAlias = OfVariant
+Record: TypeAlias = OfVariant  # one of our own, made for a variant
 
 # Values with an entry for every lane, of the variant's types
-Float: TypeAlias = Any
-UInt: TypeAlias = Any
-Mask: TypeAlias = Any
-Point: TypeAlias = Any  # of two or three components
-Vector: TypeAlias = Any
-Colour: TypeAlias = Any  # linear RGB
-Radiance: TypeAlias = Any  # mi.Spectrum: as many channels as the variant has, a Mueller matrix where it is polarized
+Float: TypeAlias = OfVariant
+UInt: TypeAlias = OfVariant
+Mask: TypeAlias = OfVariant
+Point: TypeAlias = OfVariant  # of two or three components
+Vector: TypeAlias = OfVariant
+Colour: TypeAlias = OfVariant  # linear RGB
+Radiance: TypeAlias = OfVariant  # mi.Spectrum: as many channels as the variant has, a Mueller matrix where polarized

@@ -12,11 +12,16 @@ import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from types import ModuleType
+from typing import NoReturn, Protocol, TypeAlias
 
 import numpy as np
 
 from ...errors import InputError
+from ..types import Emitter, MitsubaBSDF, Shape
+
+PlyProperties: TypeAlias = list[tuple[str, ...]]  # (type, name), or ("list", type of the count, type, name)
+PlyTable: TypeAlias = dict[str, np.ndarray | list[list[int]]]  # columns; those of lists are lists
 
 SEGMENTS = 1024
 MAX_BYTES = 2**30  # of a mesh file
@@ -44,7 +49,7 @@ class Triangles:
             normals=normals,
         )
 
-    def to_mitsuba(self, mi: Any, name: str, bsdf: Any, emitter: Any = None) -> Any:
+    def to_mitsuba(self, mi: ModuleType, name: str, bsdf: MitsubaBSDF, emitter: Emitter | None = None) -> Shape:
         """A `mi.Mesh` with that BSDF and, where given, that emitter."""
         properties = mi.Properties()
         properties["bsdf"] = bsdf
@@ -292,12 +297,15 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
     if start == 0:
         refuse("nothing follows the header")
     order, elements = _ply_header(data[:end], refuse)
-    tables: dict[str, dict[str, Any]] = {}
-    body: Any = data[start:].split() if order == "ascii" else memoryview(data)[start:]
+    tables: dict[str, PlyTable] = {}
+    body = memoryview(data)[start:]
+    words = data[start:].split() if order == "ascii" else []
     for name, count, properties in elements:
-        read = _ply_ascii if order == "ascii" else _ply_binary
         try:
-            tables[name], body = read(body, count, properties, order)
+            if order == "ascii":
+                tables[name], words = _ply_ascii(words, count, properties)
+            else:
+                tables[name], body = _ply_binary(body, count, properties, order)
         except (ValueError, IndexError, OverflowError):
             refuse(f"the file ends within, or garbles, its {count} '{name}' entries")
         if "vertex" in tables and "face" in tables:
@@ -326,10 +334,16 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
     )
 
 
-def _ply_header(header: bytes, refuse: Any) -> tuple[str, list[tuple[str, int, list[tuple[str, ...]]]]]:
+class _Refuse(Protocol):
+    """Raises InputError."""
+
+    def __call__(self, what: str, hint: str = "") -> NoReturn: ...
+
+
+def _ply_header(header: bytes, refuse: _Refuse) -> tuple[str, list[tuple[str, int, PlyProperties]]]:
     """The byte order ("ascii", "<" or ">") and the elements: name, count, properties."""
     order = ""
-    elements: list[tuple[str, int, list[tuple[str, ...]]]] = []
+    elements: list[tuple[str, int, PlyProperties]] = []
     for line in header.decode("ascii", "replace").splitlines()[1:]:
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
@@ -349,10 +363,11 @@ def _ply_header(header: bytes, refuse: Any) -> tuple[str, list[tuple[str, int, l
     return order, elements
 
 
-def _ply_ascii(words: Any, count: int, properties: Any, order: str) -> tuple[dict[str, Any], Any]:
+def _ply_ascii(words: list[bytes], count: int, properties: PlyProperties) -> tuple[PlyTable, list[bytes]]:
     if count > len(words) + 1:  # so that a wrong count in the header allocates nothing
         raise ValueError
-    table: dict[str, Any] = {p[-1]: [] for p in properties}
+    numbers: dict[str, list[float]] = {p[-1]: [] for p in properties if p[0] != "list"}
+    lists: dict[str, list[list[int]]] = {p[-1]: [] for p in properties if p[0] == "list"}
     at = 0
     for _ in range(count):
         for *kind, name in properties:
@@ -360,16 +375,15 @@ def _ply_ascii(words: Any, count: int, properties: Any, order: str) -> tuple[dic
                 length = int(words[at])
                 if not 0 <= length <= len(words) - at - 1:
                     raise ValueError
-                table[name].append([int(word) for word in words[at + 1 : at + 1 + length]])
+                lists[name].append([int(word) for word in words[at + 1 : at + 1 + length]])
                 at += 1 + length
             else:
-                table[name].append(float(words[at]))
+                numbers[name].append(float(words[at]))
                 at += 1
-    lists = {p[-1] for p in properties if p[0] == "list"}
-    return {key: value if key in lists else np.array(value) for key, value in table.items()}, words[at:]
+    return {**{name: np.array(column) for name, column in numbers.items()}, **lists}, words[at:]
 
 
-def _ply_binary(body: Any, count: int, properties: Any, order: str) -> tuple[dict[str, Any], Any]:
+def _ply_binary(body: memoryview, count: int, properties: PlyProperties, order: str) -> tuple[PlyTable, memoryview]:
     if count > len(body):  # so that a wrong count in the header allocates nothing
         raise ValueError
     if not any(p[0] == "list" for p in properties):
@@ -379,7 +393,8 @@ def _ply_binary(body: Any, count: int, properties: Any, order: str) -> tuple[dic
     fast = _ply_triangles(body, count, properties, order)
     if fast is not None:
         return fast
-    table: dict[str, Any] = {p[-1]: [] for p in properties}
+    numbers: dict[str, list[float]] = {p[-1]: [] for p in properties if p[0] != "list"}
+    lists: dict[str, list[list[int]]] = {p[-1]: [] for p in properties if p[0] == "list"}
     at = 0
     for _ in range(count):
         for *kind, name in properties:
@@ -390,16 +405,18 @@ def _ply_binary(body: Any, count: int, properties: Any, order: str) -> tuple[dic
                 at += counter.itemsize
                 if not 0 <= length * item.itemsize <= len(body) - at:
                     raise ValueError
-                table[name].append(np.frombuffer(body, item, length, at).astype(int).tolist())
+                lists[name].append(np.frombuffer(body, item, length, at).astype(int).tolist())
                 at += length * item.itemsize
             else:
                 item = np.dtype(order + _PLY_TYPES[kind[0]])
-                table[name].append(np.frombuffer(body, item, 1, at)[0])
+                numbers[name].append(float(np.frombuffer(body, item, 1, at)[0]))
                 at += item.itemsize
-    return table, body[at:]
+    return {**{name: np.array(column) for name, column in numbers.items()}, **lists}, body[at:]
 
 
-def _ply_triangles(body: Any, count: int, properties: Any, order: str) -> tuple[dict[str, Any], Any] | None:
+def _ply_triangles(
+    body: memoryview, count: int, properties: PlyProperties, order: str
+) -> tuple[PlyTable, memoryview] | None:
     """The usual case, one list and all of it triangles, without a loop; None where it is not that."""
     if len(properties) != 1:
         return None

@@ -8,41 +8,62 @@ been written in the file.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+
+import numpy as np
 
 from ...errors import InputError, did_you_mean
+from ..types import Json
 from .materials import BY_TYPE
 
 
-def apply(raw: dict[str, Any], overrides: Mapping[str, Any]) -> None:
-    """Set each path to its value, in place. Raises InputError where a path leads nowhere."""
+def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
+    """Set each path to its value, in place. Raises InputError where a path leads nowhere, or a value is no JSON."""
     for path, value in overrides.items():
-        _set(raw, path, value)
+        _set(raw, path, _plain(value, path))
 
 
-def _set(raw: dict[str, Any], path: str, value: Any) -> None:
+def _plain(value: object, path: str) -> Json:
+    """The value as a scene file would hold it: tuples and arrays are lists."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, path) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item, path) for item in value]
+    if value is None or isinstance(value, str | int | float):
+        return value
+    raise InputError(f"{value!r} cannot stand in a scene", f"path {path}", "give a number, a name, a list or an object")
+
+
+def _set(raw: dict[str, Json], path: str, value: Json) -> None:
     steps = _steps(raw, path)
-    holders = [raw]
+    holders: list[Json] = [raw]
     for index, step in enumerate(steps[:-1]):
         holders = [item for holder in holders for item in _below(holder, step, path, steps[:index], steps)]
     last = steps[-1]
     if last == "*":
         for holder in holders:
             for key in _keys(holder):
-                holder[key] = value
+                _put(holder, key, value, path)
         return
     chosen = _that_take(holders, last) if "*" in steps else holders
     if not chosen:
         known = sorted({str(key) for holder in holders if isinstance(holder, dict) for key in holder})
         raise InputError(f"nothing there has the key '{last}'", f"path {path}", did_you_mean(last, known))
     for holder in chosen:
-        if isinstance(holder, dict):
-            holder[last] = value
-        else:
-            holder[_index(holder, last, path)] = value
+        _put(holder, last, value, path)
 
 
-def _steps(raw: dict[str, Any], path: str) -> list[str]:
+def _put(holder: Json, key: str, value: Json, path: str) -> None:
+    if isinstance(holder, dict):
+        holder[key] = value
+    elif isinstance(holder, list):
+        holder[_index(holder, key, path)] = value
+    else:
+        raise InputError(f"nothing can be set below {holder!r}", f"path {path}", "shorten the path")
+
+
+def _steps(raw: dict[str, Json], path: str) -> list[str]:
     if path.startswith("/"):
         steps = [step.replace("~1", "/").replace("~0", "~") for step in path[1:].split("/")]
     else:
@@ -54,16 +75,16 @@ def _steps(raw: dict[str, Any], path: str) -> list[str]:
     return steps
 
 
-def _keys(holder: Any) -> list[Any]:
+def _keys(holder: Json) -> list[str]:
     if isinstance(holder, dict):
         return list(holder)
-    return list(range(len(holder))) if isinstance(holder, list) else []
+    return [str(index) for index in range(len(holder))] if isinstance(holder, list) else []
 
 
-def _below(holder: Any, step: str, path: str, before: list[str], steps: list[str]) -> list[Any]:
+def _below(holder: Json, step: str, path: str, before: list[str], steps: list[str]) -> list[Json]:
     """The values one step down; with a `*` before, holders without that key are passed over."""
     if step == "*":
-        return [holder[key] for key in _keys(holder)]
+        return list(holder.values()) if isinstance(holder, dict) else list(holder) if isinstance(holder, list) else []
     if isinstance(holder, dict):
         if step in holder:
             return [holder[step]]
@@ -79,18 +100,17 @@ def _below(holder: Any, step: str, path: str, before: list[str], steps: list[str
     raise InputError(f"'{'.'.join(before)}' holds nothing that could be named '{step}'", f"path {path}", "shorten it")
 
 
-def _index(holder: Any, step: str, path: str) -> int:
-    if not isinstance(holder, list):
-        raise InputError(f"nothing can be set below {holder!r}", f"path {path}", "shorten the path")
+def _index(holder: list[Json], step: str, path: str) -> int:
     if not step.isascii() or not step.isdigit() or len(step) > 9 or int(step) >= len(holder):
         hint = f"0 to {len(holder) - 1}, or *" if holder else "the list is empty"
         raise InputError(f"no item '{step}' in a list of {len(holder)}", f"path {path}", hint)
     return int(step)
 
 
-def _that_take(holders: list[Any], key: str) -> list[Any]:
+def _that_take(holders: list[Json], key: str) -> list[Json]:
     """Of several objects, those that have the key; where none has it, those materials that know it."""
-    with_key = [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
+    with_key: list[Json] = []
+    with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
     if with_key:
         return with_key
     types = [(h, BY_TYPE.get(str(h.get("type")))) for h in holders if isinstance(h, dict)]

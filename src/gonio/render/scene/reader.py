@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from ...errors import InputError, did_you_mean
+from ..types import Json
 from . import overrides as override
 from .materials import MaterialPart, numbers_in
 from .schema import SceneDescription
@@ -20,7 +20,7 @@ SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to
 
 
 def read(
-    path: Path | str, *, allow_outside: bool = False, overrides: Mapping[str, Any] | None = None
+    path: Path | str, *, allow_outside: bool = False, overrides: Mapping[str, object] | None = None
 ) -> SceneDescription:
     """A scene from a folder with a scene.json, or from a .json file.
 
@@ -33,7 +33,7 @@ def read(
     file = _scene_file(Path(path))
     raw = read_json(file)
     if overrides:
-        override.apply(raw, copy.deepcopy(dict(overrides)))
+        override.apply(raw, overrides)
     try:
         description = SceneDescription.model_validate(raw)
     except ValidationError as error:
@@ -99,7 +99,7 @@ def _check_material(description: SceneDescription, where: str, material: Materia
         raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
 
 
-def parts(part: Part, steps: str = "") -> Iterator[tuple[str, Any]]:
+def parts(part: Part, steps: str = "") -> Iterator[tuple[str, Part]]:
     """Every object of a scene with its JSON pointer, parents first."""
     yield steps, part
     for name, field in type(part).model_fields.items():
@@ -116,7 +116,7 @@ def parts(part: Part, steps: str = "") -> Iterator[tuple[str, Any]]:
 # ---------------------------------------------------------------------- pydantic's errors in our words
 
 
-def explain(error: ValidationError, raw: dict[str, Any], file: Path) -> InputError:
+def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
     """The first error with place, expectation and hint; the next few in a line each."""
     found: dict[str, tuple[str, str]] = {}
     for detail in error.errors(include_url=False):
@@ -130,7 +130,7 @@ def explain(error: ValidationError, raw: dict[str, Any], file: Path) -> InputErr
     return InputError("\n  ".join(lines), f"{file}#{where}", hint)
 
 
-def _one(detail: Any, raw: Any) -> tuple[str, str, str]:
+def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     """Pointer, what is wrong, and a hint, of one of pydantic's errors."""
     kind, context = detail["type"], detail.get("ctx", {})
     steps, value = _place(detail["loc"], raw, keep_last=kind == "missing")
@@ -180,14 +180,14 @@ def _one(detail: Any, raw: Any) -> tuple[str, str, str]:
     return pointer(*steps, *more), what, hint
 
 
-def _unquote(value: Any) -> str:
+def _unquote(value: Json) -> str:
     try:
         return f"write {float(value):g} without quotes" if isinstance(value, str) else ""
     except ValueError:
         return ""
 
 
-def _place(location: tuple[str | int, ...], raw: Any, keep_last: bool) -> tuple[list[str | int], Any]:
+def _place(location: tuple[str | int, ...], raw: Json, keep_last: bool) -> tuple[list[str | int], Json]:
     """The steps into the file and the value there. Pydantic's location also names the union's tags: dropped."""
     steps: list[str | int] = []
     value = raw
@@ -196,7 +196,7 @@ def _place(location: tuple[str | int, ...], raw: Any, keep_last: bool) -> tuple[
         in_object = isinstance(value, dict) and step in value and step != value.get("type")
         in_list = isinstance(value, list) and isinstance(step, int) and step < len(value)
         if in_object or in_list:
-            value = value[step]
+            value = value[step]  # type: ignore[index, call-overload]
         elif not (keep_last and index == len(location) - 1):
             continue
         steps.append(step)

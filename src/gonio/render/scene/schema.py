@@ -16,6 +16,7 @@ from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_valid
 from ...errors import InputError, did_you_mean
 from ..images import SUFFIXES
 from ..request import check_film
+from ..types import Json
 from .materials import Material
 from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
 
@@ -122,7 +123,7 @@ class Film(Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _two_numbers(cls, data: Any) -> Any:
+    def _two_numbers(cls, data: object) -> object:
         size = data.get("size") if isinstance(data, dict) else None
         if size is not None and not (isinstance(size, (list, tuple)) and len(size) == 2):
             raise invalid("expected 2 numbers [width, height]", "give [width, height]", "size")
@@ -415,7 +416,7 @@ class SceneDescription(Part):
     _path: Path = PrivateAttr(default=Path("scene.json"))
     _allow_outside: bool = PrivateAttr(default=False)
     _warnings: list[str] = PrivateAttr(default_factory=list)
-    _raw: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _raw: dict[str, Json] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_ambient(self) -> SceneDescription:
@@ -437,11 +438,11 @@ class SceneDescription(Part):
         return self.top_ambient or self.contents.ambient
 
     @property
-    def shapes(self) -> list[Any]:
+    def shapes(self) -> list[Shape]:
         return self.contents.shapes
 
     @property
-    def lights(self) -> list[Any]:
+    def lights(self) -> list[LightSource]:
         return self.contents.lights
 
     @property
@@ -460,7 +461,7 @@ class SceneDescription(Part):
         return list(self._warnings)
 
     @property
-    def raw(self) -> dict[str, Any]:
+    def raw(self) -> dict[str, Json]:
         """The file's JSON after overrides, as plain values."""
         return self._raw
 

@@ -11,9 +11,10 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from ...errors import InputError
+from ..types import Json
 
 MAX_BYTES = 64 * 2**20  # a scene is text that somebody wrote; geometry and images live in files of their own
 MAX_DEPTH = 64  # a lab scene nests 8 deep; 64 leaves room for mixes of mixes and stays far from any stack limit
@@ -25,7 +26,7 @@ def pointer(*steps: str | int) -> str:
     return "".join("/" + str(step).replace("~", "~0").replace("/", "~1") for step in steps)
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Json]:
     """The object in a JSON file. Raises InputError for anything a scene file must not hold."""
     text = _text(path)
     _check_depth(text, path)
@@ -49,7 +50,7 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
-def kind_of(value: Any) -> str:
+def kind_of(value: object) -> str:
     """What a JSON value is, in words: "the string 'x'", "a list of 2", "true"."""
     if value is None or isinstance(value, bool):
         return json.dumps(value)
@@ -62,10 +63,10 @@ def kind_of(value: Any) -> str:
     return f"the number {value}"
 
 
-class _Object(dict):
+class _Object(dict[str, Json]):
     """An object that remembers which of its keys came twice."""
 
-    def __init__(self, pairs: list[tuple[str, Any]]) -> None:
+    def __init__(self, pairs: list[tuple[str, Json]]) -> None:
         super().__init__(pairs)
         seen: set[str] = set()
         self.twice = [key for key, _ in pairs if key in seen or seen.add(key)]  # type: ignore[func-returns-value]
@@ -118,7 +119,7 @@ def _check_depth(text: str, path: Path) -> None:
             depth -= 1
 
 
-def _checked(value: Any, path: Path, steps: tuple[str | int, ...]) -> Any:
+def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
     """The value in plain types; raises at the first thing that JSON forbids or that a scene cannot use."""
 
     def refuse(what: str, hint: str) -> NoReturn:
@@ -153,7 +154,7 @@ def _syntax_hint(text: str, position: int) -> str:
     return "a comma, quote or bracket is missing or too many near here"
 
 
-def walk(value: Any, steps: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+def walk(value: Json, steps: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Json]]:
     """Every value in a tree of dicts and lists with the steps that lead to it, parents first."""
     yield steps, value
     if isinstance(value, dict):

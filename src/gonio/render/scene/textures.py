@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
 from ...errors import InputError
 from .. import images
+from ..images import RGB
+from ..types import PluginDict
 
 MAX_BYTES = 2**30  # of an image file
 MAX_PIXELS = 2**28  # 3 GiB as float32 RGB
@@ -18,7 +20,7 @@ _MAGIC = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"\x76\x2f\x31\
 _FORMATS = {".png": "PNG", ".jpg": "JPEG", ".exr": "OpenEXR", ".hdr": "RGBE"}
 
 
-def load_image(mi: Any, path: Path, where: str, *, srgb: bool = False) -> np.ndarray:
+def load_image(mi: ModuleType, path: Path, where: str, *, srgb: bool = False) -> RGB:
     """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded where `srgb`.
 
     Raises InputError where the file is no image, claims more pixels than it can hold, or holds NaN.
@@ -90,7 +92,7 @@ def _last_line(error: Exception) -> str:
     return str(error).strip().splitlines()[-1][:200]
 
 
-def bitmap(mi: Any, values: np.ndarray, filter_type: str, wrap: str) -> dict[str, Any]:
+def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDict:
     """A Mitsuba texture of values that are linear already. v = 0 is the top row there too."""
     # With `raw` a colour reaches the material as it stands; spectral variants must make a spectrum of it.
     raw = values.shape[2] == 1 or not mi.variant().endswith("spectral")
@@ -103,7 +105,7 @@ def bitmap(mi: Any, values: np.ndarray, filter_type: str, wrap: str) -> dict[str
     }
 
 
-def environment(mi: Any, values: np.ndarray) -> dict[str, Any]:
+def environment(mi: ModuleType, values: RGB) -> PluginDict:
     """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) is u = p/2pi, v = t/pi.
 
     Mitsuba's `envmap` differs in two ways. It runs the other way round, (sin p, -cos p): mirrored left to right, and

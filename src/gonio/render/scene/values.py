@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import (
     AfterValidator,
@@ -38,7 +39,7 @@ class Part(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> Any:
+    def _known_keys(cls, data: object) -> object:
         if isinstance(data, dict):
             known = cls.known_keys()
             for key in data:
@@ -54,18 +55,18 @@ class Part(BaseModel):
         return [field.alias or name for name, field in cls.model_fields.items()]
 
     @classmethod
-    def describe(cls, data: dict[str, Any]) -> str:
+    def describe(cls, data: Mapping[str, object]) -> str:
         kind = data.get("type")
         return f"'{kind}'" if isinstance(kind, str) else cls.__name__.lower()
 
 
-def _not_a_flag(value: Any) -> Any:
+def _not_a_flag(value: object) -> object:
     if isinstance(value, bool):  # Python counts True as 1
         raise invalid(f"expected a number, got {kind_of(value)}", "give a number")
     return value
 
 
-def _whole(value: Any) -> Any:
+def _whole(value: object) -> object:
     # JSON does not tell 8 from 8.0
     return int(value) if isinstance(value, float) and value.is_integer() else _not_a_flag(value)
 
@@ -83,7 +84,7 @@ NonNegative = Annotated[Number, Field(ge=0)]
 
 
 def _of_length(count: int, names: str) -> BeforeValidator:
-    def check(value: Any) -> Any:
+    def check(value: object) -> object:
         if not isinstance(value, (list, tuple)) or len(value) != count:
             raise invalid(f"expected {count} numbers {names}, got {kind_of(value)}", f"give {names}")
         return value
@@ -118,7 +119,7 @@ class NormalMap(Part):
     """Image beside the scene."""
 
 
-def _kind_of_value(value: Any) -> str | None:
+def _kind_of_value(value: object) -> str | None:
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):
