@@ -20,7 +20,9 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.energy import bake, comparison, monte_carlo, quadrature, walk
+from gonio.energy.albedo import monte_carlo, quadrature, walk
+from gonio.energy.compensation import comparison
+from gonio.energy.tables import bake
 from gonio.ops import backend
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -135,7 +137,7 @@ def tables() -> None:
             seconds = best(lambda ndf=ndf, masking=masking: bake.bake(ndf, ["E"], masking=masking), 3)
             figure(f"{name} seconds, warm, with its own error estimate", seconds, 1.0, ".2f")
     start = time.perf_counter()
-    subprocess.run([sys.executable, "-c", "from gonio.energy.bake import bake; bake('ggx', ['E'])"], check=True)
+    subprocess.run([sys.executable, "-c", "from gonio.energy.tables.bake import bake; bake('ggx', ['E'])"], check=True)
     figure("seconds of the first table in a fresh process, imports included", time.perf_counter() - start, 4.0, ".2f")
 
 

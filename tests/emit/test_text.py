@@ -15,7 +15,7 @@ import pytest
 from gonio import cli, models, ops
 from gonio.emit import DIALECTS, bundle
 from gonio.emit.dialect import literal, pixels
-from gonio.energy import curves
+from gonio.energy.compensation import curves
 from gonio.ops import Table, lookup
 from variants import COMPENSATED, EVERY, FEW, GOLD
 

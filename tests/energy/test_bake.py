@@ -8,10 +8,10 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio.energy import bake as baking
-from gonio.energy import baked as baked_files
-from gonio.energy import quadrature
-from gonio.energy.axes import Axes
+from gonio.energy.albedo import quadrature
+from gonio.energy.tables import bake as baking
+from gonio.energy.tables import baked as baked_files
+from gonio.energy.tables.axes import Axes
 from gonio.render import tables
 
 REFERENCE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "kulla-conty"

@@ -5,7 +5,9 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
-from gonio.energy import bake, cache, curves
+from gonio.energy import cache
+from gonio.energy.compensation import curves
+from gonio.energy.tables import bake
 
 
 @pytest.fixture(autouse=True)

@@ -6,8 +6,9 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.energy import curves, quadrature, walk
-from gonio.models.base import converter
+from gonio.energy import bend
+from gonio.energy.albedo import quadrature, walk
+from gonio.energy.compensation import curves
 from gonio.ops import backend
 
 MU = np.array([0.05, 0.1, 0.2, 0.4, 0.7, 1.0])
@@ -138,9 +139,9 @@ def test_the_polynomials_meet_the_quadrature():
         ("ggx", "schlick-direct", 1e-4),
     ):
         rows = np.array(ops.lookup(curves.isotropic(ndf, masking), ops.inset(roughness, curves.ROWS))).T
-        form = curves.form_of(ndf, masking)
-        bend = curves.numpy_knee(form, masking, roughness**2)
-        ours = curves.evaluate(form, rows[:, :-1], bend, np.broadcast_to(mu, (37, 60)))
+        form = bend.form_of(ndf, masking)
+        knee = bend.numpy_knee(form, masking, roughness**2)
+        ours = curves.evaluate(form, rows[:, :-1], knee, np.broadcast_to(mu, (37, 60)))
         exact = 1.0 - quadrature.moments(ndf, masking, mu, roughness[:, None] ** 2).whole
         assert np.abs(ours - exact).max() < bar
 
@@ -153,17 +154,17 @@ def test_what_is_missing_keeps_its_digits_in_float32(ndf, masking):
     for precision in ("float64", "float32"):
         kind = ops.backend.types(precision)
         alpha = ops.sqr(kind.float(roughness))
-        form = curves.form_of(ndf, masking)
+        form = bend.form_of(ndf, masking)
         rows = ops.lookup(curves.isotropic(ndf, masking), ops.inset(kind.float(roughness), curves.ROWS))
-        found.append(np.array(curves.missing(form, rows, curves.knee(form, masking, alpha), kind.float(mu))))
+        found.append(np.array(curves.missing(form, rows, bend.knee(form, masking, alpha), kind.float(mu))))
     assert found[0].min() >= 0.0 and found[0][found[0] > 0].min() < 1e-5
     # and it is what the fit was made for, down to grazing
     grazing = np.append(mu[:200], [0.0, 1e-7, 1e-5, 1e-3, 1.0])
     rows = curves.isotropic(ndf, masking).values[(curves.ROWS - 1) // 2]
-    bend = curves.numpy_knee(form, masking, np.array([0.25]))
-    told = curves.evaluate(form, rows[None, :-1], bend, grazing[None])[0]
+    knee = bend.numpy_knee(form, masking, np.array([0.25]))
+    told = curves.evaluate(form, rows[None, :-1], knee, grazing[None])[0]
     kind = ops.backend.types("float64")
-    ours = curves.missing(form, [kind.float(c) for c in rows], kind.float(bend), kind.float(grazing))
+    ours = curves.missing(form, [kind.float(c) for c in rows], kind.float(knee), kind.float(grazing))
     assert np.array(ours) == pytest.approx(told, rel=1e-9, abs=1e-12)
     some = found[0] > 1e-12
     # 10 times the relative change of z / r, which near the normal is that of 1 - mu
@@ -210,7 +211,7 @@ def test_the_walks_eval_has_the_walks_albedo(base):
 def test_walkers_that_leave_at_once_are_the_single_scattering_of_glass(eta, mu):
     count = 400_000
     dr, kind = backend.drjit(), backend.types("float32")
-    bound = go.Dielectric(eta, 0.6).bind(converter(kind))
+    bound = go.Dielectric(eta, 0.6).bind(kind)
     wo = kind.vec3(float(np.sqrt(1.0 - mu * mu)), 0.0, mu) + dr.zeros(kind.float, count)
     rng = kind.module.PCG32(size=count, initstate=7)
     _, left = walk.walk(bound, wo, None, rng, bound.alpha, True)

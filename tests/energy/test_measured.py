@@ -8,8 +8,9 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.energy import quadrature
-from gonio.models.base import BSDF, Value, converter, spectrum
+from gonio.energy.albedo import quadrature
+from gonio.models import binding
+from gonio.models.base import BSDF, Value, spectrum
 from gonio.ops import RecordingError, backend
 
 MU = np.array([0.05, 0.1, 0.2, 0.4, 0.7, 0.95, 0.985, 0.996, 1.0])  # Oren-Nayar bends like sin(theta) at the normal
@@ -123,8 +124,7 @@ def test_its_gradient_is_that_of_differences():
     model = go.KullaConty(go.OrenNayar(0.8, 0.5))
 
     def value(sigma):
-        convert = converter(kind)
-        bound = model.bind(lambda p, v: sigma if p.name == "sigma" else convert(p, v))
+        bound = binding.bind(model, lambda p, v: sigma if p.name == "sigma" else p.bind(v, kind))
         return bound.eval(wo, wi).x
 
     sigma = kind.float(0.5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
-from gonio.energy import monte_carlo, quadrature
+from gonio.energy.albedo import monte_carlo, quadrature
 
 CENTRES = (np.arange(64) + 0.5) / 64
 MU, ROUGHNESS = np.meshgrid(CENTRES, CENTRES[CENTRES >= 0.1])

@@ -7,7 +7,7 @@ from itertools import pairwise
 import gonio as go
 import numpy as np
 import pytest
-from gonio.energy import quadrature
+from gonio.energy.albedo import quadrature
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
@@ -162,7 +162,7 @@ def test_split_sum_gives_the_albedo_of_schlicks_fresnel():
 
 @pytest.mark.parametrize(("mu", "alpha"), [(0.3, 0.4), (-0.3, 0.4), (-0.8, 0.1), (0.9, 0.7)])
 def test_glass_agrees_with_cubature_of_its_eval(mu, alpha):
-    from gonio.energy.albedo import _by_cubature
+    from gonio.energy.albedo.directional import _by_cubature
 
     glass = go.Dielectric(1.5, alpha)
     other = _by_cubature(glass, np.array([mu]), np.array([0.0]), 0)

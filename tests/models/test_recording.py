@@ -11,7 +11,6 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio.models.base import converter
 from gonio.ops import backend
 
 from materials import ALL, COMPENSATED, SMALL
@@ -31,7 +30,7 @@ def _fields(material: Any, path: str) -> np.ndarray:
 def _both(material: go.BSDF, method: str, mode: str, wo: np.ndarray, other: np.ndarray) -> tuple[tuple, tuple]:
     """(by the graph in NumPy, by Dr.Jit), each a tuple of arrays with one row a ray."""
     graph = material.record(method, mode)
-    bound = material.bind(converter(backend.types("float64")))
+    bound = material.bind(backend.types("float64"))
     values = {n.replace(".", "_"): _fields(bound, n) for n in graph.entry.parameters if n.startswith("self")}
     recorded = graph.evaluate(wo=wo.T, **{"u" if method == "sample" else "wi": other.T}, **values)
     args = (mode,) if method != "pdf" else ()

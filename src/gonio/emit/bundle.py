@@ -6,7 +6,7 @@ import inspect
 import json
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import files
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, notation
+from ..models import BSDF, notation, tree
 from ..ops import graph
 from . import program as programs
 from .dialect import Dialect, axes, literal, pixels, reader, width
@@ -171,15 +171,12 @@ def _arguments(made: Program, method: str, dialect: Dialect) -> list[str]:
     return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
 
 
-def _choices(model: Any, path: str = "") -> list[tuple[str, Any]]:
-    found = []
-    for name, parameter in model.parameters().items():
-        value = getattr(model, name)
-        if parameter.kind == "bsdf":
-            found += [(f"{path}{name}", type(value).__name__), *_choices(value, f"{path}{name}.")]
-        elif parameter.kind in ("choice", "flag"):
-            found.append((f"{path}{name}", value))
-    return found
+def _choices(model: BSDF) -> list[tuple[str, Any]]:
+    """(path, value) of what shapes the code: materials by their class, choices and flags."""
+    return [
+        *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
+        *((leaf.path, leaf.value) for leaf in tree.leaves(model) if not leaf.parameter.numeric),
+    ]
 
 
 def _structs(made: Program, writer: Writer) -> list[Record]:
@@ -295,15 +292,10 @@ def _term_doc(name: str) -> str:
     return TERMS.get(name, "")
 
 
-def _parameters(model: Any, fields: set[str], path: str = "") -> Any:
-    for name, parameter in model.parameters().items():
-        value = getattr(model, name)
-        here = f"{path}{name}"
-        if parameter.kind == "bsdf":
-            yield from _parameters(value, fields, f"{here}.")
-            continue
+def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Any]]:
+    for path, parameter, value, _ in tree.leaves(model):
         yield {
-            "path": here,
+            "path": path,
             "kind": parameter.kind,
             "value": _plain(value),
             "default": None if parameter.required else _plain(parameter.default),
@@ -311,9 +303,9 @@ def _parameters(model: Any, fields: set[str], path: str = "") -> Any:
             "high": None if parameter.high == np.inf else parameter.high,
             "unit": parameter.unit,
             "doc": parameter.doc,
-            "symbol": SYMBOLS.get(name, name),
+            "symbol": SYMBOLS.get(parameter.name, parameter.name),
             "choices": parameter.choices,
-            "field": programs.flat(here) if here in fields else None,
+            "field": programs.flat(path) if path in fields else None,
         }
 
 
@@ -324,15 +316,12 @@ def _plain(value: Any) -> Any:
     return float(array) if array.ndim == 0 else array.tolist()
 
 
-def _numbers(model: Any, path: str = "") -> Any:
+def _numbers(model: BSDF) -> Iterator[tuple[str, Any]]:
     """(path, value as its field holds it) of each numeric parameter."""
-    for name, parameter in model.parameters().items():
-        value = getattr(model, name)
-        if parameter.kind == "bsdf":
-            yield from _numbers(value, f"{path}{name}.")
-        elif parameter.numeric and value is not None:
+    for path, parameter, value, owner in tree.leaves(model):
+        if parameter.numeric and value is not None:
             array = np.asarray(value, dtype=float)
-            where = f"emit: {type(model).__name__}.{name}"
+            where = f"emit: {type(owner).__name__}.{parameter.name}"
             widest = {"spectrum": 3, "alpha": 2}.get(parameter.kind, 1)
             if array.ndim > 1 or array.size not in (1, widest) or (array.ndim == 1 and widest == 1):
                 what = "one value a ray given, one value expected"
@@ -347,4 +336,4 @@ def _numbers(model: Any, path: str = "") -> Any:
                 array = np.broadcast_to(array, (2,))
             elif parameter.kind == "angle":
                 array = np.array([np.cos(array), np.sin(array)])
-            yield f"{path}{name}", array.tolist()
+            yield path, array.tolist()

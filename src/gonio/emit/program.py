@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import ops
 from ..errors import InputError, did_you_mean
-from ..models import BSDF
+from ..models import BSDF, binding, recording, tree
 from ..ops import graph
 from ..ops.table import Table
 from .polyfills import POLYFILLS
@@ -44,7 +44,7 @@ class Program:
 
     def __init__(self, model: BSDF, functions: tuple[str, ...]) -> None:
         self.model = model
-        self.bound = model.symbols()
+        self.bound = recording.symbols(model)
         recorded = _record(self.bound, functions)
         found = routines(recorded)
         self.driver = found.pop()
@@ -112,7 +112,7 @@ class Program:
             del self.entries["derive"]
             self.routines.remove(derive)
             return
-        kept = dict(derive.results)
+        kept = {place(f"derived.{path}")[1]: value for path, value in derive.results}
         derive.results = [(path, kept[path]) for path in struct.paths]
         derive.used = {derive.parameters.index(v) for v in derive.values() if v.op == "parameter"}
         derive.record, derive.single = struct.record, False
@@ -168,7 +168,7 @@ class Program:
 def _record(bound: Any, functions: tuple[str, ...]) -> graph.Graph:
     def every(self: Any, wo: Any, wi: Any, u: Any) -> Any:
         """The driver of a recording; no part of the shader."""
-        if any(True for _ in _deriving(self)):
+        if any(inner.derives for _, inner in tree.walk(self)):
             self = settle(self, derive(self))
         results = []
         for method in functions:
@@ -185,41 +185,15 @@ def derive(self: Any) -> Any:
     return _derive(self)
 
 
-def _derive(material: Any) -> dict[str, Any]:
-    found = dict(material.derive()) if _derives(material) else {}
-    for name, inner in _inner(material):
-        below = _derive(inner)
-        if below:
-            found[name] = below
-    return found
+def _derive(material: BSDF) -> dict[str, Any]:
+    """What every material of the tree derives, by its path."""
+    return {path: inner.derive() for path, inner in tree.walk(material) if inner.derives}
 
 
-def settle(material: Any, found: dict[str, Any]) -> Any:
-    """A copy of a bound material that holds what `derive` found."""
-    clone = object.__new__(type(material))
-    clone.__dict__.update(material.__dict__)
-    names = [name for name, _ in _inner(material)]
-    if _derives(material):
-        clone.__dict__[graph.SETTLED] = {key: value for key, value in found.items() if key not in names}
-    for name in names:
-        if name in found:
-            clone.__dict__[name] = settle(getattr(material, name), found[name])
-    return clone
-
-
-def _derives(material: Any) -> bool:
-    return type(material).derive is not BSDF.derive
-
-
-def _inner(material: Any) -> list[tuple[str, Any]]:
-    return [(n, getattr(material, n)) for n, p in material.parameters().items() if p.kind == "bsdf"]
-
-
-def _deriving(material: Any) -> Any:
-    if _derives(material):
-        yield material
-    for _, inner in _inner(material):
-        yield from _deriving(inner)
+def settle(material: BSDF, derived: dict[str, Any], path: str = "") -> BSDF:
+    """A copy of a bound material whose tree holds what `derive` gave."""
+    below = {name: settle(inner, derived, tree.join(path, name)) for name, inner in tree.children(material).items()}
+    return binding.bound_copy(material, below, derived.get(path))
 
 
 # ---------------------------------------------------------------------- paths
@@ -229,8 +203,8 @@ def place(path: str) -> tuple[str, str, bool]:
     """(root argument, path below it, whether it is a derived value) of a parameter of a recording."""
     root, _, rest = path.partition(".")
     parts = rest.split(".") if rest else []
-    derived = graph.SETTLED in parts
-    return root, ".".join(part for part in parts if part != graph.SETTLED), derived
+    derived = binding.DERIVED in parts
+    return root, ".".join(part for part in parts if part not in (binding.DERIVED, "")), derived
 
 
 def flat(path: str) -> str:
@@ -258,17 +232,14 @@ def _result_name(path: str, value: Value) -> str:
     return value.name.rpartition(".")[2] or f"value_{path}"
 
 
-def parameter_docs(model: Any, path: str = "") -> Iterator[tuple[str, str]]:
+def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:
     """(field, what it is, with unit and range) of a model's numeric parameters."""
-    for name, parameter in model.parameters().items():
-        here = f"{path}{name}"
-        if parameter.kind == "bsdf":
-            yield from parameter_docs(getattr(model, name), f"{here}.")
-        elif parameter.numeric:
+    for path, parameter, _, _ in tree.leaves(model):
+        if parameter.numeric:
             doc = parameter.doc.partition(";")[0] if parameter.kind == "alpha" else parameter.doc
             form = {"alpha": "along x, along y", "angle": "as (cos, sin)"}.get(parameter.kind, parameter.unit)
             range_ = parameter.range if parameter.range != "any number" else ""
-            yield flat(here), "; ".join(part for part in (doc, form, range_) if part)
+            yield flat(path), "; ".join(part for part in (doc, form, range_) if part)
 
 
 def listed(doc: str) -> Iterator[tuple[str, str]]:
@@ -317,7 +288,7 @@ def check(model: Any, functions: Any, where: str) -> tuple[str, ...]:
     if random is not None:
         what = f"{type(random).__name__} is estimated by random walks and cannot be written as shader code"
         raise InputError(what, where, "KullaConty is its closed form")
-    found = tuple(name for name in asked if name != "terms" or hasattr(model, "terms"))
+    found = tuple(name for name in asked if name != "terms" or model.has_terms)
     if not found:
         raise InputError(f"{type(model).__name__} has no terms D, G, F", where, "name eval, pdf or sample")
     return found
@@ -326,8 +297,6 @@ def check(model: Any, functions: Any, where: str) -> tuple[str, ...]:
 _KNOWN = "known: " + ", ".join(FUNCTIONS)
 
 
-def stochastic(model: Any) -> Any:
+def stochastic(model: BSDF) -> BSDF | None:
     """The material, this or one inside, whose values are random numbers; else None."""
-    if model.stochastic:
-        return model
-    return next((found for _, inner in _inner(model) if (found := stochastic(inner)) is not None), None)
+    return next((inner for _, inner in tree.walk(model) if inner.stochastic), None)

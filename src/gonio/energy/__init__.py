@@ -3,6 +3,6 @@
 Everything here stands on top of any base material; scenes are unknown in this room.
 """
 
-from .albedo import Albedo, albedo
+from .albedo.directional import Albedo, albedo
 
 __all__ = ["Albedo", "albedo"]

@@ -1,37 +1,59 @@
-"""The materials, one file each. A new one is one new file in this folder: discovery finds it.
+"""The materials, one file each. A new one is one new file in this folder, an entry point of a package, or a class that
+is registered: `gonio.members`.
 
-Materials that stand on a later room (compensation on `energy`) live in that room's folder `materials`, and are found
-there.
+Materials that stand on a later room (compensation, on `energy`) live in that room's folder `materials`.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-from functools import lru_cache
-from pathlib import Path
-
 from .._callable import make_callable
 from ..errors import InputError, did_you_mean
-from .base import BSDF, Parameter, Sample
+from .bsdf import BSDF, Breach, Microsurface, Preset, never
+from .calling import method
+from .parameters import (
+    Angle,
+    Colour,
+    Number,
+    Parameter,
+    Width,
+    angle,
+    bsdf,
+    choice,
+    flag,
+    number,
+    spectrum,
+    width,
+)
+from .sample import Sample
 
-__all__ = ["BSDF", "Parameter", "Sample", "model", "models"]
+__all__ = [
+    "BSDF",
+    "Angle",
+    "Breach",
+    "Colour",
+    "Microsurface",
+    "Number",
+    "Parameter",
+    "Preset",
+    "Sample",
+    "Width",
+    "angle",
+    "bsdf",
+    "choice",
+    "flag",
+    "method",
+    "model",
+    "models",
+    "never",
+    "number",
+    "spectrum",
+    "width",
+]
 
 
-@lru_cache
 def models() -> dict[str, type[BSDF]]:
     """Every material class by name, in alphabetical order."""
-    found: dict[str, type[BSDF]] = {}
-    package = Path(__path__[0]).parent
-    rooms = [Path(__path__[0]), *sorted(package.glob("*/materials"))]
-    for room in rooms:
-        name = ".".join([package.name, *room.relative_to(package).parts])
-        for module in pkgutil.iter_modules([str(room)]):
-            members = vars(importlib.import_module(f"{name}.{module.name}"))
-            for member in members.values():
-                if isinstance(member, type) and issubclass(member, BSDF) and member.name:
-                    found[member.name] = member
-    return dict(sorted(found.items()))
+    return BSDF.family.all()
 
 
 def model(name: str) -> type[BSDF]:

@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
+from ..ops import (
+    Direction,
+    Mask,
+    Mode,
+    Pair,
+    Scalar,
+    Spectrum,
+    abs,
+    backend,
+    dot,
+    fma,
+    function,
+    maximum,
+    rsqrt,
+    safe_div,
+    sqr,
+    where,
+)
 from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet
-from .base import BSDF, Sample, Value, angle, choice, flag, number, spectrum, width
+from .bsdf import Delta, InnerAlbedo, Preset
+from .calling import method
+from .microfacet import Terms
+from .parameters import Angle, Colour, Number, Width, flag, number
+from .sample import Sample
 
 
 class _Facet(NamedTuple):
@@ -25,18 +48,18 @@ class _Facet(NamedTuple):
     spread        |o.m| dm/dwi (Walter2007, eq. 14), in refraction (eq. 17) over eta^2
     """
 
-    wo: Any
-    wi: Any
-    m: Any
-    dot_o: Any
-    dot_i: Any
-    reflects: Any
-    lit: Any
-    alpha: Any
-    spread: Any
+    wo: Direction
+    wi: Direction
+    m: Direction
+    dot_o: Scalar
+    dot_i: Scalar
+    reflects: Mask
+    lit: Mask
+    alpha: Pair
+    spread: Scalar
 
 
-class Dielectric(BSDF):
+class Dielectric(microfacet._Microfacet):
     """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
 
     With eta = eta_i / eta_o (indices on the wi and wo sides) and the facet's normal m along +-(wo + eta wi):
@@ -45,42 +68,40 @@ class Dielectric(BSDF):
     eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
     """
 
-    eta: Value = number(default=1.5, doc="index inside over index outside", low=0.2, high=5.0)
-    alpha: Value = width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
-    rotation: Value = angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
-    ndf: str = choice(default="ggx", doc="distribution of microfacet normals", choices=microfacet.NDFS)
-    masking: str = choice(default="smith-correlated", doc="masking and shadowing", choices=microfacet.MASKINGS)
-    fresnel: str = choice(default="exact", doc="Fresnel reflectance", choices=microfacet.FRESNELS)
-    albedo: Value = spectrum(
-        default=1.0, doc="factor on everything reflected or transmitted", low=0.0, high=1.0, soft_high=True
-    )
+    eta: Number = number(default=1.5, doc="index inside over index outside", low=0.2, high=5.0)
+    alpha: Width = microfacet.alpha_width()
+    rotation: Angle = microfacet.rotation_angle()
+    ndf: str = microfacet.ndf_choice()
+    masking: str = microfacet.masking_choice()
+    fresnel: str = microfacet.fresnel_choice()
+    albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
     transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
-    sampling: str = choice(default="visible", doc="which normals are sampled", choices=microfacet.SAMPLINGS)
+    sampling: str = microfacet.sampling_choice()
 
     @classmethod
-    def preset(cls, name: str, **parameters: Any) -> Dielectric:
-        """A medium by name: Dielectric.preset("water", alpha=0). InputError where it is unknown."""
-        return cls(eta=indices.medium(name).eta, **parameters)
+    def presets(cls) -> Mapping[str, Preset]:
+        """Transparent media by name: eta."""
+        return {name: Preset(m.name, {"eta": m.eta}, m.source) for name, m in indices.MEDIA.items()}
 
     @function
-    def reflectance(self, cos_o: Any, cos_t: Any, eta: Any) -> Any:
+    def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
         """F by name at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
         return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
-    def _relative_eta(self, wo: Any) -> Any:
+    def _relative_eta(self, wo: Direction) -> Scalar:
         """Index on the far side over index on wo's side."""
         return where(wo.z >= 0.0, self.eta, 1.0 / self.eta)
 
     @function
-    def _normal(self, wo: Any, wi: Any, eta: Any) -> Any:
+    def _normal(self, wo: Direction, wi: Direction, eta: Scalar) -> Direction:
         """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
         h = fma(wi, ratio, wo)
         h = h * rsqrt(maximum(dot(h, h), frame.TINY))
         return where(h.z < 0.0, -h, h)
 
-    def _facet(self, wo: Any, wi: Any, eta: Any) -> _Facet:
+    def _facet(self, wo: Direction, wi: Direction, eta: Scalar) -> _Facet:
         """The facet that joins a pair of directions, along the axes of the anisotropy; turned last, see `Conductor`."""
         m = self._normal(wo, wi, eta)
         wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
@@ -98,14 +119,14 @@ class Dielectric(BSDF):
             lit = lit & reflects
         return _Facet(wo, wi, m, dot_o, dot_i, reflects, lit, alpha, spread)
 
-    def _reflectance_at(self, facet: _Facet, eta: Any) -> Any:
+    def _reflectance_at(self, facet: _Facet, eta: Scalar) -> Scalar:
         """F of the facet."""
         cos_o = abs(facet.dot_o)
         # the far direction of a refraction is known: Snell's root would lose its cosine near the critical angle
         cos_t = where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), abs(facet.dot_i))
         return self.reflectance(cos_o, cos_t, eta)
 
-    def _masking(self, facet: _Facet) -> Any:
+    def _masking(self, facet: _Facet) -> Scalar:
         """G of the facet."""
         pair = self.masking, distribution(self.ndf), facet.wo, facet.wi, facet.m, facet.alpha
         g = masking.masking_shadowing(*pair)
@@ -113,25 +134,26 @@ class Dielectric(BSDF):
             g = where(facet.reflects, g, masking.masking_shadowing(*pair, transmits=True))
         return g
 
-    def _value(self, facet: _Facet) -> Any:
+    def _value(self, facet: _Facet) -> Scalar:
         """Radiance's eval without albedo and F."""
         facets = safe_div(distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet), abs(facet.wo.z))
         return where(facet.lit, facets * facet.spread, 0.0)
 
-    def _density(self, facet: _Facet, eta: Any) -> Any:
+    def _density(self, facet: _Facet, eta: Scalar) -> Scalar:
         """The pdf without the probability of the lobe: density of the normal times dm/dwi."""
         density = microfacet.pdf_per_cosine(self, facet.wo, facet.m, facet.alpha)
         return where(facet.lit, density * facet.spread * self._squeeze(facet.reflects, eta), 0.0)
 
-    def _squeeze(self, reflects: Any, eta: Any) -> Any:
+    def _squeeze(self, reflects: Mask, eta: Scalar) -> Scalar:
         """eta^2 for refraction: by how much solid angle shrinks on its way in, and radiance grows."""
         return where(reflects, 1.0, sqr(eta))
 
-    def _share(self, f: Any) -> Any:
+    def _share(self, f: Scalar) -> Scalar:
         """Probability of choosing reflection."""
         return f if self.transmission else 1.0 + 0.0 * f
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The sum of both lobes times |cos theta_i|; 0 where alpha makes them deltas."""
         eta = self._relative_eta(wo)
         facet = self._facet(wo, wi, eta)
@@ -140,14 +162,16 @@ class Dielectric(BSDF):
         # the eta^2 of the Jacobian cancels for radiance
         return self.albedo * (value * self._squeeze(facet.reflects, eta) if mode == "importance" else value)
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Probability of the lobe, times the density of the normal, times dm/dwi."""
         eta = self._relative_eta(wo)
         facet = self._facet(wo, wi, eta)
         share = self._share(self._reflectance_at(facet, eta))
         return self._density(facet, eta) * where(facet.reflects, share, 1.0 - share)
 
-    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
         """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
         turned = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
@@ -175,17 +199,18 @@ class Dielectric(BSDF):
         weight = safe_div(value, density)
         if not self.transmission:  # else F cancels against the probability of the lobe
             weight = weight * self._reflectance_at(facet, eta)
-        weight = self.albedo * where(pdf > 0.0, weight, 0.0)
-        return Sample(wi, weight, pdf, smooth & right_side, where(reflects, 1.0, eta))
+        tinted = self.albedo * where(pdf > 0.0, weight, 0.0)
+        return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
 
-    def terms(self, wo: Any, wi: Any) -> microfacet.Terms:
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Terms:
         """D, G and F of the pair, at the normal that reflects or refracts wo into wi."""
         eta = self._relative_eta(wo)
         facet = self._facet(wo, wi, eta)
         f = self.albedo * self._reflectance_at(facet, eta)
-        return microfacet.Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
+        return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
-    def _widths(self) -> tuple[Any, Any]:
+    def _widths(self) -> tuple[Pair, Mask]:
         """Widths, and whether the surface is smooth; where both indices are equal light goes straight on."""
         alpha, smooth = microfacet.widths(self.alpha)
         if self.transmission:
@@ -197,14 +222,44 @@ class Dielectric(BSDF):
         return self.transmission
 
     @property
-    def delta(self) -> str:
-        if self.transmission and not backend.is_drjit(self.eta):
-            matched = np.abs(np.asarray(self.eta, dtype=float) - 1.0) < MATCHED
+    def delta(self) -> Delta:
+        eta = self.plain.eta
+        if backend.is_drjit(eta):
+            return "maybe"
+        if self.transmission:
+            matched = np.abs(np.asarray(eta, dtype=float) - 1.0) < MATCHED
             if np.all(matched):
                 return "always"
             if np.any(matched):
                 return "maybe"
-        return microfacet.delta(self.alpha) if not backend.is_drjit(self.eta) else "maybe"
+        return microfacet.delta_of(self.plain.alpha)
+
+    def _index(self) -> Scalar:
+        return self.eta
+
+    def normal_reflectance(self) -> Spectrum:
+        """F at normal incidence, times the albedo."""
+        one = 1.0 + 0.0 * self.eta
+        return self.reflectance(one, one, self.eta) * self.albedo
+
+    def mean_reflectance(self, average: str = "exact") -> Scalar:
+        """From the side of the less dense medium."""
+        return fresnel.kind(self.fresnel).dielectric_average(self.eta)
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """Of smooth glass, which keeps nothing; without transmission, F."""
+        if self.delta != "always":
+            return None
+        albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))
+        if self.transmission:
+            return np.array(albedo)
+        types = backend.types("float64")
+        bound, cos = self.bind(types), types.float(np.abs(mu))
+        eta = where(types.float(mu) >= 0.0, bound.eta, 1.0 / bound.eta)
+        f = bound.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
+        return albedo * backend.to_numpy(f, len(mu))[:, None]
 
 
 # Refraction turns light by about (eta - 1) tan: below this difference of indices that is lost in the rounding of a

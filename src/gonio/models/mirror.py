@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
-from typing import Any
+import numpy as np
+from numpy.typing import NDArray
 
-from ..ops import where
+from ..ops import Direction, Mode, Scalar, Spectrum, where
 from ..optics import frame
-from .base import BSDF, Sample, Value, spectrum
+from .bsdf import BSDF, Delta, InnerAlbedo
+from .calling import method
+from .parameters import Colour, spectrum
+from .sample import Sample
 
 
 class Mirror(BSDF):
     """Ideal reflection: all light leaves at theta_o = theta_i, phi_o = phi_i + pi: a delta lobe (course notes, B)."""
 
-    albedo: Value = spectrum(default=1.0, doc="share of light that is reflected", low=0.0, high=1.0, soft_high=True)
+    albedo: Colour = spectrum(default=1.0, doc="share of light that is reflected", low=0.0, high=1.0, soft_high=True)
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """0: a delta lobe has no finite value."""
         return self.albedo * (0.0 * wo.z)
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """0: a delta lobe has no density."""
         return 0.0 * wo.z
 
-    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
         """wo mirrored at the normal."""
         above = wo.z > 0.0
         one = where(above, 1.0 + 0.0 * wo.z, 0.0)
         return Sample(frame.mirror(wo), self.albedo * one, one, above, 1.0 + 0.0 * wo.z)
 
     @property
-    def delta(self) -> str:
+    def delta(self) -> Delta:
         return "always"
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64]:
+        """albedo, from above."""
+        return np.where(mu > 0.0, 1.0, 0.0)[:, None] * np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+import numpy as np
+from numpy.typing import NDArray
 
-from ..ops import safe_div, vec3, where
-from .base import BSDF, Sample, Value, bsdf, number
+from ..ops import Direction, Mode, Scalar, Spectrum, safe_div, vec3, where
+from .bsdf import BSDF, Delta, InnerAlbedo
+from .calling import method
+from .parameters import Number, bsdf, number
+from .sample import Sample
 
 
 class Mix(BSDF):
@@ -13,17 +17,20 @@ class Mix(BSDF):
 
     a: BSDF = bsdf("the material at weight 0")
     b: BSDF = bsdf("the material at weight 1")
-    weight: Value = number(default=0.5, doc="share of b", low=0.0, high=1.0)
+    weight: Number = number(default=0.5, doc="share of b", low=0.0, high=1.0)
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """(1 - weight) a + weight b."""
         return self.a.eval(wo, wi, mode) * (1.0 - self.weight) + self.b.eval(wo, wi, mode) * self.weight
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Mixture of the two densities."""
         return self.a.pdf(wo, wi) * (1.0 - self.weight) + self.b.pdf(wo, wi) * self.weight
 
-    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
         """u1 picks a material and is stretched to serve it again; a density sample is weighed against both."""
         w = self.weight
         pick_b = u.x < w
@@ -40,7 +47,7 @@ class Mix(BSDF):
         delta_weight = where(pick_b, sb.weight, sa.weight)
         return Sample(wi, where(delta, delta_weight, density_weight), pdf, delta, where(pick_b, sb.eta, sa.eta))
 
-    def tint(self, wo: Any) -> Any:
+    def tint(self, wo: Direction) -> Spectrum:
         """The average of both."""
         return self.a.tint(wo) * (1.0 - self.weight) + self.b.tint(wo) * self.weight
 
@@ -49,13 +56,28 @@ class Mix(BSDF):
         return self.a.transmits or self.b.transmits
 
     @property
-    def delta(self) -> str:
+    def delta(self) -> Delta:
         return self.a.delta if self.a.delta == self.b.delta else "maybe"
 
     @property
-    def ambient(self) -> Any:
-        """Factor of the scene's ambient light."""
-        return getattr(self.a, "ambient", 0.0) * (1.0 - self.weight) + getattr(self.b, "ambient", 0.0) * self.weight
+    def two_sided(self) -> bool:
+        return self.a.two_sided or self.b.two_sided
+
+    @property
+    def ambient(self) -> Spectrum | None:
+        """The average of both."""
+        a, b = self.a.ambient, self.b.ambient
+        if a is None:
+            return None if b is None else b * self.weight
+        return a * (1.0 - self.weight) if b is None else a * (1.0 - self.weight) + b * self.weight
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """The average of both."""
+        a, b = inner(self.a, mu, phi), inner(self.b, mu, phi)
+        weight = float(self.weight)  # type: ignore[arg-type]
+        return None if a is None or b is None else a * (1.0 - weight) + b * weight
 
 
 ALMOST_ONE = 0.99999994  # the largest float32 under 1

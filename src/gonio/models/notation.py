@@ -19,7 +19,8 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from . import model
-from .base import BSDF, Parameter
+from .bsdf import BSDF
+from .parameters import Parameter
 
 _CALL = re.compile(r"\s*([\w-]+)\s*(?:\((.*)\))?\s*", re.DOTALL)
 
@@ -48,22 +49,22 @@ def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any
     known = cls.parameters()
     values: dict[str, Any] = {}
     preset = "" if "preset" in known else given.get("preset", "")
-    if preset and not hasattr(cls, "preset"):
+    if preset and not cls.presets():
         raise InputError(f"{cls.name} has no presets", "--preset", "give its parameters by --param")
     for name, value in given.items():
         if name in known:
             values[name] = typed(known[name], value)
         elif name != "preset":
-            hint = did_you_mean(name, [*known, *(["preset"] if hasattr(cls, "preset") else [])])
+            hint = did_you_mean(name, [*known, *(["preset"] if cls.presets() else [])])
             raise InputError(f"{cls.name} has no parameter '{name}'", f"--param {name}", hint)
     for name, parameter in known.items():
-        if parameter.kind == "bsdf" and parameter.required and name not in values:
+        if parameter.inner and parameter.required and name not in values:
             values[name] = model("lambert")() if name == "a" else model("conductor")(alpha=0.3)  # type: ignore[call-arg]
     if preset:
-        return cls.preset(preset, **values), {"preset": preset, **values}  # type: ignore[attr-defined]
+        return cls.preset(preset, **values), {"preset": preset, **values}
     missing = [name for name, parameter in known.items() if parameter.required and name not in values]
     if missing:
-        hint = "give --preset, such as Au, or " if hasattr(cls, "preset") else "give "
+        hint = "give --preset, such as Au, or " if cls.presets() else "give "
         hint += " ".join(f"--param {name}=..." for name in missing)
         raise InputError(f"{cls.name} needs {', '.join(missing)}", "--param", hint)
     try:
@@ -77,7 +78,7 @@ def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any
 def typed(parameter: Parameter, value: Any) -> Any:
     """A parameter's value from text, or from what JSON has for it."""
     where = f"--param {parameter.name}"
-    if parameter.kind == "bsdf":
+    if parameter.inner:
         return _inner(value, where)
     if parameter.kind == "choice":
         return value.strip().strip('"') if isinstance(value, str) else value

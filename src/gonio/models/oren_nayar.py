@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
-from ..ops import function, inv_pi, maximum, sqr, where
-from .base import BSDF, Breach, Value, number, spectrum
+from ..ops import Direction, Mode, Scalar, Spectrum, function, inv_pi, maximum, sqr, where
+from .bsdf import BSDF, Breach
+from .calling import method
+from .parameters import Colour, Number, number, spectrum
 
 
 class OrenNayar(BSDF):
@@ -22,12 +25,12 @@ class OrenNayar(BSDF):
     albedo tends to albedo (A + B / 2), which is over 1 for albedo = 1 and sigma < 0.33.
     """
 
-    albedo: Value = spectrum(
+    albedo: Colour = spectrum(
         default=0.5, doc="share of light that a groove's side reflects", low=0.0, high=1.0, soft_high=True
     )
-    sigma: Value = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
+    sigma: Number = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
 
-    breaks: ClassVar[dict[str, Breach]] = {
+    breaks: ClassVar[Mapping[str, Breach]] = {
         "energy": Breach(
             "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
@@ -36,7 +39,7 @@ class OrenNayar(BSDF):
     }
 
     @function
-    def _shape(self, wo: Any, wi: Any) -> Any:
+    def _shape(self, wo: Direction, wi: Direction) -> Scalar:
         """A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)."""
         s2 = sqr(self.sigma)
         a = 1.0 - 0.5 * s2 / (s2 + 0.33)
@@ -45,12 +48,14 @@ class OrenNayar(BSDF):
         # both cosines vanish together only where the caller masks the result
         return a + b * tangential / maximum(maximum(wo.z, wi.z), 1e-7)
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """albedo / pi (A + B ...) cos theta_i above the surface."""
         above = (wo.z > 0.0) & (wi.z > 0.0)
         return self.albedo * where(above, self._shape(wo, wi) * wi.z * inv_pi, 0.0)
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """cos theta_i / pi above the surface: B's part is small and as smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 

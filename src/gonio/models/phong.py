@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
 from .. import ops
 from ..errors import InputError
-from ..ops import dot, function, inv_pi, mean, pow, vec3, where
+from ..ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, vec3, where
 from ..optics.frame import mirror
 from ..optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
-from .base import BSDF, Breach, Sample, Value, flag, never, number, spectrum
+from .bsdf import BSDF, Breach, never
+from .calling import method
+from .parameters import Colour, Number, flag, number, spectrum
+from .sample import Sample
 
 
 class _Empirical(BSDF):
@@ -21,13 +25,13 @@ class _Empirical(BSDF):
     grazing light. Shared by the two highlights.
     """
 
-    kd: Value = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
-    ks: Value = spectrum(default=0.3, doc="specular coefficient", low=0.0)
-    p: Value = number(default=32.0, doc="falloff of the highlight", low=0.0)
-    ka: Value = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
+    kd: Colour = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
+    ks: Colour = spectrum(default=0.3, doc="specular coefficient", low=0.0)
+    p: Number = number(default=32.0, doc="falloff of the highlight", low=0.0)
+    ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
 
-    breaks: ClassVar[dict[str, Breach]] = {
+    breaks: ClassVar[Mapping[str, Breach]] = {
         "reciprocity": Breach(
             "the specular term has no cosine, so f divides it by cos theta_i alone",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
@@ -49,43 +53,46 @@ class _Empirical(BSDF):
                     "change a coefficient, or leave check_sum out",
                 )
 
-    def _highlight_power(self) -> Any:
+    def _highlight_power(self) -> np.ndarray:
         """The most that int (highlight)^p dwi comes to."""
         raise NotImplementedError
 
-    def _highlight(self, wo: Any, wi: Any) -> Any:
+    def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
         """Base of the power, the cosine that peaks in the highlight."""
         raise NotImplementedError
 
-    def _peak(self, wo: Any, wi: Any) -> Any:
+    def _peak(self, wo: Direction, wi: Direction) -> Scalar:
         """(highlight)^p."""
         return pow(self._highlight(wo, wi), self.p)
 
-    def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
+    def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         raise NotImplementedError
 
-    def _highlight_sample(self, wo: Any, u1: Any, u2: Any) -> Any:
+    def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         raise NotImplementedError
 
     @function
-    def _specular_share(self, wo: Any) -> Any:
+    def _specular_share(self, wo: Direction) -> Scalar:
         """Probability of the specular lobe: its power against that of the diffuse lobe, ks 2 pi / (p + 1) : kd pi."""
         specular = mean(self.ks) * 2.0 / (self.p + 1.0)
         both = specular + mean(self.kd)
         return ops.safe_div(specular, both)
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """kd (n.l) + ks (highlight)^p for light and viewer above the surface (course sheet, eq. 1)."""
         above = (wo.z > 0.0) & (wi.z > 0.0)
         return self.kd * where(above, wi.z, 0.0) + self.ks * where(above, self._peak(wo, wi), 0.0)
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Mixture of the cosine and the highlight's lobe."""
         share = self._specular_share(wo)
         density = (1.0 - share) * wi.z * inv_pi + share * self._highlight_pdf(wo, wi)
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
 
-    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
         """u1 picks a lobe; a direction below the surface is a failed sample."""
         diffuse = square_to_cosine_hemisphere(u.y, u.z)
         specular = self._highlight_sample(wo, u.y, u.z)
@@ -94,13 +101,13 @@ class _Empirical(BSDF):
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
 
-    def tint(self, wo: Any) -> Any:
+    def tint(self, wo: Direction) -> Spectrum:
         """The diffuse part's colour."""
         return self.kd
 
     @property
-    def ambient(self) -> Any:
-        """Factor of the scene's ambient light."""
+    def ambient(self) -> Spectrum:
+        """ka."""
         return self.ka
 
 
@@ -112,28 +119,28 @@ class Phong(_Empirical):
     Neither reciprocal nor energy conserving.
     """
 
-    def _highlight_power(self) -> Any:
+    def _highlight_power(self) -> np.ndarray:
         """2 pi / (p + 1), met at normal incidence."""
         return 2.0 * np.pi / (np.asarray(self.p) + 1.0)
 
     @function
-    def _highlight(self, wo: Any, wi: Any) -> Any:
+    def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
         """v.r: cosine between the viewer and the mirrored light."""
         return dot(wo, mirror(wi))
 
     @function
-    def _highlight_pdf(self, wo: Any, wi: Any) -> Any:
+    def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of a cos^p lobe about the mirrored viewer, 1/sr."""
         return square_to_power_lobe_pdf(dot(mirror(wo), wi), self.p)
 
     @function
-    def _highlight_sample(self, wo: Any, u1: Any, u2: Any) -> Any:
+    def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """A direction of a cos^p lobe about the mirrored viewer."""
         return _around(mirror(wo), square_to_power_lobe(u1, u2, self.p))
 
 
 @function
-def _around(axis: Any, w: Any) -> Any:
+def _around(axis: Direction, w: Direction) -> Direction:
     """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
     side = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
     a = -1.0 / (side + axis.z)
@@ -141,6 +148,3 @@ def _around(axis: Any, w: Any) -> Any:
     s = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x)
     t = vec3(b, side + axis.y * axis.y * a, -axis.y)
     return s * w.x + t * w.y + axis * w.z
-
-
-__all__ = ["Phong"]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ops import function, vec3, where
-from .base import BSDF, Sample, bsdf
+from ..ops import Direction, Mode, Scalar, Spectrum, function, vec3, where
+from .bsdf import BSDF, Delta, InnerAlbedo
+from .calling import method
+from .parameters import bsdf
+from .sample import Sample
 
 
 class TwoSided(BSDF):
@@ -23,34 +27,47 @@ class TwoSided(BSDF):
                 "a transmitting material has two sides of its own",
             )
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The base's value, with both directions turned to wo's side."""
         return self.base.eval(_turned(wo, wo), _turned(wi, wo), mode)
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The base's density, likewise."""
         return self.base.pdf(_turned(wo, wo), _turned(wi, wo))
 
-    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
         """The base's sample, turned back."""
         s = self.base.sample(_turned(wo, wo), u, mode)
         return Sample(_turned(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
 
-    def tint(self, wo: Any) -> Any:
+    def tint(self, wo: Direction) -> Spectrum:
         """The base's."""
         return self.base.tint(_turned(wo, wo))
 
     @property
-    def delta(self) -> str:
+    def delta(self) -> Delta:
         return self.base.delta
 
     @property
-    def ambient(self) -> Any:
-        """Factor of the scene's ambient light."""
-        return getattr(self.base, "ambient", 0.0)
+    def two_sided(self) -> bool:
+        return True
+
+    @property
+    def ambient(self) -> Spectrum | None:
+        """The base's."""
+        return self.base.ambient
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """The base's."""
+        return inner(self.base, np.abs(mu), phi)
 
 
 @function
-def _turned(w: Any, wo: Any) -> Any:
+def _turned(w: Direction, wo: Direction) -> Direction:
     """w with its z mirrored where wo is below the surface."""
     return vec3(w.x, w.y, where(wo.z < 0.0, -w.z, w.z))

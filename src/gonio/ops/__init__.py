@@ -25,7 +25,7 @@ from .backend import (
 )
 from .graph import Graph, Node, RecordingError, record
 from .table import Table, inset, lookup
-from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Vector
+from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Vector, Vector3
 
 __all__ = [
     "Direction",
@@ -39,6 +39,8 @@ __all__ = [
     "Scalar",
     "Spectrum",
     "Table",
+    "Vector",
+    "Vector3",
     "abs",
     "atan2",
     "clamp",

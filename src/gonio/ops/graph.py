@@ -13,14 +13,13 @@ others. A spectrum has as many channels as whoever evaluates the graph gives it.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import inspect
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -260,18 +259,20 @@ def _flatten(value: Any, name: str) -> Iterator[tuple[str, Node]]:
     elif isinstance(value, dict):
         for key, item in value.items():
             yield from _flatten(item, f"{name}.{key}")
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        for field in _fields(value):
-            yield from _flatten(value.__dict__[field], f"{name}.{field}")
+    elif isinstance(value, Composite) and not isinstance(value, type):
+        for part, held in value.__parts__().items():
+            yield from _flatten(held, f"{name}.{part}")
 
 
-def _fields(value: Any) -> list[str]:
-    """The fields of an object that a recording follows: those declared, and what it keeps under `SETTLED`."""
-    names = [field.name for field in dataclasses.fields(value)]
-    return [*names, SETTLED] if value.__dict__.get(SETTLED) is not None else names
+@runtime_checkable
+class Composite(Protocol):
+    """An object that a recording follows into its parts: a material."""
 
+    def __parts__(self) -> Mapping[str, Any]:
+        """What may hold values, by name."""
 
-SETTLED = "_settled"  # where an object keeps what it has worked out from its fields, see `BSDF.settle`
+    def __with_parts__(self, parts: Mapping[str, Any]) -> Any:
+        """A copy with other parts."""
 
 
 def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
@@ -283,12 +284,8 @@ def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
         return type(value)(*items) if hasattr(value, "_fields") else type(value)(items)
     if isinstance(value, dict):
         return {key: _rebuild(item, replace) for key, item in value.items()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        clone = object.__new__(type(value))
-        clone.__dict__.update(value.__dict__)
-        for field in _fields(value):
-            clone.__dict__[field] = _rebuild(value.__dict__[field], replace)
-        return clone
+    if isinstance(value, Composite) and not isinstance(value, type):
+        return value.__with_parts__({name: _rebuild(part, replace) for name, part in value.__parts__().items()})
     return value
 
 
@@ -300,8 +297,8 @@ def _static_key(value: Any) -> Any:
         return tuple(_static_key(item) for item in value)
     if isinstance(value, dict):
         return tuple((key, _static_key(item)) for key, item in value.items())
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return (type(value), *(_static_key(value.__dict__[field]) for field in _fields(value)))
+    if isinstance(value, Composite) and not isinstance(value, type):
+        return (type(value), *((name, _static_key(part)) for name, part in value.__parts__().items()))
     try:
         hash(value)
     except TypeError:

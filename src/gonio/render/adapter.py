@@ -10,6 +10,7 @@ no nested call as in Mitsuba's own `twosided`) and, where the model has presets,
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from .. import ops
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, Parameter, Sample, models
+from ..models import BSDF, Parameter, Sample, binding, choice, flag, models
 from ..models.two_sided import TwoSided
 from ..optics.indices import RGB_WAVELENGTHS
 
@@ -64,7 +65,7 @@ class _Slot:
 def _adapter_class(mi: ModuleType) -> type:
     import drjit as dr
 
-    def read(props: Any, model: type[BSDF], preset: Any, parameter: Parameter) -> tuple[_Slot, Any]:
+    def read(props: Any, model: type[BSDF], preset: Mapping[str, Any], parameter: Parameter) -> tuple[_Slot, Any]:
         """A parameter's slot, and a plain value that tells of its range (a texture: the whole range)."""
         where = f"{plugin_name(model.name)}.{parameter.name}"
         names = [parameter.name]
@@ -94,8 +95,8 @@ def _adapter_class(mi: ModuleType) -> type:
                         values[name], plain[-1] = constant, np.asarray(constant).ravel()
                         del textures[name]
                     continue
-            elif preset is not None and hasattr(preset, name):
-                value = np.asarray(getattr(preset, name), dtype=float)
+            elif name in preset:
+                value = np.asarray(preset[name], dtype=float)
                 if value.ndim and mi.is_spectral:
                     textures[name] = measured(value)
                     plain.append(value)
@@ -175,9 +176,10 @@ def _adapter_class(mi: ModuleType) -> type:
         def __init__(self, props: Any, model: type[BSDF]) -> None:
             mi.BSDF.__init__(self, props)
             self.model_class = model
-            preset = None
-            if hasattr(model, "preset") and "preset" in props:
-                preset = model.preset(props["preset"])  # type: ignore[attr-defined]
+            preset: Mapping[str, Any] = {}
+            if "preset" in props and model.presets():
+                made = model.preset(props["preset"])
+                preset = {name: getattr(made, name) for name in next(iter(model.presets().values())).values}
             two_sided = bool(props.get("two_sided", False))
             self.slots: dict[str, _Slot] = {}
             self.inner: dict[str, Any] = {}
@@ -186,7 +188,7 @@ def _adapter_class(mi: ModuleType) -> type:
                 if parameter.kind in ("choice", "flag"):
                     plain[name] = props.get(name, parameter.default)
                     parameter.check(plain[name], f"{plugin_name(model.name)}.{name}")
-                elif parameter.kind == "bsdf":
+                elif parameter.inner:
                     self.inner[name] = self._child(props, name)
                 elif parameter.numeric:
                     self.slots[name], plain[name] = read(props, model, preset, parameter)
@@ -201,8 +203,7 @@ def _adapter_class(mi: ModuleType) -> type:
                 warnings.simplefilter("ignore")  # the slots have warned
                 self.model = model(**{name: _summary(value) for name, value in plain.items()})
             self.two_sided = two_sided and not self.model.transmits
-            if self.two_sided:
-                TwoSided(self.model)
+            self.sides = TwoSided(self.model) if self.two_sided else None
             self._set_flags(self.model.delta)
             self.settled: Any = None
             self._settle()
@@ -210,13 +211,13 @@ def _adapter_class(mi: ModuleType) -> type:
         def _settle(self) -> None:
             """Find once what the model derives from values that are the same at every hit."""
             self.settled = None
-            if self.textured() and getattr(self.model, "measured", False):
+            if self.textured() and self.model.needs_uniform:
                 what = (
                     "this base is measured: it takes colours and numbers, no texture, unlike conductor and dielectric"
                 )
                 raise InputError(what, f"{plugin_name(self.model.name)}.base")
-            if type(self.model).derive is not BSDF.derive and not self.textured():
-                self.settled = self.at(dr.zeros(mi.SurfaceInteraction3f), True, inner=True).settle()
+            if self.model.derives and not self.textured():
+                self.settled = binding.settled(self.at(dr.zeros(mi.SurfaceInteraction3f), True, inner=True))
 
         def textured(self) -> bool:
             """Whether a parameter of this material or of one inside it varies over the surface."""
@@ -290,14 +291,8 @@ def _adapter_class(mi: ModuleType) -> type:
             for name, child in self.inner.items():
                 own = isinstance(child, GonioBSDF)
                 found[name] = child.at(si, active, inner=True) if own else Foreign(child, si, active)
-            if self.settled is not None:
-                found["_settled"] = self.settled
-            bound = self.model.bound(found)
-            if self.two_sided and not inner:
-                wrapped = object.__new__(TwoSided)
-                wrapped.__dict__.update(base=bound, _bound=True)
-                return wrapped
-            return bound
+            bound = binding.bound_copy(self.model, found, self.settled)
+            return binding.bound_copy(self.sides, {"base": bound}) if self.sides and not inner else bound
 
         def _enabled(self, ctx: Any, wo: Any, wi: Any, active: Any) -> Any:
             """Lanes whose kind of lobe the context asks for."""
@@ -348,15 +343,15 @@ def _adapter_class(mi: ModuleType) -> type:
             return mi.Spectrum(self.at(si, active).tint(si.wi)) & active
 
         def has_attribute(self, name: str, active: Any = True) -> Any:
-            return mi.Bool(name == "ambient" and hasattr(type(self.model), "ambient"))
+            return mi.Bool(name == "ambient" and self.model.ambient is not None)
 
         def eval_attribute(self, name: str, si: Any, active: Any = True) -> Any:
-            if name != "ambient" or not hasattr(type(self.model), "ambient"):
+            if name != "ambient" or not self.model.ambient is not None:
                 return mi.Spectrum(0.0)
             return mi.Spectrum(self.at(si, active).ambient) & active
 
         def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
-            if name != "ambient" or not hasattr(type(self.model), "ambient"):
+            if name != "ambient" or not self.model.ambient is not None:
                 return mi.Color3f(0.0)
             return mi.Color3f(self.at(si, active).ambient) & active
 
@@ -386,13 +381,15 @@ def _stand_in(bsdf: Any) -> BSDF:
 class _Foreign(BSDF):
     """Facts about a BSDF that is not Gonio's."""
 
-    def __init__(self, transmits: bool, delta: str) -> None:
-        self.__dict__.update(facts=(transmits, delta))
+    passes: bool = flag(False, "whether it transmits")
+    lobes: str = choice(
+        "maybe", "whether its lobes are delta distributions", dict.fromkeys(("never", "maybe", "always"), "")
+    )
 
     @property
     def transmits(self) -> bool:
-        return self.__dict__["facts"][0]
+        return self.passes
 
     @property
-    def delta(self) -> str:
-        return self.__dict__["facts"][1]
+    def delta(self) -> Any:
+        return self.lobes

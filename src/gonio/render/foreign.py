@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import Parameter, Sample
-from ..models.base import Breach
+from ..models import Breach, Parameter, Sample
+from ..models.parameters import ColourParameter, NumberParameter
 from ..ops import backend
 from . import adapter, engine
 
@@ -45,16 +45,16 @@ class ForeignBSDF:
         """Numbers and albedos among the plugin's properties, as Gonio declares them; those that `replace` can set."""
         if self.description is None:
             return {}
-        found = {}
+        found: dict[str, Parameter] = {}
         for name, value in self.description.items():
             if isinstance(value, int | float) and not isinstance(value, bool):
-                kind = "spectrum" if name in ALBEDOS else "float"
+                kind = ColourParameter if name in ALBEDOS else NumberParameter
                 # widths of 0 are refused or are another plugin
-                low, high = (0.0, 1.0) if kind == "spectrum" or name.startswith("alpha") else (-np.inf, np.inf)
-                found[name] = Parameter(name, kind, value, "a property of the plugin", low, high)
+                low, high = (0.0, 1.0) if name in ALBEDOS or name.startswith("alpha") else (-np.inf, np.inf)
+                found[name] = kind(name, value, "a property of the plugin", low, high)
         for name in _declared(self.bsdf, self._mi):
             if name not in found and name in ALBEDOS:
-                found[name] = Parameter(name, "spectrum", 0.5, "a property of the plugin", 0.0, 1.0)
+                found[name] = ColourParameter(name, 0.5, "a property of the plugin", 0.0, 1.0)
         return found
 
     def replace(self, **values: Any) -> ForeignBSDF:
@@ -69,6 +69,11 @@ class ForeignBSDF:
             else:
                 changed[name] = value
         return load(changed)
+
+    def white(self) -> ForeignBSDF:
+        """The plugin with every albedo 1; itself where it has none."""
+        albedos = [name for name in self.parameters() if name in ALBEDOS]
+        return self.replace(**dict.fromkeys(albedos, 1.0)) if albedos else self
 
     def breaches(self) -> dict[str, Breach]:
         return {}

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from .. import files
-from ..energy import bake as baking
-from ..energy.baked import Baked, homework_pictures, load
+from ..energy.tables import bake as baking
+from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, models, notation
 from ..optics.ndf import distributions

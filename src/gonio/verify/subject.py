@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import GonioError, InputError
-from ..models import BSDF, Parameter, Sample, models, notation
-from ..models.base import Breach, converter
+from ..models import BSDF, Breach, Parameter, Sample, models, notation, tree
 from ..ops import backend
 from . import directions
 
@@ -115,11 +114,7 @@ class Subject:
     def replace(self, **values: Any) -> Subject:
         """The same BSDF with other parameter values."""
         model = self.model
-        if hasattr(model, "replace"):
-            changed = model.replace(**values)
-        else:
-            fields = {field.name: getattr(model, field.name) for field in dataclasses.fields(model)}
-            changed = type(model)(**{**fields, **values})
+        changed = tree.rebuild(model, values) if isinstance(model, BSDF) else model.replace(**values)
         return Subject(changed, self.target, {**self.settings, **values})
 
     def command(self, *more: str) -> str:
@@ -164,7 +159,7 @@ class Subject:
     def bound(self, precision: str = "float32") -> Any:
         """The model for wavefronts of Dr.Jit arrays of that precision; a new value compiles nothing."""
         if isinstance(self.model, BSDF):
-            return self.model.bind(converter(backend.types(precision)))
+            return self.model.bind(backend.types(precision))
         return self.model
 
     def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:

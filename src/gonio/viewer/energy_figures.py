@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import files
-from ..energy import comparison
-from ..energy.baked import Baked, load
+from ..energy.compensation import comparison
+from ..energy.tables.baked import Baked, load
 from . import figures
 
 SLICES = 4  # of a table with three axes, at most

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..models import BSDF
+from ..models import BSDF, tree
 from ..render import engine, scene
 from ..render.scene import schema, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
 from ..render.scene.values import ImageTexture, rgb
-from .stage import SUN, Ball, Material, Row, Stage, replaced, value_at, walk
+from .stage import SUN, Ball, Material, Row, Stage, replaced, walk
 
 LARGEST_IMAGE = 1024  # pixels across of an environment in a page; a wider one is averaged down
 BALLS = 5  # a row
@@ -103,7 +103,7 @@ def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
 def _code(bsdf: BSDF) -> Any:
     facts: list[Any] = [type(bsdf).__name__]
     for path, parameter, owner in walk(bsdf):
-        value = value_at(bsdf, path)
+        value = tree.value_at(bsdf, path)
         facts.append((type(owner).__name__, path))
         if not parameter.numeric:
             facts.append(value)
@@ -117,7 +117,7 @@ def _code(bsdf: BSDF) -> Any:
 def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
     """A ball each, named by what tells it from the others; its numbers are those in which it differs from the first."""
     paths = [path for path, parameter, _ in walk(members[0]) if parameter.numeric]
-    values = [{path: _listed(value_at(member, path)) for path in paths} for member in members]
+    values = [{path: _listed(tree.value_at(member, path)) for path in paths} for member in members]
     telling = [path for path in paths if any(v[path] != values[0][path] for v in values)]
     numbers = [path for path in telling if not isinstance(values[0][path], list)]
     balls = []

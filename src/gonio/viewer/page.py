@@ -21,7 +21,7 @@ import numpy as np
 
 from .. import __version__
 from ..emit import bundle as written_for
-from ..energy import bake
+from ..energy.tables import bake
 from ..errors import InputError, MachineError
 from ..models import BSDF
 from . import stage

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..models import BSDF
+from ..models import BSDF, tree
 from ..render import adapter, engine, foreground, integrators, lights
 from ..render.scene import textures
 from . import messages, stage
@@ -202,45 +202,36 @@ class _Balls:
     def _plugin(self, bsdf: BSDF) -> dict[str, Any]:
         """A material as a plugin; numbers as their slots name them."""
         plugin: dict[str, Any] = {"type": adapter.register_model(self.mi, type(bsdf))}
+        for name, inner in tree.children(bsdf).items():
+            plugin[name] = self._plugin(inner)
         for name, parameter in bsdf.parameters().items():
-            value = getattr(bsdf, name)
-            if parameter.kind == "bsdf":
-                plugin[name] = self._plugin(value)
-            elif not parameter.numeric:
-                plugin[name] = value
+            if not parameter.numeric and not parameter.inner:
+                plugin[name] = getattr(bsdf, name)
         for name, value in _slots(bsdf).items():
             if "." not in name:
                 plugin[name] = {"type": "rgb", "value": list(value)} if isinstance(value, tuple) else value
         return plugin
 
 
-def _slots(bsdf: BSDF, prefix: str = "") -> dict[str, float | tuple[float, ...]]:
+def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
     """The numbers of a material by the adapter's names: two widths are alpha_x and alpha_y, no turn is no slot."""
-    found: dict[str, Any] = {}
-    for name, parameter in bsdf.parameters().items():
-        value = getattr(bsdf, name)
-        if parameter.kind == "bsdf":
-            found.update(_slots(value, f"{prefix}{name}."))
-        elif parameter.kind == "spectrum":
+    slots: dict[str, Any] = {}
+    for path, parameter, value, _ in tree.leaves(bsdf):
+        if parameter.kind == "spectrum":
             colour = np.broadcast_to(np.asarray(value, float), 3)
-            found[prefix + name] = tuple(float(x) for x in colour)
+            slots[path] = tuple(float(x) for x in colour)
         elif parameter.kind == "alpha" and isinstance(value, tuple | list):
-            found[f"{prefix}{name}_x"], found[f"{prefix}{name}_y"] = float(value[0]), float(value[1])
+            slots[f"{path}_x"], slots[f"{path}_y"] = float(value[0]), float(value[1])
         elif parameter.numeric and not (parameter.kind == "angle" and value == 0):
-            found[prefix + name] = float(value)
-    return found
+            slots[path] = float(value)
+    return slots
 
 
 def _structure(bsdf: BSDF) -> Any:
     """What shapes a material's code: classes, choices, and which numbers there are."""
-    shape: list[Any] = [type(bsdf), bsdf.delta, sorted(_slots(bsdf))]
-    for name, parameter in bsdf.parameters().items():
-        value = getattr(bsdf, name)
-        if parameter.kind == "bsdf":
-            shape.append(_structure(value))
-        elif not parameter.numeric:
-            shape.append(value)
-    return shape
+    shape = [(path, type(inner), inner.delta) for path, inner in tree.walk(bsdf)]
+    choices = [leaf.value for leaf in tree.leaves(bsdf) if not leaf.parameter.numeric]
+    return shape, choices, sorted(_slots(bsdf))
 
 
 # --------------------------------------------------------------------------- lights

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, Parameter, model, notation
+from ..models import BSDF, Parameter, model, notation, tree
 from ..optics import fresnel, indices
 from .watch import Code
 
@@ -92,21 +92,10 @@ class Stage:
 # --------------------------------------------------------------------------- parameters by path
 
 
-def walk(bsdf: BSDF, prefix: str = "") -> Iterator[tuple[str, Parameter, BSDF]]:
+def walk(bsdf: BSDF) -> Iterator[tuple[str, Parameter, BSDF]]:
     """Every parameter of a material and of those inside it: (path, declaration, the material that has it)."""
-    for name, parameter in bsdf.parameters().items():
-        if parameter.kind == "bsdf":
-            yield from walk(getattr(bsdf, name), f"{prefix}{name}.")
-        else:
-            yield prefix + name, parameter, bsdf
-
-
-def value_at(bsdf: BSDF, path: str) -> Any:
-    """The parameter's value at a path."""
-    *inner, name = path.split(".")
-    for part in inner:
-        bsdf = getattr(bsdf, part)
-    return getattr(bsdf, name)
+    for leaf in tree.leaves(bsdf):
+        yield leaf.path, leaf.parameter, leaf.owner
 
 
 def replaced(bsdf: BSDF, values: dict[str, Any], where: str = "values") -> BSDF:
@@ -115,18 +104,7 @@ def replaced(bsdf: BSDF, values: dict[str, Any], where: str = "values") -> BSDF:
     for path in values:
         if path not in known:
             raise InputError(f"unknown parameter '{path}'", where, did_you_mean(path, list(known)))
-    return _replaced(bsdf, {path: plain(known[path], value) for path, value in values.items()})
-
-
-def _replaced(bsdf: BSDF, values: dict[str, Any]) -> BSDF:
-    own: dict[str, Any] = {}
-    for name, parameter in bsdf.parameters().items():
-        if parameter.kind == "bsdf":
-            inner = {path.partition(".")[2]: v for path, v in values.items() if path.startswith(f"{name}.")}
-            own[name] = _replaced(getattr(bsdf, name), inner)
-        else:
-            own[name] = values.get(name, getattr(bsdf, name))
-    return type(bsdf)(**own)
+    return tree.replace(bsdf, {path: plain(known[path], value) for path, value in values.items()}, where)
 
 
 def plain(parameter: Parameter, value: Any) -> Any:
@@ -148,7 +126,7 @@ def presets(bsdf: BSDF) -> list[dict[str, Any]]:
     """
     found: list[dict[str, Any]] = []
     for path, parameter, owner in walk(bsdf):
-        if parameter.name != "eta" or not hasattr(type(owner), "preset"):
+        if parameter.name != "eta" or not owner.presets():
             continue
         stem = path.removesuffix("eta")
         if "k" in owner.parameters():
@@ -217,7 +195,7 @@ def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
     bsdfs, given, known = [], [], set()
     for target in targets:
         cls, own = _class(target)
-        fits = {*cls.parameters(), *(["preset"] if hasattr(cls, "preset") else [])}
+        fits = {*cls.parameters(), *(["preset"] if cls.presets() else [])}
         settings = {**{name: value for name, value in wished.items() if name in fits}, **own}
         bsdfs.append(notation.made(cls, settings)[0])
         given.append({*settings})
@@ -272,7 +250,7 @@ def _titles(bsdfs: Sequence[BSDF]) -> list[str]:
 
 
 def _title(bsdf: BSDF) -> str:
-    inner = [_title(getattr(bsdf, name)) for name, p in bsdf.parameters().items() if p.kind == "bsdf"]
+    inner = [_title(child) for child in tree.children(bsdf).values()]
     return type(bsdf).__name__ + (f"({', '.join(inner)})" if inner else "")
 
 
@@ -280,7 +258,7 @@ def _masking(bsdf: BSDF) -> tuple[str, tuple[str, ...]]:
     """The first masking inside, and the choices worth a toggle: the model's own, then the homework's two."""
     for path, parameter, _ in walk(bsdf):
         if parameter.name == "masking" and parameter.kind == "choice":
-            own = value_at(bsdf, path)
+            own = tree.value_at(bsdf, path)
             allowed = [own]
             for name in HOMEWORK_MASKINGS:
                 if name not in allowed and _accepts(bsdf, {path: name}):
@@ -301,11 +279,11 @@ def _series(bsdf: BSDF, fixed: set[str]) -> tuple[Ball, ...]:
     """Balls over the first width that is not fixed, else over the first such number, else one ball."""
     free = [(path, p) for path, p, _ in walk(bsdf) if path.partition(".")[0] not in fixed and path not in fixed]
     for path, parameter in free:
-        if parameter.kind == "alpha" and not isinstance(value_at(bsdf, path), tuple):
+        if parameter.kind == "alpha" and not isinstance(tree.value_at(bsdf, path), tuple):
             return tuple(_rough(path, r) for r in ROUGHNESS)
     for path, parameter in free:
         if parameter.kind == "float" and parameter.name != "seed":
-            return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, value_at(bsdf, path)))
+            return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, tree.value_at(bsdf, path)))
     for path, parameter in free:
         if parameter.kind == "spectrum" and parameter.high <= 1.0:
             return tuple(Ball(f"{path} {_short(v)}", {path: [v] * 3}) for v in (0.1, 0.3, 0.5, 0.7, 0.9))

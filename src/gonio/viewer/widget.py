@@ -6,7 +6,7 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, MachineError
-from ..models import BSDF
+from ..models import BSDF, tree
 from . import page, stage
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _own(model: BSDF) -> set[str]:
     """The parameters that are not what they are by default: whoever made the material has fixed those."""
     fixed = set()
     for path, parameter, _ in stage.walk(model):
-        if parameter.required or not _equal(stage.value_at(model, path), parameter.default):
+        if parameter.required or not _equal(tree.value_at(model, path), parameter.default):
             fixed.add(path)
     return fixed
 

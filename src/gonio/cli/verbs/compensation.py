@@ -25,7 +25,7 @@ def compensation(
     Example:
       gonio compensation -o comparison
     """
-    from ...energy import comparison
+    from ...energy.compensation import comparison
 
     if output is not None:
         from ... import files

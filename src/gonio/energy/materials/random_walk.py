@@ -2,40 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import ClassVar
 
 from ...errors import InputError
-from ...models import microfacet
-from ...models.base import Value, number
+from ...models import Number, method, number
+from ...models.microfacet import widths
+from ...ops import Direction, Mode, Spectrum, where
 from ...optics import frame
-from .. import missing, walk
-from ._added import _Added
+from ..albedo import walk
+from ..compensation import lobe
+from ..compensation.missing import missing_energy
+from ._compensated import _Compensated, lobe_ratio
+from .kulla_conty import Derived, returned
 
 
-class RandomWalk(_Added):
+class RandomWalk(_Compensated):
     """f_base + the light of two and more bounces, estimated by one walk a call (Heitz2016).
 
     The exact multiple scattering of a Smith microsurface, in the mean: `eval` and the weight are random numbers, whose
     source is a hash of both directions and `seed`. A renderer asks for new directions at each sample and need not care;
-    who asks for one pair many times gives `seed` an array. Needs ndf "ggx" and masking "smith-correlated". Dear, and
+    who asks for one pair many times gives `seed` an array. Needs ndf "ggx" and masking "smith-correlated". Slow and
     noisy: it is here to judge the others. It cannot be recorded, so there is no shader code of it.
     """
 
-    stochastic = True
-    seed: Value = number(default=0.0, doc="shifts the random numbers")
+    stochastic: ClassVar[bool] = True
+    seed: Number = number(default=0.0, doc="shifts the random numbers")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        base: Any = self.base
-        if (base.ndf, base.masking) != ("ggx", "smith-correlated"):
-            what = f"{base.ndf} with {base.masking} given, ggx with smith-correlated expected"
+        surface = self.base.microsurface
+        if surface is None or (surface.ndf, surface.masking) != ("ggx", "smith-correlated"):
+            what = f"{surface and f'{surface.ndf} with {surface.masking}'} given, ggx with smith-correlated expected"
             raise InputError(what, "RandomWalk.base", "the walk's first bounce is exactly that")
 
-    def _extra(self, found: Any, wo: Any, wi: Any, mode: str) -> Any:
-        base: Any = self.base
-        alpha, smooth = microfacet.widths(base.alpha)
-        wo, wi = frame.rotate(wo, base.rotation), frame.rotate(wi, base.rotation)
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The base, plus an estimate of the light of two and more bounces."""
+        return self.base.eval(wo, wi, mode) + self.added(wo, wi, mode)
+
+    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+        """One walk's light of two and more bounces along wi, times |cos theta_i|."""
+        surface = self.base.microsurface
+        assert surface is not None, "checked when it was made"
+        alpha, smooth = widths(surface.alpha)
+        wo, wi = frame.rotate(wo, surface.rotation), frame.rotate(wi, surface.rotation)
         rng = walk.generator(wo, wi, self.seed)
-        value, _ = walk.walk(base, wo, wi, rng, alpha, mode == "importance")
-        live = (wo.z * wi.z != 0.0) if base.transmits else (wo.z > 0.0) & (wi.z > 0.0)
-        return missing.where(live & ~smooth, value, 0.0)
+        value, _ = walk.walk(self.base, wo, wi, rng, alpha, mode == "importance")
+        live = (wo.z * wi.z != 0.0) if surface.transmits else lobe.above(wo, wi)
+        return where(live & ~smooth, value, 0.0)
+
+    def derive(self) -> Derived:
+        """Kulla-Conty's lobe, which is what is sampled."""
+        lost = missing_energy(self.base)
+        f_add = returned(lost, "bounce")
+        return Derived(lost, f_add, lobe_ratio(f_add, lost))

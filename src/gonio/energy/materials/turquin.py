@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ... import ops
-from ...models.base import BSDF, Breach, Sample, bsdf
-from ...ops import maximum
-from .. import missing
-from ..missing import Metal
-from ._added import with_terms
+from ...models import BSDF, Breach, Sample, bsdf, method
+from ...models.bsdf import Delta, InnerAlbedo
+from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
+from ..compensation import missing, reflecting
+from ..compensation.lobe import MissingEnergy
+from ._compensated import with_terms
+
+
+class Derived(NamedTuple):
+    """What does not depend on directions: 1 - E of the base at F = 1, and F0."""
+
+    missing: MissingEnergy
+    f0: Spectrum
 
 
 class Turquin(BSDF):
@@ -20,53 +32,65 @@ class Turquin(BSDF):
     """
 
     base: BSDF = bsdf("the material to be compensated; it must not transmit")
-    breaks: ClassVar[dict[str, Breach]] = {
+    breaks: ClassVar[Mapping[str, Breach]] = {
         "reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)
     }
-    lossless = 2e-3
+    lossless: ClassVar[float | None] = 2e-3
 
     def __post_init__(self) -> None:
         super().__post_init__()
         missing.check_base(self.base, "Turquin.base", transmitting=False)
-        self.__dict__["_turned"] = missing.turned(self.base)
 
     @property
-    def turned(self) -> bool:
-        """Whether the base has two widths."""
-        return self.__dict__["_turned"]
-
-    @property
-    def delta(self) -> str:
+    def delta(self) -> Delta:
         return self.base.delta
 
-    def tint(self, wo: Any) -> Any:
+    def tint(self, wo: Direction) -> Any:
         """The base's."""
         return self.base.tint(wo)
 
-    def derive(self) -> Any:
-        """What does not depend on directions."""
-        found = Metal.derive(self)
-        return {**found, "f0": missing.normal_reflectance(self.base)}
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """The base's, times the factor."""
+        of_base = None if nodes is None or reflecting.has_two_widths(self.base) else inner(self.base, mu, phi)
+        if of_base is None:
+            return None
+        types = backend.types("float64")
+        sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
+        wo = backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)
+        return of_base * backend.to_numpy(self.bind(types)._factor(wo), len(mu))
 
-    def _factor(self, wo: Any) -> Any:
-        found = self.derived()
-        lost = ops.minimum(Metal.missing(self, found, wo), 0.95)
-        return found["f0"] * (lost / maximum(1.0 - lost, 0.05)) + 1.0
+    def derive(self) -> Derived:
+        """E by its polynomial, and F0."""
+        f0 = self.base.normal_reflectance()
+        assert f0 is not None, "checked when it was made"
+        return Derived(missing.missing_energy(self.base), f0)
 
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+    def _factor(self, wo: Direction) -> Spectrum:
+        """1 + F0 (1 - E(mu_o)) / E(mu_o), E held above .05."""
+        lost, F0 = self.derived
+        one_minus_E = ops.minimum(lost.at(wo), 0.95)
+        return 1.0 + F0 * (one_minus_E / maximum(1.0 - one_minus_E, 0.05))
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The base times the factor."""
         return self.base.eval(wo, wi, mode) * self._factor(wo)
 
-    def terms(self, wo: Any, wi: Any) -> Any:
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Any:
         """The base, and what the factor adds to it; D, G and F of the base."""
         single = self.base.eval(wo, wi)
         return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))
 
-    def pdf(self, wo: Any, wi: Any) -> Any:
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The base's."""
         return self.base.pdf(wo, wi)
 
-    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Sample:
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
         """The base's, with the weight times the factor."""
         s = self.base.sample(wo, u, mode)
         return Sample(s.wi, s.weight * self._factor(wo), s.pdf, s.delta, s.eta)

@@ -12,6 +12,11 @@ from .base import r0_conductor
 
 Reals: TypeAlias = NDArray[np.float64]
 
+AVERAGES = {
+    "exact": "the integral",
+    "imageworks": "the polynomial fit of Kulla2017, p. 26, in reflectivity r and edge tint g (Gulbrandsen2014)",
+}
+
 
 def edge_tint(eta: Spectrum, k: Spectrum) -> tuple[Spectrum, Spectrum]:
     """(r, g): reflectivity at normal incidence and edge tint of a metal (Gulbrandsen2014, eq. 3 solved for g)."""

@@ -155,7 +155,7 @@ class MaterialPart(Part):
         if taken:
             raise invalid(f"both 'preset' and '{taken[0]}' are given", "a preset sets the index; keep one", "preset")
         try:
-            self.model.preset(self.preset)  # type: ignore[attr-defined]
+            self.model.preset(self.preset)
         except InputError as error:
             raise invalid(error.what, error.hint, "preset") from None
 
@@ -243,7 +243,7 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
         fields[_attribute(dial)] = _field(parameters[name], dial, False, docs[dial])
     for key in lab.ignored if lab else ():
         fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="Accepted and ignored."))
-    if hasattr(model, "preset"):
+    if model.presets():
         doc = 'A named refractive index in place of the numbers, e.g. "Au".'
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
     title = "".join(word.capitalize() for word in names[0].split("-"))

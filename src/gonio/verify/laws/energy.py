@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ...energy.albedo import cubature
 from ...errors import InputError
-from .. import cubature, directions, statistics
+from .. import directions, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..subject import Subject
@@ -110,7 +111,9 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
         return _uniformly(subject, wo, effort.furnace_samples, seed)
-    integral = cubature.integrate(subject, lambda o, i: subject.eval(o, i, "importance"), wo, effort.accuracy, seed)
+    integral = cubature.integrate(
+        subject.sample, lambda o, i: subject.eval(o, i, "importance"), wo, effort.accuracy, seed
+    )
     return integral.value + ideal, integral.error + effort.accuracy
 
 
@@ -165,18 +168,9 @@ def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np
 
 
 def _white(subject: Subject) -> Subject | None:
-    """The subject with every albedo 1 and F = 1, in inner materials too; None where it has neither."""
-    changes: dict[str, Any] = {}
-    for name, parameter in subject.parameters.items():
-        if parameter.kind == "spectrum" and parameter.high == 1.0:
-            changes[name] = 1.0
-        elif parameter.kind == "bsdf":
-            inner = _white(Subject(getattr(subject.model, name), name))
-            if inner is not None:
-                changes[name] = inner.model
-        elif parameter.kind == "choice" and name == "fresnel" and "one" in parameter.choices:
-            changes[name] = "one"
+    """The subject's white twin, every albedo 1 and F = 1; None where it has neither."""
     try:
-        return subject.replace(**changes) if changes else None
+        twin = subject.model.white()
     except InputError:
         return None
+    return None if twin is subject.model else Subject(twin, subject.target, subject.settings)

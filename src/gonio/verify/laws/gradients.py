@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
 
-from ...models import BSDF, Parameter
-from ...models.base import converter
+from ...models import BSDF, Parameter, binding, tree
 from ...ops import backend
 from ..effort import Effort
 from ..subject import Subject, guarded
@@ -62,13 +60,7 @@ class Gradients(Law):
 
 def _numeric(model: BSDF) -> list[tuple[str, Parameter]]:
     """Every numeric parameter by its path: "alpha", "base.alpha"."""
-    found = []
-    for name, parameter in model.parameters().items():
-        if parameter.numeric:
-            found.append((name, parameter))
-        elif parameter.kind == "bsdf":
-            found += [(f"{name}.{path}", inner) for path, inner in _numeric(getattr(model, name))]
-    return found
+    return [(leaf.path, leaf.parameter) for leaf in tree.leaves(model) if leaf.parameter.numeric]
 
 
 def _size(value: Any) -> float:
@@ -88,18 +80,17 @@ def _derivatives(
     dr = backend.drjit()
     kind = backend.types("float64")
     a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
-    *inward, name = path.split(".")
-    plain = getattr(functools.reduce(getattr, inward, model), name)
+    plain = tree.value_at(model, path)
 
     def value(shift: Any) -> Any:
-        bound = model.bind(converter(kind))
-        owner = functools.reduce(getattr, inward, bound)
-        if parameter.kind == "angle":
+        def shifted(bound: Any) -> Any:
+            if parameter.kind != "angle":
+                return bound + shift
             # the bound value is (cos, sin), or nothing at all where the angle is 0
             s, c = dr.sincos(backend.float_of(plain, kind) + shift)
-            owner.__dict__[name] = kind.vec2(c, s)
-        else:
-            owner.__dict__[name] = getattr(owner, name) + shift
+            return kind.vec2(c, s)
+
+        bound = binding.shift(model.bind(kind), path, shifted)
         return guarded(model, "eval", lambda: bound.eval(a, b, "radiance"))
 
     def number(shift: float) -> np.ndarray:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...models import BSDF
-from ...models.base import converter
+from ...models import BSDF, binding
 from ...ops import backend
 from .. import directions
 from ..effort import Effort
@@ -164,11 +163,10 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
     """Parameters whose gradient of the summed values is not finite, each with a row where."""
     dr = backend.drjit()
     kind = backend.types("float32")
-    convert = converter(kind)
     leaves: dict[str, list[Any]] = {}
 
     def watched(parameter: Any, value: Any) -> Any:
-        bound = convert(parameter, value)
+        bound = parameter.bind(value, kind)
         if bound is not None and backend.is_drjit(bound):
             # one entry a ray, so that the gradient says which
             bound = bound + dr.zeros(kind.float, len(wo))
@@ -176,7 +174,7 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
             leaves.setdefault(parameter.name, []).append(bound)
         return bound
 
-    model = subject.model.bind(watched)
+    model = binding.bind(subject.model, watched)
     # values hold to the horizon itself, their slopes, which are powers of the cosine steeper, to 89.9999 degrees
     shallow = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) < 1.5e-6
     wo, wi = np.where(shallow[:, None], [0.6, 0.0, 0.8], wo), np.where(shallow[:, None], [0.0, 0.6, 0.8], wi)

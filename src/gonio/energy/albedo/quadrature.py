@@ -39,11 +39,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import ops
-from ..ops import backend
-from ..optics import frame, fresnel, masking
-from ..optics.ndf import NDF, distribution
-from ..optics.special import gauss
+from ... import ops
+from ...ops import backend
+from ...optics import frame, fresnel, masking
+from ...optics.ndf import NDF, distribution
+from ...optics.special import gauss
 
 # Gauss-Legendre nodes over (chi, x). Measured: the worst texel of a 128 x 128 table with roughness >= 0.05 is then met
 # to 2e-7, and to 1.4e-5 for Beckmann's `smith-separable`, whose rational fit jumps by 5e-5 at a = 1.6.

@@ -9,22 +9,23 @@ those differences is the error that is stated: it is that of the coarser of the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from . import directions
-from .subject import Subject
+from ...optics.special import gauss
 
 ORDER = 4  # nodes a side: exact for polynomials of degree 7, and cheap enough to divide further instead
+ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 DEPTH = 16  # a sixteenth of a right angle, halved 12 times more, is 2e-5: below the narrowest width that is no mirror
 SEEDED = 11  # halvings around samples
 LARGEST = 600_000  # cells evaluated in one round, some 10 M directions
 
-_X, _W = np.polynomial.legendre.leggauss(ORDER)
-_X, _W = 0.5 * (_X + 1.0), 0.5 * _W
+_X, _W = gauss(ORDER)
 
-Integrand = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Integrand: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
+# (wo, u) of rows (N, 3) -> a Sample of arrays: where cells are divided first
+Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
 
 
 class Integral(NamedTuple):
@@ -54,14 +55,15 @@ class _Cells(NamedTuple):
 
 
 def integrate(
-    subject: Subject, integrand: Integrand, wo: np.ndarray, tolerance: float = 1e-5, seed: int = 0
+    sample: Sampler, integrand: Integrand, wo: np.ndarray, tolerance: float = 1e-5, seed: int = 0
 ) -> Integral:
     """int integrand(wo, wi) dwi for each row of wo (N, 3).
 
+    sample     the model's own sampling, which shows where its lobes are
     integrand  (rows, 3), (rows, 3) -> (rows, channels), float64
     tolerance  absolute, of each integral; where cells run out the stated error is larger
     """
-    cells = _seeded(subject, wo, seed)
+    cells = _seeded(sample, wo, seed)
     coarse = _values(integrand, wo, cells)
     channels = coarse.shape[1]
     value, error = np.zeros((len(wo), channels)), np.zeros((len(wo), channels))
@@ -83,7 +85,7 @@ def integrate(
     return Integral(value, error)
 
 
-def _seeded(subject: Subject, wo: np.ndarray, seed: int) -> _Cells:
+def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> _Cells:
     """A few cells a side, divided around what the model samples, around the mirror direction and around wo itself."""
     n_theta, n_phi = 4, 8
     step = np.array([0.5 * np.pi / n_theta, 2.0 * np.pi / n_phi])
@@ -93,7 +95,7 @@ def _seeded(subject: Subject, wo: np.ndarray, seed: int) -> _Cells:
     per = 256
     rng = np.random.default_rng([seed, 77])
     many = np.repeat(wo, per, axis=0)
-    drawn = subject.sample(many, directions.numbers(rng, len(many)), precision="float32")
+    drawn = sample(many, rng.random((len(many), 3)).astype(np.float32).clip(max=ALMOST_ONE).astype(float))
     good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
     mirror = wo * np.array([-1.0, -1.0, 1.0])
     likely = np.concatenate([drawn.wi[good], *([mirror, wo, -wo] * 12)])

@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..models import microfacet
-from ..ops import Table, inset, lookup, maximum, sqrt
-from . import cache, quadrature
-from .monte_carlo import hammersley
+from ...errors import InputError
+from ...models import Microsurface
+from ...models.microfacet import widths
+from ...ops import Direction, Scalar, Spectrum, Table, inset, lookup, maximum, sqrt
+from .. import cache
+from ..albedo import quadrature
+from ..albedo.monte_carlo import hammersley
 
 SIZE = 128  # bilinear between them errs by 3e-4 for roughness >= .1
 
@@ -33,14 +35,14 @@ def schlick_table(ndf: str, masking: str) -> Table:
     return Table(f"schlick_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
-def reflected(base: Any, f0: Any, whole: Any, wo: Any) -> Any:
-    """F0 A + B at wo, a spectrum.
+def reflected(surface: Microsurface, f0: Spectrum, whole: Scalar, wo: Direction) -> Spectrum:
+    """F0 A + B at wo.
 
     whole  E(mu) at F = 1, A + B
     """
-    alpha, _ = microfacet.widths(base.alpha)
+    alpha, _ = widths(surface.alpha)
     row, column = inset(sqrt(sqrt(alpha.x * alpha.y)), SIZE), inset(sqrt(maximum(wo.z, 1e-6)), SIZE)
-    (b,) = lookup(schlick_table(base.ndf, base.masking), row, column)
+    (b,) = lookup(schlick_table(surface.ndf, surface.masking), row, column)
     return f0 * maximum(whole - b, 0.0) + b
 
 

@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..optics.masking import term
-from ..optics.ndf import distribution
-from . import curves, quadrature
+from ...optics.masking import term
+from ...optics.ndf import distribution
+from .. import bend
+from ..albedo import quadrature
 
 LAYOUTS = ("linear", "stretched")
 
@@ -119,17 +120,17 @@ class Axes:
         return np.asarray(index) / (count - 1) if count > 1 else np.asarray(index) * 0.0 + 1.0
 
 
-def stretch(ndf: str, masking: str) -> tuple[curves.Form, str]:
+def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
     """How the stretched axis bends mu into s, and the same in words."""
     if not term(masking).smith:
-        return curves.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
+        return bend.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
     if distribution(ndf).long_tailed:
-        return curves.Form(0, 1, 4.0), "sqrt(mu / (mu + 4 alpha))"
-    return curves.Form(1, 2, 4.0), "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))"
+        return bend.Form(0, 1, 4.0), "sqrt(mu / (mu + 4 alpha))"
+    return bend.Form(1, 2, 4.0), "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))"
 
 
 def stretched_mu(ndf: str, masking: str, alpha: np.ndarray, x: np.ndarray) -> np.ndarray:
     """The cosine at a place x in [0, 1] of the stretched axis of a width."""
     form, _ = stretch(ndf, masking)
-    bend = curves.numpy_knee(form, masking, np.maximum(alpha, quadrature.SMALLEST_ALPHA))
-    return curves.cosine(form, x, bend)
+    knee = bend.numpy_knee(form, masking, np.maximum(alpha, quadrature.SMALLEST_ALPHA))
+    return bend.cosine(form, x, knee)

@@ -2,13 +2,9 @@
 
 A compensated material needs M at both directions for every pair. Two bilinear lookups are eight gathers, dearer than
 the whole Torrance-Sparrow term on today's processors; a polynomial of degree 10 costs a third of it. The right
-variable makes one possible. Masking changes where mu is a few alpha, so with a bend b of a few alpha and
-
-    u(mu) = mu^p (1 + b^p) / (mu^p + b^p),   r = u^(1 / 2^n),   z = 1 - r        (p, n, b: see `FORMS`)
-
-M is a smooth function of z in [0, 1] whatever the width, down to a limit at alpha -> 0. It all but vanishes toward the
-normal (z = 0), often toward grazing too, and a polynomial in powers of z would lose its digits there in float32. So it
-is kept in the basis of Bernstein, with no coefficient below 0:
+variable makes one possible: z of `gonio.energy.bend`, in which M is smooth whatever the width. M all but vanishes
+toward the normal (z = 0), often toward grazing too, and a polynomial in powers of z would lose its digits there in
+float32. So it is kept in the basis of Bernstein, with no coefficient below 0:
 
     M = sum over k of c_k z^k r^(10 - k) = r^10 sum over k of c_k (z / r)^k,   1 / r = 1 + z / r,   c_k >= 0.
 
@@ -21,105 +17,21 @@ two axes, see `anisotropic`.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from .. import ops
-from ..ops import Table, sqr, sqrt
-from ..optics.masking import term
-from ..optics.ndf import distribution
-from . import cache, quadrature
-from .quadrature import gauss
+from ... import ops
+from ...ops import Table, sqr, sqrt
+from ...optics.special import gauss
+from .. import cache
+from ..albedo import quadrature
+from ..bend import DEGREE, Form, cosine, descent, form_of, numpy_knee, numpy_rise
 
 ROWS = 129  # roughness 0 to 1; linear interpolation between them errs by 3e-5
-DEGREE = 10  # errs by 7e-5 (Smith, schlick-direct), 2e-4 (schlick-ibl), 4e-4 (Beckmann's rational fit, with its jump)
 LOBE_NODES = 256  # the density between them is off by 1e-4; with 64 a furnace by sampling was 4e-4 short
 NODES_OF_FIT = 64
 STEPS_OF_FIT = 8
-LEAST_POWER = 1e-33  # of r, and its inverse of z / r: float32 ends at 1e-38 and 3e38
-
-
-class Form(NamedTuple):
-    """How mu is bent: p is 2^squarings, n is roots, b = factor w / (1 + hold w); and the degree of the polynomial.
-
-    w is alpha, or for schlick-direct 2 k.
-    """
-
-    squarings: int
-    roots: int
-    factor: float
-    hold: float = 0.0
-    degree: int = DEGREE
-
-    @property
-    def least(self) -> float:
-        """mu / b below which M is held, as powers of r and z / r would leave what float32 holds."""
-        return LEAST_POWER ** (2.0 ** (self.roots - self.squarings) / self.degree)
-
-
-# Chosen for the smallest error of the fit.
-FORMS = {
-    "schlick": Form(0, 0, 2.0),
-    "ggx": Form(0, 0, 2.0, 6.0),
-    "narrow": Form(2, 2, 4.0),  # other distributions end, and a few alpha from grazing nothing is missing
-    # glass has more to show: a knee at the critical angle
-    "schlick-glass": Form(0, 0, 2.0, degree=14),
-    "thin-ggx": Form(0, 1, 2.0, degree=14),
-    "thin-narrow": Form(1, 2, 4.0, degree=14),
-    "dense-ggx": Form(0, 0, 4.0, degree=14),
-    "dense-narrow": Form(1, 1, 4.0, degree=14),
-}
-
-
-def form_of(ndf: str, masking: str, side: str = "") -> Form:
-    """The form of a table: of a metal, or of a side of glass."""
-    if not term(masking).smith:
-        return FORMS["schlick-glass" if side else "schlick"]
-    kind = "ggx" if distribution(ndf).long_tailed else "narrow"
-    return FORMS[f"{side}-{kind}" if side else kind]
-
-
-def knee(form: Form, masking: str, alpha: Any) -> Any:
-    """The bend: the cosine about which masking sets in."""
-    return _bend(form, term(masking).onset(alpha))
-
-
-def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
-    """The same of an array."""
-    found: Any = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
-    return _bend(form, np.asarray(found.numpy()).reshape(np.shape(alpha)))
-
-
-def _bend(form: Form, width: Any) -> Any:
-    return form.factor * width / (1.0 + form.hold * width) if form.hold else form.factor * width
-
-
-@ops.function
-def descent(form: Form, mu: Any, bend: Any) -> Any:
-    """z / r: 0 at the normal; nothing here is a difference of near values."""
-    mu = ops.maximum(mu, bend * form.least)
-    fall = 1.0 - mu
-    for _ in range(form.squarings):
-        fall = fall * (1.0 + mu)
-        mu, bend = sqr(mu), sqr(bend)
-    ratio = bend * fall / (mu * (1.0 + bend))  # (1 - u) / u
-    for _ in range(form.roots):
-        ratio = ratio / (1.0 + sqrt(1.0 + ratio))  # the same of the root of u
-    return ratio
-
-
-def numpy_rise(form: Form, mu: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    """r, as `descent` has it."""
-    mu, power = np.maximum(mu, bend * form.least), 2**form.squarings
-    return (mu**power * (1.0 + bend**power) / (mu**power + bend**power)) ** 0.5**form.roots
-
-
-def cosine(form: Form, rise: np.ndarray, bend: np.ndarray) -> np.ndarray:
-    """mu at r: the inverse of `numpy_rise`."""
-    power = 2**form.squarings
-    bent, u = np.maximum(bend**power, 1e-300), rise**2**form.roots
-    return np.clip(bent * u / ((1.0 - u) + bent), 0.0, 1.0) ** (1.0 / power)
 
 
 def bernstein(x: np.ndarray, degree: int) -> np.ndarray:

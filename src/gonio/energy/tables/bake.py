@@ -18,16 +18,18 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
-from ..models import BSDF
-from ..models.conductor import Conductor
-from ..models.dielectric import Dielectric
-from ..optics.ndf import distribution
-from . import baked, cache, curves, monte_carlo, quadrature
-from .albedo import albedo, bound_in_float64, check_uniform, widths
+from ...errors import InputError, did_you_mean
+from ...models import BSDF
+from ...models.parameters import pair_of
+from ...ops import backend
+from ...optics.ndf import distribution
+from .. import cache
+from ..albedo import albedo, monte_carlo, quadrature
+from ..albedo.directional import check_uniform
+from ..cache import content_hash
+from . import baked
 from .axes import LAYOUTS, Axes, Points
 from .baked import Baked
-from .cache import content_hash
 
 LUTS = {
     "E": "directional albedo with F = 1, or the model's own [phi,] [roughness, mu]",
@@ -40,6 +42,7 @@ LARGEST = 4096
 AZIMUTHS = 24  # stretched, alpha_y = alpha_x / 4: linear between them errs by 1.2e-3
 LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
+LARGEST_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) of eta = 5
 SCHEMA = 2
 
 
@@ -59,14 +62,20 @@ class _Target:
         if self.model is None:
             found = quadrature.moments(self.ndf, self.masking, **shape, nodes=nodes)
             return {"E": found.whole, "dfg": np.stack([found.whole - found.schlick, found.schlick], -1)}
-        if isinstance(self.model, Conductor):
-            reflectance = bound_in_float64(self.model).reflectance
+        surface = self.model.microsurface
+        if surface.eta is None:
+            reflectance = self.model.bind(backend.types("float64")).reflectance
             return {"E": quadrature.reflected(self.ndf, self.masking, reflectance, **shape, nodes=nodes)}
         glass_nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
-        eta, fresnel = float(self.model.eta), self.model.fresnel
+        eta, fresnel = float(surface.eta), surface.fresnel
         power = quadrature.glass(self.ndf, self.masking, fresnel, eta=eta, nodes=glass_nodes, **shape)
-        total = power.reflected + (power.transmitted if self.model.transmits else 0.0)
-        return {"E": total[..., None] * np.broadcast_to(np.asarray(self.model.albedo, float), 3)}
+        total = power.reflected + (power.transmitted if surface.transmits else 0.0)
+        return {"E": total[..., None] * np.broadcast_to(np.asarray(surface.albedo, float), 3)}
+
+    @property
+    def conducts(self) -> bool:
+        """Whether it is a metal: what does not has an index to sweep."""
+        return self.model is not None and self.model.microsurface.eta is None
 
     def average(self, axes: Axes, rows: np.ndarray, fine: bool = False) -> np.ndarray:
         """E_avg at rows of roughness: Gauss-Legendre in sqrt(mu), and even steps of azimuth over a quarter turn."""
@@ -116,8 +125,8 @@ def bake(
     for name, given in (("masking", masking), ("aspect", aspect)):
         if material and given is not None:
             raise InputError(f"{name} of a material given", f"--{name}", "a material brings its own, by its parameters")
-    if material and not isinstance(target, Conductor | Dielectric):
-        return _any_material(target, lut, size, method, layout)  # type: ignore[arg-type]
+    if isinstance(target, BSDF) and target.microsurface is None:
+        return _any_material(target, lut, size, method, layout)
     asked, axes = _resolved(target, masking, layout, size, aspect, azimuths)
     _check_target(asked, axes, lut, method)
 
@@ -135,7 +144,7 @@ def bake(
     dims = {"E": list(axes.names), "dfg": list(axes.names), "E_avg": ["roughness"]}
     nodes, text = axes.arrays(), axes.texts()
     if "glass" in lut:
-        glass, found = _glass(axes, getattr(asked.model, "fresnel", "exact"))
+        glass, found = _glass(axes, asked.model.microsurface.fresnel if asked.model else "exact")
         nodes["sqrt_f0"] = glass.pop("sqrt_f0")
         text["sqrt_f0"] = f"slice j at (eta - 1) / (eta + 1) = (j + 1/2) / {GLASS_STEPS} of 2/3; eta is dense over thin"
         arrays.update(glass)
@@ -159,9 +168,9 @@ def bake(
 def cached(target: str | BSDF, **options: Any) -> Baked:
     """As `bake`, kept in the user's cache folder (`gonio.energy.cache`): what was baked before is only read.
 
-    Kept are distributions, Conductor and Dielectric; of other materials the formulas may stand anywhere.
+    Kept are distributions and microsurfaces of Gonio's own; the formulas of other materials may stand anywhere.
     """
-    if isinstance(target, BSDF) and not isinstance(target, Conductor | Dielectric):
+    if isinstance(target, BSDF) and not tabulated(target):
         return bake(target, **options)
     widths_of = None if isinstance(target, str) else _aspect(target, 1.0)
     key = ("baked", _describe(target), widths_of, sorted(options.items()))
@@ -213,9 +222,10 @@ def _resolved(
     target: str | BSDF, masking: str | None, layout: str, size: int, aspect: float | None, azimuths: int
 ) -> tuple[_Target, Axes]:
     """What is baked, over which axes."""
-    model: Any = None if isinstance(target, str) else target
-    ndf = distribution(str(target) if model is None else model.ndf).name
-    masking = quadrature.known_masking(masking or "smith-correlated" if model is None else model.masking)
+    model = None if isinstance(target, str) else target
+    surface = None if model is None else model.microsurface
+    ndf = distribution(str(target) if surface is None else surface.ndf).name
+    masking = quadrature.known_masking(masking or "smith-correlated" if surface is None else surface.masking)
     aspect = _aspect(model, 1.0 if aspect is None else aspect)
     if aspect != 1.0 and not 1 <= azimuths <= LARGEST:
         raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {LARGEST}")
@@ -233,8 +243,8 @@ def _check_target(asked: _Target, axes: Axes, lut: tuple[str, ...] | list[str], 
     if "dfg" in lut and asked.model is not None:
         hint = "bake its distribution, such as ggx: it is for any F0"
         raise InputError("split sum of a material asked for", "--lut", hint)
-    if "glass" in lut and (axes.azimuths or isinstance(asked.model, Conductor)):
-        what = "glass with two widths asked for" if axes.azimuths else "glass of a Conductor asked for"
+    if "glass" in lut and (axes.azimuths or asked.conducts):
+        what = "glass with two widths asked for" if axes.azimuths else f"glass of a {kind} asked for"
         raise InputError(what, "--lut", "this table is of a distribution or a Dielectric, with one width")
 
 
@@ -242,7 +252,7 @@ def _aspect(model: Any, given: float) -> float:
     """alpha_y / alpha_x as given, or of a model's widths."""
     if model is not None:
         check_uniform(model)
-        x, y = widths(model)
+        x, y = map(float, pair_of(model.microsurface.alpha))
         given = 1.0 if x == y else y / x if x > 0.0 else np.inf
     if not 1.0 / LARGEST_ASPECT <= given <= LARGEST_ASPECT:
         hint = f"give {1.0 / LARGEST_ASPECT:g} to {LARGEST_ASPECT:g}"
@@ -332,7 +342,7 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
     """Both sides over (sqrt_f0, roughness, mu): reflected and transmitted power; their sum is E."""
 
     def root(index: Any) -> Any:
-        return (index + 0.5) / GLASS_STEPS * curves.LARGEST_ROOT
+        return (index + 0.5) / GLASS_STEPS * LARGEST_ROOT
 
     def power(dense: bool, fine: bool, step: Any, *index: Any) -> np.ndarray:
         at = axes.at(*index)
@@ -391,10 +401,17 @@ def _describe(target: Any) -> Any:
     """A target as the manifest names it; a width that is an axis is left out."""
     if isinstance(target, str):
         return target
-    swept = ("alpha", "rotation", "sampling") if isinstance(target, Conductor | Dielectric) else ()
-    found: dict[str, Any] = {"model": target.name}
+    surface = target.microsurface
+    swept = ("alpha", "rotation", "sampling") if surface is not None else ()
+    described: dict[str, Any] = {"model": target.name}
     for name, parameter in target.parameters().items():
         if name not in swept:
             value = getattr(target, name)
-            found[name] = _describe(value) if parameter.kind == "bsdf" else np.asarray(value).tolist()
-    return found
+            described[name] = _describe(value) if parameter.inner else np.asarray(value).tolist()
+    return described
+
+
+def tabulated(model: BSDF) -> bool:
+    """Whether tables of a material are kept between runs: of a microsurface of Gonio's own; the formulas of others may
+    stand in any file and change."""
+    return model.microsurface is not None and type(model).__module__.startswith("gonio.")

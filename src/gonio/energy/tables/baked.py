@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from .cache import content_hash
+from ...errors import InputError
+from ..cache import content_hash
 
 
 @dataclass(frozen=True)

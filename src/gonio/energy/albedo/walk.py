@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..ops import backend, dot, maximum, sqrt, vec3, where
-from ..ops.graph import Node, RecordingError
-from ..optics import frame, fresnel
-from ..optics.ndf import distribution
+from ...models.microfacet import widths
+from ...ops import backend, dot, maximum, sqrt, vec3, where
+from ...ops.graph import Node, RecordingError
+from ...optics import frame, fresnel
+from ...optics.ndf import distribution
 
 MOST_BOUNCES = 128  # at alpha = 1 less than 1e-9 of the light is left after these
 FLAT = 1e-6  # below this |w.z| a walker stays at its height
@@ -83,7 +84,7 @@ def walk(base: Any, wo: Any, wi: Any, rng: Any, alpha: Any, power: bool) -> tupl
     kind = backend.types_like(type(wo))
     Float, Vector = kind.float, type(wo)
     glass = base.transmits
-    metal = hasattr(base, "k")
+    metal = base.microsurface.eta is None
     side = dr.select(wo.z >= 0.0, Float(1.0), Float(-1.0))  # +1: the walker's own medium is outside
     w = Vector(-(vec3(wo.x, wo.y, wo.z) * side))
     weight = dr.zeros(type(base.albedo * 1.0), 1) + 1.0 + 0.0 * wo.z
@@ -187,12 +188,9 @@ def albedo(base: Any, mu: float, walks: int, seed: int = 0) -> tuple[np.ndarray,
 
     base  a Conductor or Dielectric with ndf "ggx"; mu below 0 starts inside glass
     """
-    from ..models.base import converter
-    from ..models.microfacet import widths
-
     dr = backend.drjit()
     kind = backend.types("float32")
-    bound = base.bind(converter(kind))
+    bound = base.bind(kind)
     alpha, _ = widths(bound.alpha)
     sums, squares, done = 0.0, 0.0, 0
     while done < walks:

@@ -14,29 +14,33 @@ Where a base returns more than it receives, nothing is missing and nothing is ad
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
-from ..models import BSDF, Parameter
-from ..ops import (
+from ...errors import InputError
+from ...models import BSDF, Parameter, binding
+from ...ops import (
+    Direction,
+    Mode,
     Node,
     RecordingError,
+    Scalar,
+    Spectrum,
     atan2,
     backend,
     clamp,
     max_component,
     maximum,
-    mean,
     safe_div,
     sincos,
     sqrt,
     vec3,
     where,
 )
-from ..ops import pi as PI
-from .quadrature import gauss
+from ...ops import pi as PI
+from ...optics.special import gauss
+from . import lobe
 
 # of M at equal steps of x, mu = sin^2(pi x / 2), linear between them: E bends like a root of mu at grazing, and, where
 # it depends on sin(theta) as Oren-Nayar's, like a root of 1 - mu at the normal
@@ -44,99 +48,81 @@ NODES = 65
 POINTS = 1 << 16  # drawn at each node. With both, furnaces of Phong and Oren-Nayar err by 1e-4, of mixes by 4e-4
 LOBE_NODES = 256  # as `curves.LOBE_NODES`
 SMALLEST_MU = 1e-4
-NOTHING = 1e-5
 
 
-class Measured:
-    """The rule of bases that are measured; see `gonio.energy.missing` for the others."""
+class Measured(NamedTuple):
+    """M at nodes, linear between them.
 
-    @staticmethod
-    def derive(material: Any) -> dict[str, Any]:
-        """M at the nodes, the inverse of its lobe, and f_add / (pi M_avg)."""
-        base = _uniform(material.base)
-        dr = backend.drjit()
-        kind = _kind(base)
-        white = whitened(base)
-        of_white, of_base = _albedos(base, white, kind)
-        weight = kind.float(_averaging())
-        lost = maximum(1.0 - max_component(of_white), 0.0)
-        average = dr.sum(lost * weight)
-        f_avg = clamp(type(of_base)(*[dr.sum(c * weight) for c in of_base]) / (1.0 - average), 0.0, 1.0)
-        series = f_avg * (1.0 - average) / (1.0 - f_avg * average)
-        added = series * f_avg if material.color == "bounce" else series
-        some = average > NOTHING
-        scale = where(some, 1.0 / (PI * where(some, average, 1.0)), 0.0)
-        return {
-            "missing": lost,
-            "inverse": kind.float(_inverse(np.asarray(dr.detach(lost).numpy(), float))),
-            "scale": scale,
-            "added": added * scale,
-            "ratio": safe_div(mean(added), maximum(mean(f_avg), 1e-6)),
-        }
+    missing  M at equal steps of x, mu = sin^2(pi x / 2)
+    inverse  mu^2 below which lie equal shares of M mu
+    scale    1 / (pi M_avg), 0 where nothing is missing
+    average  M_avg
+    F_avg    the colour with which one bounce leaves
+    """
 
-    @staticmethod
-    def missing(material: Any, found: dict[str, Any], w: Any) -> Any:
+    missing: Scalar
+    inverse: Scalar
+    scale: Scalar
+    average: Scalar
+    F_avg: Spectrum
+
+    @property
+    def factor(self) -> float:
+        return 1.0
+
+    def at(self, w: Direction) -> Scalar:
         """M at a direction above the surface."""
         _check_computed(w.z)
         mu = clamp(w.z, 0.0, 1.0)
-        return _read(found["missing"], atan2(sqrt(mu), sqrt(1.0 - mu)) * (2.0 / PI))
+        return _read(self.missing, atan2(sqrt(mu), sqrt(1.0 - mu)) * (2.0 / PI))
 
-    @staticmethod
-    def added(material: Any, found: dict[str, Any], wo: Any, wi: Any, mode: str) -> Any:
-        """f_add f_ms |cos theta_i|."""
-        both = Measured.missing(material, found, wo) * Measured.missing(material, found, wi)
-        return found["added"] * where((wo.z > 0.0) & (wi.z > 0.0), both * wi.z, 0.0)
+    def over_average(self, w: Direction) -> Scalar:
+        return self.scale
 
-    @staticmethod
-    def share(material: Any, found: dict[str, Any], wo: Any) -> Any:
-        """Probability of the broad lobe: the power it carries over all the power."""
-        m_o = where((found["scale"] > 0.0) & (wo.z > 0.0), Measured.missing(material, found, wo), 0.0)
-        given = m_o * found["ratio"]
-        return safe_div(given, given + (1.0 - m_o))
+    def share(self, wo: Direction, wi: Direction) -> Scalar:
+        return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
 
-    @staticmethod
-    def pdf(material: Any, found: dict[str, Any], wo: Any, wi: Any) -> Any:
+    def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> float:
+        return 1.0
+
+    def given(self, wo: Direction) -> Scalar:
+        return where((self.scale > 0.0) & (wo.z > 0.0), self.at(wo), 0.0)
+
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """M(mu_i) mu_i / (pi M_avg)."""
-        return Measured.missing(material, found, wi) * maximum(wi.z, 0.0) * found["scale"]
+        return self.at(wi) * maximum(wi.z, 0.0) * self.scale
 
-    @staticmethod
-    def sample(material: Any, found: dict[str, Any], wo: Any, u: Any) -> Any:
+    def sample(self, wo: Direction, u: Direction) -> Direction:
         """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
-        mu2 = clamp(_read(found["inverse"], u.y), 1e-12, 1.0)
-        sin, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * PI) * u.z)
-        return vec3(sin * c, sin * s, sqrt(mu2))
+        return lobe.from_square(_read(self.inverse, u.y), u.z)
 
-    @staticmethod
-    def eta(material: Any, wo: Any, wi: Any) -> Any:
-        """Index on wi's side over index on wo's side."""
+    def eta(self, wo: Direction, wi: Direction) -> Scalar:
         return 1.0 + 0.0 * wo.z
 
 
-def whitened(base: Any) -> Any:
-    """A bound material with F = 1 and every declared share 1, inner materials likewise."""
-    clone = object.__new__(type(base))
-    clone.__dict__.update(base.__dict__)
-    clone.__dict__.pop("_settled", None)
-    for name, parameter in base.parameters().items():
-        if is_share(parameter):
-            clone.__dict__[name] = getattr(base, name) * 0.0 + 1.0
-        elif name == "fresnel" and "one" in parameter.choices:
-            clone.__dict__[name] = "one"
-        elif parameter.kind == "bsdf":
-            clone.__dict__[name] = whitened(getattr(base, name))
-    return clone
+def measured(base: BSDF) -> Measured:
+    """What a bound base that only reflects misses, by measuring it and its white twin."""
+    base = _uniform(base)
+    dr = backend.drjit()
+    types = _types(base)
+    of_white, of_base = _albedos(base, base.white(), types)
+    weight = types.float(_averaging())
+    lost = maximum(1.0 - max_component(of_white), 0.0)
+    average = dr.sum(lost * weight)
+    mean_albedo = type(of_base)(*[dr.sum(channel * weight) for channel in of_base])
+    return Measured(
+        missing=lost,
+        inverse=types.float(_inverse(np.asarray(dr.detach(lost).numpy(), float))),
+        scale=lobe.over_pi(average),
+        average=average,
+        F_avg=clamp(mean_albedo / (1.0 - average), 0.0, 1.0),
+    )
 
 
-def is_share(parameter: Parameter) -> bool:
-    """Whether a parameter says how much of the light is kept: a colour whose declared range ends at 1."""
-    return parameter.kind == "spectrum" and parameter.high == 1.0
-
-
-def _uniform(base: Any) -> Any:
+def _uniform(base: BSDF) -> BSDF:
     """The bound base with one entry a value; raises where it cannot be measured: while it is recorded, inside a loop of
     Dr.Jit's, or where its values differ from ray to ray."""
-    values = list(base._bound_values())
-    _check_computed(*values)
+    _check_computed(*binding.values(base))
     dr = backend.drjit()
     name = type(base).__name__
     hint = "give numbers and plain colours; a Conductor or a Dielectric inside takes textures and arrays"
@@ -146,14 +132,13 @@ def _uniform(base: Any) -> Any:
             return value
         parts = list(value) if dr.is_vector_v(value) else [value]
         if any(not bool(dr.all(p == dr.gather(type(p), p, 0))[0]) for p in map(dr.detach, parts)):
-            raise InputError(
-                f"{name}.{parameter.name} varies, yet its energy is measured once", "KullaConty.base", hint
-            )
+            what = f"{name}.{parameter.name} varies, yet its energy is measured once"
+            raise InputError(what, "KullaConty.base", hint)
         return type(value)(*map(dr.mean, parts))
 
     if dr.flag(dr.JitFlag.SymbolicScope):
         raise InputError(f"{name} has values that vary, yet its energy is measured once", "KullaConty.base", hint)
-    return base.bind(one)
+    return binding.bind(base, one)
 
 
 def _check_computed(*values: Any) -> None:
@@ -162,13 +147,13 @@ def _check_computed(*values: Any) -> None:
         raise RecordingError(what, "KullaConty.base", "a Conductor or a Dielectric can")
 
 
-def _kind(base: BSDF) -> backend.Types:
-    for value in base._bound_values():
+def _types(base: BSDF) -> backend.Types:
+    for value in binding.values(base):
         return backend.types_like(type(value))
     return backend.types(None)
 
 
-def _albedos(base: Any, white: Any, kind: backend.Types) -> tuple[Any, Any]:
+def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Any, Any]:
     """E of the white base and of the base itself at each node, the mean over azimuth: spectra with NODES entries.
 
     Directions come from `sample` with the same POINTS of a lattice (R4, powers of x^5 = x + 1) at every node:

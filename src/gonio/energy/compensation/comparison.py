@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..models import BSDF
-from ..models.conductor import Conductor
-from ..models.dielectric import Dielectric
-from ..ops import backend
-from . import walk
-from .albedo import albedo, direction
-from .materials.fdez_aguera import FdezAguera
-from .materials.kulla_conty import KullaConty
-from .materials.random_walk import RandomWalk
-from .materials.turquin import Turquin
+from ...errors import InputError
+from ...models import BSDF
+from ...models.conductor import Conductor
+from ...models.dielectric import Dielectric
+from ...ops import backend
+from ..albedo import albedo, walk
+from ..albedo.directional import direction
+from ..materials.fdez_aguera import FdezAguera
+from ..materials.kulla_conty import KullaConty
+from ..materials.random_walk import RandomWalk
+from ..materials.turquin import Turquin
 
 METHODS = {
     "plain": "single scattering only",

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import ops
-from ..errors import InputError, did_you_mean
-from ..ops import backend
-from ..optics import frame, masking, warp
-from ..optics.ndf import distribution
+from ... import ops
+from ...errors import InputError, did_you_mean
+from ...ops import backend
+from ...optics import frame, masking, warp
+from ...optics.ndf import distribution
 from .quadrature import known_masking
 
 POINTS = ("hammersley", "independent")

@@ -1,0 +1,191 @@
+"""Directional albedo: the share of the power arriving along one direction that a material gives back.
+
+    albedo(wo) = int f*(wo, wi) |cos theta_i| dwi        over both sides of the surface
+
+f* is the BSDF without the radiance factor (eta_o/eta_i)^2 (mode "importance"), so that reflected and transmitted power
+add up, and 1 is a surface that keeps nothing and adds nothing.
+
+Three ways, by falling trust:
+    closed form  what the material itself knows (`BSDF.known_albedo`): Lambert, mirrors, smooth glass, mixes of them
+    quadrature   microfacets by `quadrature`; any other `eval` by `cubature`, which starts where `sample` goes
+    sampling     `sample`'s weights over shifted lattices, with the standard error of the shifts
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import InputError, did_you_mean
+from ...models import BSDF, tree
+from ...models.microfacet import SMOOTH
+from ...models.parameters import pair_of
+from ...ops import backend
+from . import cubature, quadrature
+
+METHODS = ("auto", "closed-form", "quadrature", "sampling")
+
+
+class Albedo(NamedTuple):
+    """value (N, channels); error, an estimate of its size (N, channels); method, how it was found."""
+
+    value: np.ndarray
+    error: np.ndarray
+    method: str
+
+
+def albedo(
+    model: BSDF,
+    mu: ArrayLike = 1.0,
+    phi: ArrayLike = 0.0,
+    *,
+    method: str = "auto",
+    samples: int = 1 << 16,
+    seed: int = 0,
+) -> Albedo:
+    """Directional albedo of power, reflected plus transmitted, of any material.
+
+        go.albedo(go.Conductor.preset("Au", alpha=0.3), mu=[0.2, 1.0]).value        # (2, 3)
+
+    mu       cosine of wo, (N,) or a number in [-1, 1]; below 0 wo lies inside, for materials that transmit
+    phi      azimuth of wo, radians
+    method   "auto" takes the first of "closed-form", "quadrature" and "sampling" that there is for the material
+    samples  for "sampling", in all, a direction
+    Returns value, error and method. The error of a quadrature is its difference to a finer or coarser one, that of
+    sampling one standard error.
+    Raises InputError where the method does not exist for the material, or a parameter has one value a ray.
+    """
+    if not isinstance(model, BSDF):
+        raise InputError(f"{type(model).__name__} given, a material expected", "albedo")
+    if method not in METHODS:
+        raise InputError(f"unknown method '{method}'", "albedo: method", did_you_mean(str(method), list(METHODS)))
+    mu, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(mu, float)), np.asarray(phi, float))
+    if mu.ndim != 1 or not np.all(np.abs(mu) <= 1.0):
+        raise InputError("mu is a cosine: numbers in [-1, 1] expected", "albedo: mu")
+    check_uniform(model)
+    if method in ("auto", "closed-form"):
+        value = _known(model, mu, phi, None)
+        if value is not None:
+            return Albedo(value, np.zeros_like(value), "closed-form")
+        if method == "closed-form":
+            raise InputError(f"no closed form is known for {type(model).__name__}", "albedo: method", 'give "auto"')
+    if method in ("auto", "quadrature"):
+        coarse = _known(model, mu, phi, NODES)
+        fine = None if coarse is None else _known(model, mu, phi, JUDGE)
+        if coarse is not None and fine is not None:
+            return Albedo(fine, np.abs(fine - coarse), "quadrature")
+    singular = model.delta != "never" or model.stochastic
+    if method == "sampling" or (method == "auto" and singular):
+        return _by_sampling(model, mu, phi, samples, seed)
+    if singular:
+        raise InputError(f"{type(model).__name__} cannot be integrated by quadrature", "albedo", 'give "sampling"')
+    return _by_cubature(model, mu, phi, seed)
+
+
+def direction(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """Unit vectors (N, 3) of cosine mu and azimuth phi."""
+    sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
+    return np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
+
+
+def check_uniform(model: BSDF) -> None:
+    """Raise InputError where a parameter has one value a ray."""
+    for leaf in tree.leaves(model):
+        if leaf.parameter.numeric and not backend.is_drjit(leaf.value) and leaf.parameter.rows(leaf.value) != 1:
+            where = f"albedo: {type(leaf.owner).__name__}.{leaf.parameter.name}"
+            raise InputError("one value a ray given, one value expected", where)
+
+
+# --------------------------------------------------------------------------- what is known
+
+NODES, JUDGE = 64, 96  # of quadratures that a material makes itself
+
+
+def _known(
+    model: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64], nodes: int | None
+) -> NDArray[np.float64] | None:
+    """What the material knows of its albedo, or what the quadrature of its microsurface gives; nodes None asks for
+    closed forms only."""
+
+    def inner(material: BSDF, mu: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        return _known(material, mu, phi, nodes)
+
+    value = model.known_albedo(mu, phi, inner, nodes)
+    if value is not None or nodes is None or model.delta != "never":
+        return value
+    return _microsurface(model, mu, phi, nodes == JUDGE)
+
+
+def _microsurface(model: BSDF, mu: np.ndarray, phi: np.ndarray, fine: bool) -> NDArray[np.float64] | None:
+    """By quadrature over the facets' normals."""
+    surface = model.microsurface
+    if surface is None or min(widths(surface.alpha)) < SMOOTH:
+        return None
+    x, y = widths(surface.alpha)
+    turn = 0.0 if surface.rotation is None else float(surface.rotation)  # type: ignore[arg-type]
+    if surface.eta is None:
+        judge = quadrature.JUDGE if x == y else quadrature.TURNED_JUDGE
+        reflectance = model.bind(backend.types("float64")).reflectance  # type: ignore[attr-defined]
+        names = surface.ndf, surface.masking, reflectance
+        two = None if x == y else y
+        return (
+            quadrature.reflected(*names, np.abs(mu), x, two, phi - turn, nodes=judge if fine else None)
+            * (mu > 0.0)[:, None]
+        )
+    index = float(surface.eta)  # type: ignore[arg-type]
+    power = quadrature.glass(
+        surface.ndf,
+        surface.masking,
+        surface.fresnel,
+        np.abs(mu),
+        x,
+        np.where(mu >= 0.0, index, 1.0 / index),
+        None if x == y else y,
+        # an o below the surface sees the facets turned about: the azimuth of -o
+        np.where(mu < 0.0, phi + np.pi, phi) - turn,
+        nodes=quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES,
+    )
+    total = power.reflected + (power.transmitted if surface.transmits else 0.0)
+    return total[:, None] * np.broadcast_to(np.asarray(surface.albedo, float), 3)
+
+
+def widths(alpha: object) -> tuple[float, float]:
+    """(alpha_x, alpha_y) as plain numbers."""
+    x, y = pair_of(alpha)
+    return float(x), float(y)
+
+
+# --------------------------------------------------------------------------- any eval
+
+TOLERANCE = 1e-6
+
+
+def _by_cubature(model: BSDF, mu: np.ndarray, phi: np.ndarray, seed: int) -> Albedo:
+    def power(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        return model.eval(wo, wi, mode="importance", precision="float64")
+
+    found = cubature.integrate(model.sample, power, direction(mu, phi), TOLERANCE, seed)
+    return Albedo(found.value, found.error, "quadrature")
+
+
+SHIFTS = 16
+
+
+def _by_sampling(model: BSDF, mu: np.ndarray, phi: np.ndarray, samples: int, seed: int) -> Albedo:
+    """Mean weight over SHIFTS randomly shifted lattices (the R3 lattice, powers of x^4 = x + 1)."""
+    if samples < SHIFTS:
+        raise InputError(f"{samples} samples asked for", "albedo: samples", f"give {SHIFTS} or more")
+    count = samples // SHIFTS
+    rng = np.random.default_rng(seed)
+    root = 1.2207440846057596
+    lattice = np.arange(1, count + 1)[:, None] * root ** -np.arange(1.0, 4.0) % 1.0
+    u = (lattice[None] + rng.random((SHIFTS, 1, 3))).reshape(-1, 3) % 1.0
+    values, errors = [], []
+    for wo in direction(mu, phi):
+        weight = np.asarray(model.sample(np.repeat(wo[None], len(u), 0), u, mode="importance").weight, float)
+        means = weight.reshape(SHIFTS, count, -1).mean(1)
+        values.append(means.mean(0))
+        errors.append(means.std(0, ddof=1) / np.sqrt(SHIFTS))
+    return Albedo(np.array(values), np.array(errors), "sampling")

@@ -1,0 +1,162 @@
+"""What rough glass misses, from both sides.
+
+From side a a share T_a of what is missing goes to side b, the rest back to a (power, not radiance):
+
+    f_reflected = (1 - T_a) M_a(o) M_a(i) / (pi M_avg,a),    f_transmitted = T_a M_a(o) M_b(i) / (pi M_avg,b),
+
+so that a's albedo is made whole whatever T_a is. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, asks for
+T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is met by
+T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ...models import BSDF, Microsurface
+from ...models.microfacet import widths
+from ...ops import (
+    Direction,
+    Mask,
+    Mode,
+    Scalar,
+    Spectrum,
+    abs,
+    inset,
+    inv_pi,
+    lookup,
+    maximum,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
+from ..bend import form_of, knee
+from . import curves, lobe
+
+
+class Side(NamedTuple):
+    """One side of the surface.
+
+    c         coefficients of M
+    bend      the cosine about which masking sets in
+    scale     1 / (pi M_avg), 0 where nothing is missing
+    through   T, the share of what is missing here that goes to the other side
+    """
+
+    c: tuple[Scalar, ...]
+    bend: Scalar
+    scale: Scalar
+    through: Scalar
+
+
+class Glass(NamedTuple):
+    """Both sides; "thin" is that of the lower index.
+
+    average  of M_avg over both sides
+    F_avg    the base's albedo: between them both lobes keep all but that
+    place    where the tables of the lobes' inverses are read: index, width
+    inside   index inside over index outside
+    names    ndf, masking and Fresnel
+    """
+
+    thin: Side
+    dense: Side
+    average: Scalar
+    F_avg: Spectrum
+    place: tuple[Scalar, Scalar]
+    inside: Scalar
+    names: tuple[str, str, str]
+
+    @property
+    def factor(self) -> float:
+        return 1.0
+
+    def is_thin(self, w: Direction) -> Mask:
+        """Whether a direction lies on the side of the lower index."""
+        below = w.z < 0.0
+        return where(self.inside >= 1.0, ~below, below)
+
+    def at(self, w: Direction) -> Scalar:
+        """M at a direction, from its own side."""
+        ndf, masking, _ = self.names
+        of_sides = []
+        for name, side in zip(curves.SIDES, (self.thin, self.dense), strict=True):
+            form = form_of(ndf, masking, name)
+            of_sides.append(curves.missing(form, side.c, side.bend, abs(w.z)))
+        return where(self.is_thin(w), of_sides[0], of_sides[1])
+
+    def over_average(self, w: Direction) -> Scalar:
+        return where(self.is_thin(w), self.thin.scale, self.dense.scale)
+
+    def share(self, wo: Direction, wi: Direction) -> Scalar:
+        """1 - T of wo's side in reflection, T in transmission; nothing leaves along the surface."""
+        sides = wo.z * wi.z
+        through = self.through(wo)
+        return where(sides != 0.0, where(sides > 0.0, 1.0 - through, through), 0.0)
+
+    def through(self, wo: Direction) -> Scalar:
+        """T of wo's side."""
+        return where(self.is_thin(wo), self.thin.through, self.dense.through)
+
+    def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> Scalar | float:
+        if mode == "importance":
+            return 1.0
+        return where(wo.z * wi.z > 0.0, 1.0, 1.0 / sqr(self.eta(wo, wi)))
+
+    def given(self, wo: Direction) -> Scalar:
+        return where(self.thin.scale > 0.0, self.at(wo), 0.0)
+
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """M(mu_i) mu_i / (pi M_avg) of wi's side, times the share of that side."""
+        return self.at(wi) * abs(wi.z) * self.over_average(wi) * self.share(wo, wi)
+
+    def sample(self, wo: Direction, u: Direction) -> Direction:
+        """A side by u1, then a direction of that density."""
+        thin, passes = self.is_thin(wo), u.x < self.through(wo)
+        tables = curves.glass_lobe(*self.names)
+        at = inset(u.y, tables["thin"].shape[-1])
+        (of_thin,), (of_dense,) = (lookup(tables[side], *self.place, at) for side in curves.SIDES)
+        leaves_thin = (thin & ~passes) | (passes & ~thin)
+        w = lobe.from_square(where(leaves_thin, of_thin, of_dense), u.z)
+        below = (wo.z < 0.0) & ~passes | (wo.z >= 0.0) & passes
+        return vec3(w.x, w.y, where(below, -w.z, w.z))
+
+    def eta(self, wo: Direction, wi: Direction) -> Scalar:
+        """Index on wi's side over index on wo's side."""
+        return where(wo.z * wi.z > 0.0, 1.0, where(wo.z >= 0.0, self.inside, 1.0 / self.inside))
+
+
+def glass(base: BSDF, surface: Microsurface) -> Glass:
+    """What a bound base that transmits misses."""
+    index = surface.eta
+    assert index is not None, "what transmits has an index"
+    names = surface.ndf, surface.masking, surface.fresnel
+    alpha, _ = widths(surface.alpha)
+    width = sqrt(alpha.x * alpha.y)
+    eta = maximum(index, 1.0 / index)
+    place = (
+        inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.LARGEST_ROOT)), curves.GLASS_ETAS),
+        inset(sqrt(width), curves.GLASS_ROWS),
+    )
+    tables = curves.glass(*names)
+    thin, dense = (lookup(tables[side], *place) for side in curves.SIDES)
+    m_thin, m_dense = maximum(thin[-1], 0.0), maximum(dense[-1], 0.0)
+    both = maximum(m_thin + m_dense, 2.0 * lobe.NOTHING)
+    some = (m_thin > lobe.NOTHING) & (m_dense > lobe.NOTHING) & (abs(index - 1.0) > 1e-4)
+    enters = 1.0 - base.mean_reflectance()  # type: ignore[operator]
+
+    def side(name: str, found: tuple[Scalar, ...], average: Scalar, through: Scalar) -> Side:
+        bend = knee(form_of(*names[:2], name), surface.masking, width)
+        scale = where(some, inv_pi / maximum(average, lobe.NOTHING), 0.0)
+        return Side(found[:-1], bend, scale, through)
+
+    return Glass(
+        thin=side("thin", thin, m_thin, enters * m_dense / both),
+        dense=side("dense", dense, m_dense, enters / sqr(eta) * m_thin / both),
+        average=0.5 * (m_thin + m_dense),
+        F_avg=surface.albedo,
+        place=place,
+        inside=index,
+        names=names,
+    )

@@ -1,0 +1,71 @@
+"""The words that every account of missing energy speaks, and what the three have in common."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from ... import ops
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, sincos, sqrt, vec3, where
+
+# Where less is missing on average, nothing is given back: M_avg is then all error of the fit.
+NOTHING = 1e-5
+
+
+class MissingEnergy(Protocol):
+    """M(mu) = 1 - E(mu), E the directional albedo of a base at F = 1, and the broad lobe M(mu_i) mu_i that returns it.
+
+    average  M_avg = 1 - E_avg = 2 int M mu dmu
+    F_avg    share of the light that one bounce keeps; colours accumulate by it
+    factor   what else stands before all light that leaves, once
+    """
+
+    @property
+    def average(self) -> Scalar: ...
+
+    @property
+    def F_avg(self) -> Spectrum: ...
+
+    @property
+    def factor(self) -> Spectrum | float: ...
+
+    def at(self, w: Direction) -> Scalar:
+        """M at a direction, from its own side of the surface."""
+
+    def over_average(self, w: Direction) -> Scalar:
+        """1 / (pi M_avg) on w's side; 0 where nothing is missing."""
+
+    def share(self, wo: Direction, wi: Direction) -> Scalar | float:
+        """The share of what is missing at wo that leaves on wi's side: all of it above a surface that only reflects."""
+
+    def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> Scalar | float:
+        """(eta_o / eta_i)^2 where radiance passes to the other side, else 1."""
+
+    def given(self, wo: Direction) -> Scalar:
+        """M(mu_o) as the sampling of the lobe takes it: 0 where there is nothing to give back."""
+
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of `sample`: M(mu_i) mu_i / (pi M_avg) of wi's side, times the share of that side."""
+
+    def sample(self, wo: Direction, u: Direction) -> Direction:
+        """A direction with that density."""
+
+    def eta(self, wo: Direction, wi: Direction) -> Scalar:
+        """Index on wi's side over index on wo's side."""
+
+
+def above(wo: Direction, wi: Direction) -> Mask:
+    """Whether both lie above the surface."""
+    return (wo.z > 0.0) & (wi.z > 0.0)
+
+
+def over_pi(average: Scalar) -> Scalar:
+    """1 / (pi M_avg), or 0 where nothing is missing."""
+    some = average > NOTHING
+    return where(some, ops.inv_pi / where(some, average, 1.0), 0.0)
+
+
+def from_square(mu2: Any, u: Scalar) -> Direction:
+    """The direction above the surface of squared cosine mu2 and azimuth 2 pi u."""
+    mu2 = clamp(mu2, 1e-12, 1.0)
+    sin_theta, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * ops.pi) * u)
+    return vec3(sin_theta * c, sin_theta * s, sqrt(mu2))

@@ -1,0 +1,43 @@
+"""Which account of missing energy a base has, and which bases can be compensated."""
+
+from __future__ import annotations
+
+from ...errors import InputError
+from ...models import BSDF
+from .glass import glass
+from .lobe import MissingEnergy
+from .measured import measured
+from .reflecting import reflecting
+
+
+def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
+    """What single scattering in a bound base misses; `average` as `BSDF.mean_reflectance` takes it."""
+    surface = base.microsurface
+    if surface is None:
+        return measured(base)
+    return glass(base, surface) if surface.transmits else reflecting(base, surface, average)
+
+
+def check_base(base: BSDF, where: str, transmitting: bool, any_base: bool = False) -> None:
+    """Raise InputError where a base cannot be compensated.
+
+    transmitting  whether a microsurface may transmit
+    any_base      whether bases that are no microsurface are taken: any that reflects by a finite lobe
+    """
+    name = type(base).__name__
+    if base.microsurface is not None:
+        if base.transmits and not transmitting:
+            hint = "Dielectric(transmission=False), or KullaConty, which splits the energy between both sides"
+            raise InputError(f"{name} transmits, a material that only reflects expected", where, hint)
+        return
+    hint = "compensate a conductor or a dielectric first, then mix it or make it two-sided"
+    if not any_base or not base.name or base.two_sided:
+        expected = "a Gonio material seen from one side" if any_base else "Conductor or Dielectric"
+        raise InputError(f"{name or 'a foreign BSDF'} given, {expected} expected", where, hint)
+    if base.transmits:
+        raise InputError(f"{name} transmits, a material that only reflects expected", where, hint)
+    if base.delta != "never" or base.stochastic:
+        why = "has a perfectly specular part" if base.delta != "never" else "is random"
+        raise InputError(f"{name} {why}, a material with a finite lobe expected", where, hint)
+    if not base.isotropic:
+        raise InputError(f"{name} has two widths inside, one expected", where, hint)

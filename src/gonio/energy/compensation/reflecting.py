@@ -1,0 +1,168 @@
+"""What a microfacet surface that only reflects misses: metals, and glass without transmission."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ...models import BSDF, Microsurface
+from ...models.microfacet import SMOOTH, widths
+from ...models.parameters import pair_of
+from ...ops import (
+    Direction,
+    Mode,
+    Pair,
+    Scalar,
+    Spectrum,
+    backend,
+    function,
+    inset,
+    lookup,
+    maximum,
+    minimum,
+    sqr,
+    sqrt,
+    where,
+)
+from ...optics import frame
+from ..bend import form_of, knee
+from . import curves, lobe
+
+
+class Reflecting(NamedTuple):
+    """M as a polynomial of Bernstein a width; see `curves`.
+
+    c             its coefficients; of two widths, at the width that stands for both
+    bend          the cosine about which masking sets in
+    scale         1 / (pi M_avg) of that polynomial: of the lobe that is sampled
+    average       M_avg
+    F_avg         mean reflectance
+    factor        the base's albedo
+    row           where the table of the lobe's inverse is read
+    two           of two widths that differ: `TwoWidths`
+    ndf, masking  by name
+    """
+
+    c: tuple[Scalar, ...]
+    bend: Scalar
+    scale: Scalar
+    average: Scalar
+    F_avg: Spectrum
+    factor: Spectrum
+    row: Scalar
+    two: TwoWidths | None
+    ndf: str
+    masking: str
+
+    def at(self, w: Direction) -> Scalar:
+        """M at a direction above the surface."""
+        if self.two is None:
+            return self.of_mean_width(w)
+        return self.two.at(w, self.ndf, self.masking)
+
+    def of_mean_width(self, w: Direction) -> Scalar:
+        """M at a direction above the surface, of the width that stands for both: what is sampled."""
+        return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
+
+    def over_average(self, w: Direction) -> Scalar:
+        return self.scale if self.two is None else lobe.over_pi(self.average)
+
+    def share(self, wo: Direction, wi: Direction) -> Scalar:
+        return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
+
+    def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> float:
+        return 1.0
+
+    def given(self, wo: Direction) -> Scalar:
+        return where((self.scale > 0.0) & (wo.z > 0.0), self.of_mean_width(wo), 0.0)
+
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """M(mu_i) mu_i / (pi M_avg); of the mean of two widths."""
+        return self.of_mean_width(wi) * maximum(wi.z, 0.0) * self.scale
+
+    def sample(self, wo: Direction, u: Direction) -> Direction:
+        """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
+        (mu2,) = lookup(curves.lobe(self.ndf, self.masking), self.row, inset(u.y, curves.LOBE_NODES))
+        return lobe.from_square(mu2, u.z)
+
+    def eta(self, wo: Direction, wi: Direction) -> Scalar:
+        return 1.0 + 0.0 * wo.z
+
+
+class TwoWidths(NamedTuple):
+    """M of two widths, which depends on azimuth; see `curves.anisotropic`.
+
+    turned    coefficients in azimuth of each coefficient of M
+    alpha     the widths
+    rotation  the base's
+    """
+
+    turned: tuple[Scalar, ...]
+    alpha: Pair
+    rotation: Pair | None
+
+    def at(self, w: Direction, ndf: str, masking: str) -> Scalar:
+        """M at a direction above the surface."""
+        seen = _azimuth(frame.rotate(w, self.rotation), self.alpha)
+        form = form_of(ndf, masking)
+        rows = curves.turn(self.turned, seen.along, seen.across)
+        return curves.missing(form, rows, knee(form, masking, seen.width), w.z)
+
+
+def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
+    """What a bound base misses; `average` as `BSDF.mean_reflectance` takes it."""
+    names = surface.ndf, surface.masking
+    alpha, _ = widths(surface.alpha)
+    two = has_two_widths(base.plain)
+    width = sqrt(alpha.x * alpha.y) if two else alpha.x
+    *c, mean = curves.coefficients(*names, width)
+    mean = maximum(mean, 0.0)
+    F_avg: Any = base.mean_reflectance(average)
+    turned, true_mean = None, mean
+    if two:
+        larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
+        place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
+        *channels, of_both = lookup(curves.anisotropic(*names), *place)
+        turned, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
+    return Reflecting(
+        c=tuple(c),
+        bend=knee(form_of(*names), surface.masking, width),
+        scale=lobe.over_pi(mean),
+        average=true_mean,
+        F_avg=F_avg,
+        factor=surface.albedo,
+        row=inset(sqrt(width), curves.ROWS),
+        two=turned,
+        ndf=surface.ndf,
+        masking=surface.masking,
+    )
+
+
+def has_two_widths(base: BSDF) -> bool:
+    """Whether a base, as it was made, has or may have two widths that differ; it shapes the code."""
+    surface = base.microsurface
+    if surface is None:
+        return False
+    if backend.is_drjit(surface.alpha):
+        return bool(backend.drjit().is_vector_v(surface.alpha))
+    x, y = pair_of(surface.alpha)
+    return x is not y and not (isinstance(x, int | float) and isinstance(y, int | float) and x == y)
+
+
+class Azimuth(NamedTuple):
+    """Where a direction stands between the axes of the larger and the smaller width, and the width it sees."""
+
+    along: Scalar
+    across: Scalar
+    width: Scalar
+
+
+@function
+def _azimuth(w: Direction, alpha: Pair) -> Azimuth:
+    """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi seen along w; at the normal itself any azimuth will do."""
+    sin2 = maximum(frame.sin2(w), 1e-12)
+    along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
+    seen = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))
+    turned = frame.sin2(w) > 1e-12
+    x, y = where(turned, alpha.x * along_x, 1.0), where(turned, alpha.y * along_y, 1.0)
+    larger_x = alpha.x >= alpha.y
+    return Azimuth(where(larger_x, x, y) / (x + y), where(larger_x, y, x) / (x + y), seen)

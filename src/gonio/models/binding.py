@@ -1,0 +1,96 @@
+"""The bound copy of a material: every number a Dr.Jit value (or a symbol), ready for `eval`, `pdf` and `sample`.
+
+Binding makes each value an evaluated array of one entry, never a literal, so that a changed value compiles nothing.
+What follows from the parameters alone (`BSDF.derive`) is computed once on the bound copy and kept there.
+
+Copies are made in this file and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ..ops import backend
+from . import tree
+from .parameters import Parameter
+
+if TYPE_CHECKING:
+    from .bsdf import BSDF
+
+M = TypeVar("M", bound="BSDF")
+
+DERIVED = "derived"  # the part of a bound copy that holds what `derive` gave, in recordings and their names
+
+
+def bound_copy(material: M, values: Mapping[str, Any], derived: Any = None) -> M:
+    """A copy with these bound values: every numeric parameter's, and the inner materials'."""
+    copy: M = object.__new__(type(material))
+    state = vars(copy)
+    state.update(vars(material))
+    state.update(values)
+    state.update(_bound=True, _plain=material.plain, _derived=derived, _kept=None)
+    return copy
+
+
+def bind(material: M, convert: Callable[[Parameter, Any], Any]) -> M:
+    """A bound copy, its numbers being what `convert(parameter, value)` makes of them, in inner materials too."""
+    values = {}
+    for name, parameter in material.parameters().items():
+        if parameter.inner:
+            values[name] = bind(getattr(material, name), convert)
+        elif parameter.numeric:
+            values[name] = convert(parameter, getattr(material, name))
+    return bound_copy(material, values)
+
+
+def bind_to(material: M, types: backend.Types) -> M:
+    """A bound copy for Dr.Jit values of these types, with what its parameters derive, where that is the same for all
+    rays; what plain numbers derive is kept with the material, which is frozen."""
+    copy = bind(material, lambda parameter, value: parameter.bind(value, types))
+    if not material.derives:
+        return copy
+    kept = vars(material).setdefault("_kept", None) or {}
+    if types.float not in kept:
+        derived = settled(copy)
+        if derived is None or not _plain(material):
+            return with_derived(copy, derived)
+        vars(material)["_kept"] = kept = {**kept, types.float: derived}
+    return with_derived(copy, kept[types.float])
+
+
+def with_derived(material: M, derived: Any) -> M:
+    """The bound copy holding what `derive` gave, or what a recording has in its place."""
+    return bound_copy(material, {}, derived)
+
+
+def settled(material: BSDF) -> Any:
+    """What a bound copy derives, evaluated now: where no parameter varies from ray to ray and none is being
+    differentiated, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
+    if not material.derives:
+        return None
+    dr = backend.drjit()
+    if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) != 1 or dr.grad_enabled(v) for v in values(material)):
+        return None
+    derived = material.derive()
+    dr.make_opaque(derived)
+    return derived
+
+
+def values(material: BSDF) -> Iterator[Any]:
+    """The numeric values of a bound copy, inner materials' included."""
+    for leaf in tree.leaves(material):
+        if leaf.parameter.numeric and leaf.value is not None:
+            yield leaf.value
+
+
+def shift(material: M, path: str, change: Callable[[Any], Any]) -> M:
+    """The bound copy with one value changed."""
+    name, _, rest = path.partition(".")
+    value = getattr(material, name)
+    return bound_copy(material, {name: shift(value, rest, change) if rest else change(value)})
+
+
+def _plain(material: BSDF) -> bool:
+    """Whether all numbers are plain ones, which cannot change behind our back as arrays can."""
+    return all(isinstance(leaf.value, int | float | tuple) for leaf in tree.leaves(material) if leaf.parameter.numeric)

@@ -1,0 +1,180 @@
+"""The call from outside: NumPy arrays, lists or Dr.Jit vectors in, the same kind out.
+
+`method` wraps the formulas of a material. Called with bound parameters (by another formula, a renderer, a recording)
+the formula runs as it stands; from outside the material is bound, the arguments converted, and the answer as well.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import ops
+from ..errors import InputError
+from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
+from . import binding, tree
+from .sample import Sample
+
+if TYPE_CHECKING:
+    from .bsdf import BSDF
+
+MODES = ("radiance", "importance")
+UNIT = 1e-2  # how far from 1 a direction's length may be: rounding, and what people type by hand
+
+V3 = TypeVar("V3", bound="Vector3[Any]")
+S = TypeVar("S")
+C = TypeVar("C", bound=Callable[..., Any])
+
+
+class EvalMethod(Protocol):
+    """`eval` as callers see it: a spectrum a ray, (N, 3)."""
+
+    @overload
+    def __call__(self, wo: Direction, wi: Direction, mode: Mode = ...) -> Spectrum: ...
+    @overload
+    def __call__(self, wo: V3, wi: V3, mode: Mode = ..., precision: Precision | None = ...) -> V3: ...
+    @overload
+    def __call__(
+        self, wo: ArrayLike, wi: ArrayLike, mode: Mode = ..., precision: Precision | None = ...
+    ) -> NDArray[np.floating[Any]]: ...
+
+
+class PdfMethod(Protocol):
+    """`pdf` as callers see it: a number a ray, (N,)."""
+
+    @overload
+    def __call__(self, wo: Vector3[S], wi: Vector3[S], *, precision: Precision | None = ...) -> S: ...
+    @overload
+    def __call__(
+        self, wo: ArrayLike, wi: ArrayLike, *, precision: Precision | None = ...
+    ) -> NDArray[np.floating[Any]]: ...
+
+
+class SampleMethod(Protocol):
+    """`sample` as callers see it."""
+
+    @overload
+    def __call__(self, wo: Direction, u: Direction, mode: Mode = ...) -> Sample[Direction, Spectrum, Scalar]: ...
+    @overload
+    def __call__(self, wo: V3, u: V3, mode: Mode = ..., precision: Precision | None = ...) -> Sample[V3, V3, Any]: ...
+    @overload
+    def __call__(
+        self, wo: ArrayLike, u: ArrayLike, mode: Mode = ..., precision: Precision | None = ...
+    ) -> Sample[NDArray[np.floating[Any]], NDArray[np.floating[Any]], NDArray[np.floating[Any]]]: ...
+
+
+@overload
+def method(formula: Callable[[Any, Direction, Direction, Mode], Spectrum], /) -> _Eval: ...
+@overload
+def method(formula: Callable[[Any, Direction, Direction], Scalar], /) -> _Pdf: ...
+@overload
+def method(
+    formula: Callable[[Any, Direction, Direction, Mode], Sample[Direction, Spectrum, Scalar]], /
+) -> _Sampler: ...
+@overload
+def method(formula: C, /) -> C: ...
+def method(formula: Any, /) -> Any:
+    """Mark `eval`, `pdf`, `sample` or `terms` of a material, so that editors know what callers get; it takes NumPy
+    arrays, lists and Dr.Jit vectors. Methods of these names are wrapped anyway where the mark is left out."""
+    if hasattr(formula, "__wrapped__"):
+        return formula
+    inner = ops.function(formula)
+    takes_mode = "mode" in inspect.signature(formula).parameters
+
+    @functools.wraps(formula)
+    def enter(self: BSDF, wo: Any, other: Any, mode: Mode = "radiance", precision: Precision | None = None) -> Any:
+        args = (mode,) if takes_mode else ()
+        if self.is_bound:
+            return inner(self, wo, other, *args)
+        if mode not in MODES:
+            raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{formula.__name__}", " or ".join(MODES))
+        if backend.is_drjit(wo):
+            return inner(binding.bind_to(self, backend.types_like(type(wo))), wo, other, *args)
+        return _on_numpy(self, formula.__name__, inner, wo, other, args, precision)
+
+    return enter
+
+
+if TYPE_CHECKING:
+
+    class _Eval:
+        def __get__(self, owner: Any, cls: Any = None) -> EvalMethod: ...
+
+    class _Pdf:
+        def __get__(self, owner: Any, cls: Any = None) -> PdfMethod: ...
+
+    class _Sampler:
+        def __get__(self, owner: Any, cls: Any = None) -> SampleMethod: ...
+
+
+def _on_numpy(
+    material: BSDF, name: str, inner: Callable[..., Any], wo: Any, other: Any, args: tuple[Any, ...], precision: Any
+) -> Any:
+    types = backend.types(precision)
+    first, second, count = _rows(wo, other, name)
+    _check_rows(material, count)
+    if count == 0:  # Dr.Jit joins no array of no entries with one of one entry
+        first = second = np.array([0.0, 0.0, 1.0])
+    bound = binding.bind_to(material, types)
+    result = inner(bound, backend.vector_of(first, 3, types), backend.vector_of(second, 3, types), *args)
+
+    def out(value: Any) -> NDArray[Any]:
+        return backend.to_numpy(value, count) if count else backend.to_numpy(value, 1)[:0]
+
+    if isinstance(result, tuple):
+        parts: Any = type(result)
+        return parts(*[out(value) for value in result])
+    return out(result)
+
+
+def _rows(wo: Any, other: Any, name: str) -> tuple[NDArray[Any], NDArray[Any], int]:
+    """Two arguments as arrays of shape (N, 3) or (3,), and N."""
+    arrays = []
+    for label, value in (("wo", wo), ("u" if name == "sample" else "wi", other)):
+        where = f"{name}: {label}"
+        try:
+            array = np.asarray(value)
+            if np.iscomplexobj(array):
+                raise InputError("complex numbers given, real ones expected", where)
+            array = array.astype(np.float64)
+        except InputError:
+            raise
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.ndim not in (1, 2) or array.shape[-1] != 3:
+            raise InputError(f"an array of shape {array.shape}, expected (N, 3)", where)
+        if label != "u":
+            _check_unit(array, where)
+        arrays.append(array)
+    sizes = sorted({len(x) for x in arrays if x.ndim == 2 and len(x) != 1}) or [1]
+    if len(sizes) > 1:
+        raise InputError(f"{sizes[0]} and {sizes[1]} rows given, the same number expected", name)
+    return arrays[0], arrays[1], sizes[0]
+
+
+def _check_unit(array: NDArray[Any], where: str) -> None:
+    length = np.sqrt(np.einsum("...i,...i->...", array, array))
+    off = np.abs(length - 1.0) > UNIT
+    if np.any(off):
+        row = int(np.argmax(off)) if array.ndim == 2 else 0
+        what = f"row {row} has length {np.atleast_1d(length)[row]:.4g}, unit vectors expected"
+        raise InputError(
+            what, where, "divide directions by their length: w / np.linalg.norm(w, axis=-1, keepdims=True)"
+        )
+
+
+def _check_rows(material: BSDF, count: int) -> None:
+    """Raise InputError where a parameter has one value a ray, for another number of rays."""
+    if count == 1:
+        return
+    for leaf in tree.leaves(material):
+        if leaf.parameter.numeric and not isinstance(leaf.value, int | float):
+            rows = leaf.parameter.rows(leaf.value)
+            if rows not in (1, count):
+                where = f"{type(leaf.owner).__name__}.{leaf.parameter.name}"
+                raise InputError(f"{rows} rows given for {count} directions, the same number expected", where)

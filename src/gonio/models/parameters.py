@@ -1,0 +1,359 @@
+"""A parameter of a material, declared once: kind, range, unit and a line of documentation.
+
+    albedo: Colour = spectrum(0.5, "share of light that is reflected", high=1.0)
+
+The command line, scenes, plugins, sliders, shaders and the manual all read that declaration. Each kind is a class that
+says what it accepts, what it becomes when the material is bound, and what symbol stands for it in a recording.
+
+The annotation (`Colour`, `Number`, `Width`, `Angle`) tells type checkers two things: what the constructor takes, and
+what `eval` sees, where every number has become a Dr.Jit value or a symbol.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import GonioWarning, InputError, did_you_mean
+from ..ops import Pair, Scalar, Spectrum, backend, graph, sincos
+
+CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have their own number
+
+# --------------------------------------------------------------------------- what checkers and editors see
+
+Floats: TypeAlias = "NDArray[np.floating[Any]]"
+PlainNumber: TypeAlias = "float | list[float] | Floats | Scalar"
+PlainColour: TypeAlias = "float | tuple[float, float, float] | list[float] | Floats | Spectrum | Scalar"
+PlainWidth: TypeAlias = "float | tuple[PlainNumber, PlainNumber] | list[float] | Floats | Pair | Scalar"
+
+if TYPE_CHECKING:
+
+    class Number:
+        def __get__(self, owner: object, cls: type | None = None) -> Scalar: ...
+        def __set__(self, owner: object, value: PlainNumber) -> None: ...
+
+    class Colour:
+        def __get__(self, owner: object, cls: type | None = None) -> Spectrum: ...
+        def __set__(self, owner: object, value: PlainColour) -> None: ...
+
+    class Width:
+        def __get__(self, owner: object, cls: type | None = None) -> Pair: ...
+        def __set__(self, owner: object, value: PlainWidth) -> None: ...
+
+    class Angle:
+        def __get__(self, owner: object, cls: type | None = None) -> Pair | None: ...
+        def __set__(self, owner: object, value: PlainNumber | None) -> None: ...
+
+else:
+    Number = Colour = Width = Angle = "a declared parameter"
+
+
+# --------------------------------------------------------------------------- the kinds
+
+
+class Material:
+    """What a parameter may hold as a material inside a material: `BSDF`."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Declaration of one parameter; a kind is a subclass.
+
+    low, high  closed range; outside it is an error, above `high` only a warning where `soft_high`
+    white      its value in the material's white twin (`BSDF.white`); None leaves it as it is
+    """
+
+    kind: ClassVar[str] = ""
+    numeric: ClassVar[bool] = False
+    inner: ClassVar[bool] = False  # whether it holds a material
+
+    name: str
+    default: Any
+    doc: str
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    soft_high: bool = False
+    white: Any = None
+
+    @property
+    def required(self) -> bool:
+        return self.default is dataclasses.MISSING
+
+    @property
+    def range(self) -> str:
+        """The range in words, as errors and the manual print it."""
+        return self.kind
+
+    @property
+    def choices(self) -> dict[str, str]:
+        """name -> what it means, of a choice."""
+        return {}
+
+    def check(self, value: Any, where: str) -> None:
+        """Raise InputError, or warn, where `value` cannot stand for this parameter."""
+
+    def bind(self, value: Any, types: backend.Types) -> Any:
+        """The value as Dr.Jit values of these types; what shapes the code stays as it is."""
+        return value
+
+    def symbol(self, value: Any) -> Any:
+        """The symbol that stands for the value in a recording; what shapes the code stays as it is."""
+        return value
+
+    def rows(self, value: Any) -> int:
+        """How many rays the value has entries for, 1 where it is the same for all."""
+        return 1
+
+
+class _Numeric(Parameter):
+    """What the kinds that hold numbers share."""
+
+    numeric = True
+    dimensions: ClassVar[int] = 0  # of one ray's value
+    symbol_type: ClassVar[str] = "float"
+
+    @property
+    def range(self) -> str:
+        low = "" if self.low == -math.inf else f">= {self.low:g}"
+        high = "" if self.high == math.inf else f"<= {self.high:g}"
+        return " and ".join(x for x in (low, high) if x) or "any number"
+
+    def check(self, value: Any, where: str) -> None:
+        if backend.is_drjit(value) or isinstance(value, graph.Node) or value is None:
+            return
+        try:
+            array = np.asarray(value)
+            if np.iscomplexobj(array):
+                raise InputError(f"{value!r} is complex, a real number expected", where, "give eta and k apart")
+            array = array.astype(np.float64)
+        except InputError:
+            raise
+        except (TypeError, ValueError):
+            raise InputError(f"{value!r} given, a number or an array expected", where) from None
+        if isinstance(value, str | bytes) or array.ndim > 1 + self.dimensions:
+            raise InputError(f"{value!r} given, a number or an array expected", where)
+        if self.dimensions and array.ndim and array.shape[-1] != CHANNELS:
+            what = f"a colour of shape {array.shape}, a number, {CHANNELS} values or (N, {CHANNELS}) expected"
+            raise InputError(what, where)
+        if array.size == 0:
+            raise InputError("an empty array given, a number or an array expected", where)
+        if not np.all(np.isfinite(array)):
+            raise InputError(f"{value!r} is not finite", where)
+        if array.min() < self.low or (array.max() > self.high and not self.soft_high):
+            outside = array.min() if array.min() < self.low else array.max()
+            raise InputError(f"{outside:g} given, {self.range} expected", where)
+        if array.max() > self.high:
+            text = f"{array.max():g} is over {self.high:g}: the material gives back more light than it receives"
+            warnings.warn(f"{where}: {text}", GonioWarning, stacklevel=5)
+
+    def bind(self, value: Any, types: backend.Types) -> Any:
+        return backend.float_of(value, types)
+
+    def symbol(self, value: Any) -> Any:
+        return graph.symbol(self.symbol_type)
+
+    def rows(self, value: Any) -> int:
+        return 1 if backend.is_drjit(value) or np.ndim(value) <= self.dimensions else len(value)
+
+
+class NumberParameter(_Numeric):
+    """A number; bound: a Dr.Jit float."""
+
+    kind = "float"
+
+
+class ColourParameter(_Numeric):
+    """A colour: a number (grey), three values, or an array (N, 3); bound: a spectrum."""
+
+    kind = "spectrum"
+    dimensions = 1
+    symbol_type = "spectrum"
+
+    @property
+    def share(self) -> bool:
+        """Whether it says how much of the light is kept: its declared range ends at 1."""
+        return self.high == 1.0
+
+    def bind(self, value: Any, types: backend.Types) -> Any:
+        if backend.is_drjit(value):
+            return value if backend.drjit().is_vector_v(value) else types.vec3(value, value, value)
+        array = np.asarray(value, dtype=np.float64)
+        return backend.vector_of(np.broadcast_to(array, (CHANNELS,)) if array.ndim == 0 else array, CHANNELS, types)
+
+
+class WidthParameter(_Numeric):
+    """A microfacet width alpha, or a tuple of two (along x, along y); bound: a pair."""
+
+    kind = "alpha"
+    symbol_type = "vec2"
+
+    def check(self, value: Any, where: str) -> None:
+        for one in pair_of(value, where):
+            super().check(one, where)
+
+    def bind(self, value: Any, types: backend.Types) -> Any:
+        if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
+            return value
+        x, y = pair_of(value)
+        x, y = backend.float_of(x, types), backend.float_of(y, types) if y is not x else None
+        return types.vec2(x, x if y is None else y)
+
+    def rows(self, value: Any) -> int:
+        return max(_Numeric.rows(self, one) for one in pair_of(value))
+
+
+class AngleParameter(_Numeric):
+    """An angle in radians; bound: the pair (cos, sin), or None where it is the plain number 0: no turn at all."""
+
+    kind = "angle"
+    symbol_type = "vec2"
+
+    @staticmethod
+    def none(value: Any) -> bool:
+        """Whether a value is no turn, known before anything runs."""
+        return value is None or (isinstance(value, int | float) and value == 0)
+
+    def bind(self, value: Any, types: backend.Types) -> Any:
+        if self.none(value):
+            return None
+        if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
+            return value
+        s, c = sincos(backend.float_of(value, types))
+        return types.vec2(c, s)
+
+    def symbol(self, value: Any) -> Any:
+        return None if self.none(value) else super().symbol(value)
+
+
+@dataclass(frozen=True)
+class ChoiceParameter(Parameter):
+    """A choice between names; it shapes the code, so it is known before anything runs."""
+
+    kind = "choice"
+    members: Mapping[str, str] | Callable[[], Mapping[str, str]] = dataclasses.field(default_factory=dict)
+
+    @property
+    def choices(self) -> dict[str, str]:
+        return dict(self.members() if callable(self.members) else self.members)
+
+    @property
+    def range(self) -> str:
+        return " | ".join(self.choices)
+
+    def check(self, value: Any, where: str) -> None:
+        known = self.choices
+        if not isinstance(value, str) or value not in known:
+            raise InputError(f"unknown {self.name} '{value}'", where, did_you_mean(str(value), list(known)))
+
+
+class FlagParameter(Parameter):
+    """A switch that shapes the code."""
+
+    kind = "flag"
+
+    def check(self, value: Any, where: str) -> None:
+        if not isinstance(value, bool | np.bool_):
+            raise InputError(f"{value!r} given, True or False expected", where)
+
+
+class MaterialParameter(Parameter):
+    """A material inside a material."""
+
+    kind = "bsdf"
+    inner = True
+
+    def check(self, value: Any, where: str) -> None:
+        if not isinstance(value, Material):
+            raise InputError(f"{type(value).__name__} given, a material expected", where)
+
+
+def pair_of(value: Any, where: str = "") -> tuple[Any, Any]:
+    """The two widths of a width as a user gives it: itself twice, or the tuple's."""
+    if not isinstance(value, tuple | list):
+        return value, value
+    if len(value) != 2:
+        raise InputError(f"{len(value)} widths given, one or two expected", where)
+    return value[0], value[1]
+
+
+# --------------------------------------------------------------------------- how a material declares them
+
+
+def _declare(kind: type[Parameter], default: Any, doc: str, **more: Any) -> Any:
+    return dataclasses.field(default=default, metadata={"kind": kind, "doc": doc, **more})
+
+
+def number(
+    default: Any = dataclasses.MISSING, doc: str = "", *, low: float = -math.inf, high: float = math.inf, unit: str = ""
+) -> Any:
+    """Declare a number with its closed range and unit."""
+    return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit)
+
+
+def spectrum(
+    default: Any = dataclasses.MISSING,
+    doc: str = "",
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    unit: str = "",
+    soft_high: bool = False,
+) -> Any:
+    """Declare a colour: a number (grey), three values, or an array (N, channels).
+
+    A colour whose range ends at 1 is a share of the light: it is 1 in the material's white twin.
+    """
+    white = 1.0 if high == 1.0 else None
+    return _declare(ColourParameter, default, doc, low=low, high=high, unit=unit, soft_high=soft_high, white=white)
+
+
+def width(default: Any = dataclasses.MISSING, doc: str = "", *, low: float = 0.0, high: float = 1.0) -> Any:
+    """Declare a microfacet width alpha, or a tuple of two (along x, along y); bound: a vector of two.
+
+    low  0 where the model knows what a mirror is; a model that divides by alpha says from where on it holds
+    """
+    return _declare(WidthParameter, default, doc, low=low, high=high)
+
+
+def angle(default: Any = 0.0, doc: str = "") -> Any:
+    """Declare an angle in radians; bound: the vector (cos, sin), or None where it is the plain number 0."""
+    return _declare(AngleParameter, default, doc, unit="rad")
+
+
+def choice(
+    default: str, doc: str, choices: Mapping[str, str] | Callable[[], Mapping[str, str]], *, white: str | None = None
+) -> Any:
+    """Declare a choice between names; it shapes the code, so it is known before anything runs.
+
+    choices  name -> what it means, or a function that returns them (members may be registered later)
+    white    the name that stands in the material's white twin, such as F = 1
+    """
+    return _declare(ChoiceParameter, default, doc, members=choices, white=white)
+
+
+def flag(default: bool, doc: str) -> Any:
+    """Declare a switch that shapes the code."""
+    return _declare(FlagParameter, default, doc)
+
+
+def bsdf(doc: str, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a material inside a material."""
+    return _declare(MaterialParameter, default, doc)
+
+
+def declared(cls: type) -> dict[str, Parameter]:
+    """The parameters that a class declares, by name, in order."""
+    found = {}
+    for field in dataclasses.fields(cls):
+        if field.metadata:
+            more = dict(field.metadata)
+            found[field.name] = more.pop("kind")(name=field.name, default=field.default, **more)
+    return found
