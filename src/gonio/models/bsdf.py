@@ -107,6 +107,7 @@ class BSDF(Material):
     lossless: ClassVar[float | None] = None
     derives: ClassVar[bool] = False  # whether `derive` is written
     has_terms: ClassVar[bool] = False  # whether `terms` is written
+    preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
 
     _bound: ClassVar[bool] = False
     _plain: ClassVar[Any] = None
@@ -255,7 +256,7 @@ class BSDF(Material):
             if not known:
                 raise InputError(f"{cls.name} has no presets", "preset", "give its parameters")
             hint = did_you_mean(str(name), [*known, *(p.title for p in known.values())])
-            raise InputError(f"unknown preset '{name}' of {cls.name}", "preset", hint)
+            raise InputError(f"unknown {cls.preset_kind} '{name}'", "preset", hint)
         return cls(**{**known[key].values, **parameters})
 
     def breaches(self) -> dict[str, Breach]:

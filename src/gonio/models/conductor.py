@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from ..ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, function, safe_div, where
 from ..optics import frame, fresnel, indices, masking
@@ -32,6 +33,8 @@ class Conductor(microfacet._Microfacet):
     fresnel: str = microfacet.fresnel_choice()
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected")
     sampling: str = microfacet.sampling_choice()
+
+    preset_kind: ClassVar[str] = "metal"
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:

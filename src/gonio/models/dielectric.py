@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,8 @@ class Dielectric(microfacet._Microfacet):
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
     transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
     sampling: str = microfacet.sampling_choice()
+
+    preset_kind: ClassVar[str] = "medium"
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:

@@ -7,8 +7,7 @@ from typing import Any, Protocol
 from ... import ops
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, sincos, sqrt, vec3, where
 
-# Where less is missing on average, nothing is given back: M_avg is then all error of the fit.
-NOTHING = 1e-5
+NOTHING = 1e-5  # M_avg below this is all error of the fit: nothing is given back
 
 
 class MissingEnergy(Protocol):

@@ -34,6 +34,7 @@ class Reflecting(NamedTuple):
     c             its coefficients; of two widths, at the width that stands for both
     bend          the cosine about which masking sets in
     scale         1 / (pi M_avg) of that polynomial: of the lobe that is sampled
+    whole         1 / (pi M_avg) of M itself; the same with one width
     average       M_avg
     F_avg         mean reflectance
     factor        the base's albedo
@@ -45,6 +46,7 @@ class Reflecting(NamedTuple):
     c: tuple[Scalar, ...]
     bend: Scalar
     scale: Scalar
+    whole: Scalar
     average: Scalar
     F_avg: Spectrum
     factor: Spectrum
@@ -64,7 +66,7 @@ class Reflecting(NamedTuple):
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
-        return self.scale if self.two is None else lobe.over_pi(self.average)
+        return self.whole
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
         return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
@@ -126,7 +128,8 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     return Reflecting(
         c=tuple(c),
         bend=knee(form_of(*names), surface.masking, width),
-        scale=lobe.over_pi(mean),
+        scale=(scale := lobe.over_pi(mean)),
+        whole=scale if turned is None else lobe.over_pi(true_mean),
         average=true_mean,
         F_avg=F_avg,
         factor=surface.albedo,
