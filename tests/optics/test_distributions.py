@@ -196,9 +196,6 @@ def test_a_new_distribution_is_one_class() -> None:
 
     NDF.family.add(Flat)
     try:
-        from gonio.models import microfacet
-
-        microfacet.NDFS["flat"] = "flat"
         material = go.Conductor(alpha=0.3, ndf="flat", masking="smith-separable-exact", fresnel="one")
         wo, u = np.tile(at(40), (100_000, 1)), np.random.default_rng(SEED).random((100_000, 3))
         value = material.eval(at(40), DIRECTIONS, precision="float64")[:, 0] @ WEIGHTS
@@ -207,4 +204,3 @@ def test_a_new_distribution_is_one_class() -> None:
         assert material.record("eval").entry.parameters
     finally:
         NDF.family.remove("flat")
-        del microfacet.NDFS["flat"]

@@ -4,7 +4,7 @@
     manifest.json   the manifest alone, for people and scripts
     E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. Of a table with
                     three axes the slices stand one below the other, the first on top
-With layout "homework": E.png and E_avg.png exactly as the homework has them (`gonio.energy.baked.homework_pictures`).
+With layout "homework": E.png and E_avg.png exactly as the homework has them (`gonio.energy.tables.baked.homework_pictures`).
 """
 
 from __future__ import annotations

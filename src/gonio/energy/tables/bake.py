@@ -5,7 +5,7 @@
     baked.manifest["error"]      # {"E": {"max": ..., "rms": ..., "interpolation": ...}, ...}
     bake("ggx", aspect=0.25)     # two widths: E[phi, roughness, mu]
 
-The axes are in `gonio.energy.axes`, files and the homework's pictures in `gonio.energy.baked`.
+The axes are in `axes`, files and the homework's pictures in `baked`.
 """
 
 from __future__ import annotations
