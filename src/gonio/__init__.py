@@ -24,35 +24,82 @@ with contextlib.suppress(MachineError):
     llvm.use()
 
 _PLACES = {
-    "GonioError": "errors",
-    "GonioWarning": "errors",
-    "InputError": "errors",
-    "MachineError": "errors",
-    "get_precision": "ops",
-    "set_precision": "ops",
-    "BSDF": "models",
-    "Sample": "models",
-    "model": "models",
-    "Albedo": "energy",
-    "albedo": "energy",
-    "bake": "render.tables",
-    "compare": "viewer.error_map",
-    "plot": "viewer.plots",
-    "study": "viewer.contact_sheet",
-    "view": "viewer.widget",
+    "errors": ("GonioError", "GonioWarning", "InputError", "MachineError"),
+    "members": ("register",),
+    "ops": ("Direction", "Mask", "Mode", "Pair", "Scalar", "Spectrum", "get_precision", "set_precision"),
+    "optics.ndf": ("NDF",),
+    "optics.masking": ("Masking",),
+    "optics.fresnel": ("Fresnel",),
+    # what a material of one's own is written with
+    "models": (
+        *("Angle", "BSDF", "Breach", "Colour", "Number", "Parameter", "Preset", "Sample", "Width"),
+        *("angle", "bsdf", "choice", "flag", "method", "model", "never", "number", "spectrum", "width"),
+    ),
+    "energy": ("Albedo", "albedo"),
+    "render.integrators": ("Integrator",),
+    "verify.laws": ("Law",),
+    "render.tables": ("bake",),
+    "viewer.error_map": ("compare",),
+    "viewer.plots": ("plot",),
+    "viewer.contact_sheet": ("study",),
+    "viewer.widget": ("view",),
 }
+_FLAT = {name: place for place, names in _PLACES.items() for name in names}
 _CALLABLE = ("emit", "models", "render", "verify")  # packages that can be called: go.models(), go.render(scene)
 _ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
+    from . import ops
     from .emit import emit
     from .energy.albedo import Albedo, albedo
+    from .energy.materials.fdez_aguera import FdezAguera
+    from .energy.materials.kulla_conty import KullaConty
+    from .energy.materials.random_walk import RandomWalk
+    from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
-    from .models import BSDF, Sample, model, models
-    from .ops import get_precision, set_precision
+    from .members import register
+    from .models import (
+        BSDF,
+        Angle,
+        Breach,
+        Colour,
+        Number,
+        Parameter,
+        Preset,
+        Sample,
+        Width,
+        angle,
+        bsdf,
+        choice,
+        flag,
+        method,
+        model,
+        models,
+        never,
+        number,
+        spectrum,
+        width,
+    )
+    from .models.blinn_phong import BlinnPhong
+    from .models.conductor import Conductor
+    from .models.dielectric import Dielectric
+    from .models.lambert import Lambert
+    from .models.mirror import Mirror
+    from .models.mix import Mix
+    from .models.mix import Mix as mix
+    from .models.oren_nayar import OrenNayar
+    from .models.phong import Phong
+    from .models.two_sided import TwoSided
+    from .models.two_sided import TwoSided as two_sided
+    from .ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, get_precision, set_precision
+    from .optics.fresnel import Fresnel
+    from .optics.masking import Masking
+    from .optics.ndf import NDF
     from .render import render
+    from .render.integrators import Integrator
     from .render.tables import bake
     from .verify import verify
+    from .verify.laws import Law
     from .viewer.contact_sheet import study
     from .viewer.error_map import compare
     from .viewer.plots import plot
@@ -62,10 +109,10 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> Any:
     if name.startswith("_"):
         raise AttributeError(name)
-    if name in _CALLABLE:
+    if name in _CALLABLE or name == "ops":
         return import_module("." + name, __name__)
-    if name in _PLACES:
-        return getattr(import_module("." + _PLACES[name], __name__), name)
+    if name in _FLAT:
+        return getattr(import_module("." + _FLAT[name], __name__), name)
     wanted = _ALIASES.get(name, name)
     if wanted.islower():  # a submodule on its way in, no material
         raise AttributeError(f"module 'gonio' has no attribute '{name}'")
@@ -77,28 +124,14 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     classes = import_module(".models", __name__).models().values()
-    return sorted([*globals(), *_PLACES, *_CALLABLE, *_ALIASES, *(cls.__name__ for cls in classes)])
+    return sorted([*globals(), *_FLAT, "ops", *_CALLABLE, *_ALIASES, *(cls.__name__ for cls in classes)])
 
 
 __all__ = [
-    "BSDF",
-    "Albedo",
-    "GonioError",
-    "GonioWarning",
-    "InputError",
-    "MachineError",
-    "Sample",
-    "albedo",
-    "bake",
-    "compare",
-    "emit",
-    "get_precision",
-    "model",
-    "models",
-    "plot",
-    "render",
-    "set_precision",
-    "study",
-    "verify",
-    "view",
-]
+    "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Colour", "Conductor", "Dielectric", "Direction",
+    "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
+    "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Parameter", "Phong",
+    "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake",
+    "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model", "models", "never", "number",
+    "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
+]  # fmt: skip

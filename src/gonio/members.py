@@ -122,6 +122,31 @@ def _entry_points(group: str) -> Iterable[EntryPoint]:
     return ()
 
 
+Thing = TypeVar("Thing")
+
+
+def register(thing: Thing) -> Thing:
+    """Add a member to its family: a material, a distribution, a masking term, an integrator, a law, ...
+
+        @go.register
+        class Ward(go.BSDF): ...
+
+    It is then known by its name wherever Gonio's own are. Returns the thing itself. InputError where it belongs to no
+    family, or takes the name of a member that is another.
+    """
+    family_of(thing).add(thing)
+    return thing
+
+
+def family_of(thing: object) -> Family[Any]:
+    """The family that a class, or an instance of one, belongs to: what its base class names as `family`."""
+    family = getattr(thing, "family", None)
+    if not isinstance(family, Family):
+        what = f"{getattr(thing, '__qualname__', repr(thing))} is no member of a family"
+        raise InputError(what, "register", "derive it from gonio.BSDF, gonio.NDF, gonio.Masking or their like")
+    return family
+
+
 def _source(member: object) -> tuple[str, str]:
     """File (or module) and name of a member: the same for a class that was loaded anew."""
     thing: Any = member if isinstance(member, type) or callable(member) else type(member)

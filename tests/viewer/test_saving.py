@@ -46,7 +46,7 @@ BROKEN = {  # what is changed, and what the page says: where, what, remedy
     "no Python": ("(wi.z > 0.0)\n", "(wi.z > 0.0\n", "ward.py:18", "was never closed", "mend"),
     "no such class": ("class Ward", "class Wart", "ward.py", "no class 'Ward'", "did you mean 'Wart'?"),
     "fails when it is run": ("class Ward", "sqr(beta)\nclass Ward", "ward.py:9", "name 'beta' is not defined", ""),
-    "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:17", "TypeError: missing", "mend"),
+    "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:17", "TypeError: ", "mend"),
     "if on a value": ("        tan2", "        if h.z > 0: pass\n        tan2", "ward.py:19", "Python `if`", "where("),
     "unknown parameter": ("self.kd", "self.kdd", "ward.py:22", "no attribute 'kdd'", "mend"),
     "out of range": ("number(0.3", "number(3.0", "ward.py", "3 given", ""),

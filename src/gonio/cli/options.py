@@ -23,6 +23,7 @@ Parameters = Annotated[list[str] | None, Option("--param", "-p", metavar="NAME=V
 SceneFile = Annotated[Path, Argument(metavar="SCENE", help="A scene's folder or .json; or a Mitsuba .xml.")]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
+Code = Annotated[bool, Option("--allow-code", help="Let the scene run Python files that it names as materials.")]
 Device = Annotated[str, Option(metavar="cpu|cuda|auto", help="Where to compute.")]
 Exposure = Annotated[str, Option(metavar="EV|auto", help="Stops of brightness, for .png.")]
 
@@ -70,6 +71,7 @@ class Rendering:
     denoise: Annotated[bool, Option("--denoise", help="Remove noise with Open Image Denoise.")] = False
     exposure: Exposure = "0"
     allow_outside: Outside = False
+    allow_code: Code = False
 
     def request(self, scene: Path, output: Path | None = None, timeout: float | None = None) -> Request:
         """The request to render a scene. Raises InputError for a size or an exposure that is none."""

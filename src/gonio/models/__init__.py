@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from .._callable import make_callable
 from ..errors import InputError, did_you_mean
-from .bsdf import BSDF, Breach, Microsurface, Preset, never
 from .calling import method
+from .material import BSDF, Breach, Microsurface, Preset, never
 from .parameters import (
     Angle,
     Colour,

@@ -2,7 +2,7 @@
 
 from typing import Any, TypeAlias
 
-from .bsdf import BSDF, Breach, never
+from .material import BSDF, Breach, never
 from .parameters import Parameter, angle, bsdf, choice, flag, number, spectrum, width
 from .sample import Sample
 

@@ -16,7 +16,7 @@ from . import tree
 from .parameters import Parameter
 
 if TYPE_CHECKING:
-    from .bsdf import BSDF
+    from .material import BSDF
 
 M = TypeVar("M", bound="BSDF")
 

@@ -11,7 +11,7 @@ from ..ops import Direction, Scalar, dot, function, inv_pi, safe_div
 from ..optics.frame import half_vector, reflect, sin2
 from ..optics.special import power_of_cosine
 from ..optics.warp import square_to_power_lobe
-from .bsdf import Breach
+from .material import Breach
 from .phong import _Empirical
 
 

@@ -21,7 +21,7 @@ from . import binding, tree
 from .sample import Sample
 
 if TYPE_CHECKING:
-    from .bsdf import BSDF
+    from .material import BSDF
 
 MODES = ("radiance", "importance")
 UNIT = 1e-2  # how far from 1 a direction's length may be: rounding, and what people type by hand

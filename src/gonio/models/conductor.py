@@ -10,8 +10,8 @@ from ..optics import frame, fresnel, indices, masking
 from ..optics.fresnel.artist import edge_tint, imageworks
 from ..optics.ndf import distribution
 from . import microfacet
-from .bsdf import Preset
 from .calling import method
+from .material import Preset
 from .microfacet import Terms
 from .parameters import Angle, Colour, Width, spectrum
 from .sample import Sample

@@ -29,8 +29,8 @@ from ..ops import (
 from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet
-from .bsdf import Delta, InnerAlbedo, Preset
 from .calling import method
+from .material import Delta, InnerAlbedo, Preset
 from .microfacet import Terms
 from .parameters import Angle, Colour, Number, Width, flag, number
 from .sample import Sample

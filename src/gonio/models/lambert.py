@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ops import Direction, Mode, Scalar, Spectrum, abs, inv_pi, where
-from .bsdf import BSDF, InnerAlbedo
 from .calling import method
+from .material import BSDF, InnerAlbedo
 from .parameters import Colour, spectrum
 
 

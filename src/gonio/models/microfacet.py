@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..ops import Direction, Mask, Pair, Scalar, Spectrum, abs, backend, dot, function, maximum, safe_div, vec2, where
 from ..optics import fresnel, masking
 from ..optics.ndf import NDF, distribution
-from .bsdf import BSDF, Delta, InnerAlbedo, Microsurface
+from .material import BSDF, Delta, InnerAlbedo, Microsurface
 from .parameters import Angle, Colour, Width, angle, choice, pair_of, spectrum, width
 
 # Below this width a facet's tilt, about alpha, is no more than a thousand roundings of a float32 direction (6e-8), and

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ..ops import Direction, Mode, Scalar, Spectrum, where
 from ..optics import frame
-from .bsdf import BSDF, Delta, InnerAlbedo
 from .calling import method
+from .material import BSDF, Delta, InnerAlbedo
 from .parameters import Colour, spectrum
 from .sample import Sample
 

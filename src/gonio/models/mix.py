@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..ops import Direction, Mode, Scalar, Spectrum, safe_div, vec3, where
-from .bsdf import BSDF, Delta, InnerAlbedo
 from .calling import method
+from .material import BSDF, Delta, InnerAlbedo
 from .parameters import Number, bsdf, number
 from .sample import Sample
 

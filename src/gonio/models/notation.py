@@ -1,6 +1,7 @@
 """Materials as text: how the command line names one, with its parameters, and a material in a material.
 
     conductor                                   its name; parameters follow as NAME=VALUE
+    ward.py:Ward                                a class in a Python file, which runs because the user named it
     conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
     {"type": "conductor", "alpha": [.1, .4]}    as in a scene
 
@@ -10,6 +11,7 @@ inside that is not given is metal of alpha .3, and the first of a mix Lambert's.
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -18,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import model
-from .bsdf import BSDF
+from . import model, outside
+from .material import BSDF
 from .parameters import Parameter
 
-_CALL = re.compile(r"\s*([\w-]+)\s*(?:\((.*)\))?\s*", re.DOTALL)
+_CALL = re.compile(r"\s*([\w-]+|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
 
 
 def assignment(text: str, option: str = "--param") -> tuple[str, str]:
@@ -41,7 +43,8 @@ def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple
     """
     cls, own = taken_apart(text)
     given = {**own, **dict(map(assignment, assignments))}
-    return made(cls, {**given, "preset": preset} if preset else given)
+    material, values = made(cls, {**given, "preset": preset} if preset else given)
+    return outside.probe(material), values
 
 
 def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any]]:
@@ -81,7 +84,9 @@ def typed(parameter: Parameter, value: Any) -> Any:
     if parameter.inner:
         return _inner(value, where)
     if parameter.kind == "choice":
-        return value.strip().strip('"') if isinstance(value, str) else value
+        name = value.strip().strip('"') if isinstance(value, str) else value
+        # a distribution or a masking term of the user's own
+        return outside.member(name, where=where) if isinstance(name, str) and outside.names_code(name) else name
     if parameter.kind == "flag":
         if str(value).lower() not in ("true", "false"):
             raise InputError(f"'{value}' given, true or false expected", where)
@@ -98,7 +103,7 @@ def written(value: Any) -> str:
     """A value as `typed` takes it, a material with the parameters that are not the default."""
     if isinstance(value, BSDF):
         inner = ",".join(f"{name}={written(v)}" for name, v in settings(value).items())
-        return f"{value.name}({inner})" if inner else value.name
+        return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
     if isinstance(value, bool | np.bool_):
         return str(bool(value)).lower()
     if np.ndim(value):
@@ -130,10 +135,25 @@ def _inner(value: Any, where: str) -> BSDF:
         return made(*taken_apart(value.strip().strip('"'), where))[0]
     try:
         fields = dict(json.loads(re.sub(r"(?<![\w.])\.(?=\d)", "0.", value)) if isinstance(value, str) else value)
-        cls = model(fields.pop("type"))
+        name = str(fields.pop("type"))
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise _no_material(value, where) from None
-    return made(cls, fields)[0]
+    return made(class_named(name, where), fields)[0]
+
+
+def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
+    """The class of a name, or of FILE.py:CLASS."""
+    return outside.load(name, where=where) if outside.names_code(name) else model(name)
+
+
+def spelled(cls: type[BSDF]) -> str:
+    """How a text names a class: a material's name, or FILE.py:CLASS."""
+    if BSDF.family.all().get(cls.name) is cls:
+        return cls.name
+    try:
+        return f"{inspect.getsourcefile(cls)}:{cls.__qualname__}"
+    except (TypeError, OSError):
+        return cls.__qualname__
 
 
 def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
@@ -141,7 +161,7 @@ def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, 
     match = _CALL.fullmatch(text)
     if not match or re.fullmatch(r"[\d.-]+", match[1]):
         raise _no_material(text, where)
-    return model(match[1]), dict(assignment(part, where) for part in _parts(match[2] or ""))
+    return class_named(match[1], where), dict(assignment(part, where) for part in _parts(match[2] or ""))
 
 
 def _parts(text: str) -> list[str]:

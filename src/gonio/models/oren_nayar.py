@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from ..ops import Direction, Mode, Scalar, Spectrum, function, inv_pi, maximum, sqr, where
-from .bsdf import BSDF, Breach
 from .calling import method
+from .material import BSDF, Breach
 from .parameters import Colour, Number, number, spectrum
 
 

@@ -12,8 +12,8 @@ from ..errors import InputError
 from ..ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, vec3, where
 from ..optics.frame import mirror
 from ..optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
-from .bsdf import BSDF, Breach, never
 from .calling import method
+from .material import BSDF, Breach, never
 from .parameters import Colour, Number, flag, number, spectrum
 from .sample import Sample
 

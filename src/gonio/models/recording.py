@@ -10,7 +10,7 @@ from ..ops import Mode, graph
 from . import binding
 
 if TYPE_CHECKING:
-    from .bsdf import BSDF
+    from .material import BSDF
 
 M = TypeVar("M", bound="BSDF")
 

@@ -15,7 +15,7 @@ from ..errors import InputError, did_you_mean
 from .parameters import Parameter
 
 if TYPE_CHECKING:
-    from .bsdf import BSDF
+    from .material import BSDF
 
 M = TypeVar("M", bound="BSDF")
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..ops import Direction, Mode, Scalar, Spectrum, function, vec3, where
-from .bsdf import BSDF, Delta, InnerAlbedo
 from .calling import method
+from .material import BSDF, Delta, InnerAlbedo
 from .parameters import bsdf
 from .sample import Sample
 

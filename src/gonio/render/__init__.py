@@ -28,6 +28,7 @@ def render(
     denoise: bool = False,
     exposure: Exposure = 0.0,
     allow_outside: bool = False,
+    allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
 ) -> RGB:
     """Render a scene file; the picture, (height, width, 3) float32, linear radiance, row 0 on top.
@@ -48,6 +49,7 @@ def render(
     denoise        run Open Image Denoise over the result
     exposure       of a .png: stops, or "auto" for one chosen by the picture's luminance
     allow_outside  let the scene read files outside its folder
+    allow_code     let the scene name materials in Python files, "ward.py:Ward", which then run
     overrides      values by their path in the scene, as `gonio study` varies them
     Warns (GonioWarning) of odd scenes and of a .png that clips. Raises InputError, MachineError.
     """
@@ -71,6 +73,7 @@ def render(
         denoise=denoise,
         exposure=exposure,
         allow_outside=allow_outside,
+        allow_code=allow_code,
         overrides=overrides or {},
     )
     prepared = run.prepare(request)

@@ -34,6 +34,7 @@ class Request:
     denoise: bool = False
     exposure: exposures.Exposure = 0.0
     allow_outside: bool = False
+    allow_code: bool = False
     overrides: Mapping[str, object] = field(default_factory=dict)
 
     def check(self) -> None:

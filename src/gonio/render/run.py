@@ -80,7 +80,12 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     overrides: dict[str, object] = dict(request.overrides)
     if request.size is not None:
         overrides["/camera/film/size"] = [*request.size]
-    description = scene.read(request.scene, allow_outside=request.allow_outside, overrides=overrides)
+    description = scene.read(
+        request.scene,
+        allow_outside=request.allow_outside,
+        allow_code=request.allow_code,
+        overrides=overrides,
+    )
     of_scene = integrators.Settings(
         integrator=description.integrator.type,
         max_depth=description.integrator.max_depth or integrators.Settings.max_depth,

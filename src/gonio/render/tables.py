@@ -4,7 +4,7 @@
     manifest.json   the manifest alone, for people and scripts
     E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. Of a table with
                     three axes the slices stand one below the other, the first on top
-With layout "homework": E.png and E_avg.png exactly as the homework has them (`gonio.energy.tables.baked.homework_pictures`).
+With layout "homework": E.png and E_avg.png exactly as the homework has them (`baked.homework_pictures`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .. import files
 from ..energy.tables import bake as baking
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, models, notation
+from ..models import BSDF, models, notation, outside
 from ..optics.ndf import distributions
 from . import images
 
@@ -104,10 +104,18 @@ def _target(target: str | BSDF) -> str | BSDF:
             hint = "bake a material, such as conductor; alpha is an axis of the table"
             raise InputError(f"'{name}' is a distribution, without parameters", "--param", hint)
         return target
+    if outside.names_code(name):
+        return _own(target, name)
     known = [*distributions(), *models()]
     if name.replace("_", "-") not in known:
         raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))
     return notation.named(target)[0]
+
+
+def _own(target: str, name: str) -> str | BSDF:
+    """A material of a file, or the name of a distribution there."""
+    thing = outside.thing(name, where="TARGET")
+    return notation.named(target)[0] if issubclass(thing, BSDF) else outside.member(name, where="TARGET")
 
 
 def _pictures(baked: Baked) -> dict[str, bytes]:

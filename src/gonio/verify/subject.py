@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import GonioError, InputError
-from ..models import BSDF, Breach, Parameter, Sample, models, notation, tree
+from ..models import BSDF, Breach, Parameter, Sample, notation, tree
 from ..ops import backend
 from . import directions
 
@@ -219,14 +219,4 @@ def of(model: Any) -> Subject:
         return model
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", "verify", "give a gonio.BSDF")
-    return Subject(model, _name(type(model)), notation.settings(model))
-
-
-def _name(cls: type) -> str:
-    """How the command line finds a class: a model's name, else FILE.py:CLASS."""
-    if cls in models().values():
-        return cls.name  # type: ignore[attr-defined]
-    try:
-        return f"{inspect.getsourcefile(cls)}:{cls.__qualname__}"
-    except (TypeError, OSError):
-        return cls.__qualname__
+    return Subject(model, notation.spelled(type(model)), notation.settings(model))

@@ -9,8 +9,6 @@ leather.bsdf             a measured material in the RGL's format
 
 from __future__ import annotations
 
-import importlib.util
-import inspect
 import json
 import re
 from collections.abc import Sequence
@@ -19,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, did_you_mean
-from ..models import BSDF, notation
-from . import subject as subjects
+from ..errors import InputError
+from ..models import notation, outside
 from .subject import Subject
 
 STEPS = 5  # of a sweep
@@ -57,14 +54,13 @@ def _sweep(text: str) -> tuple[str, list[str]]:
 
 
 def _build(target: str, given: dict[str, str]) -> Subject:
-    path, _, name = target.rpartition(":")
     if target.startswith("mitsuba:"):
         from ..render import foreign
 
         values = {key: _property(value) for key, value in given.items()}
         return Subject(foreign.plugin(target.removeprefix("mitsuba:"), values), target, values)
-    if path.endswith(".py"):
-        bsdf, values = notation.made(_class_in(Path(path), name), given)
+    if outside.names_code(target):
+        bsdf, values = notation.made(outside.load(target, where="TARGET"), given)
         return Subject(bsdf, target, values)
     if target.endswith(".py"):
         raise InputError(f"'{target}' names a file, but no class in it", "TARGET", f"give {target}:CLASS")
@@ -73,76 +69,11 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     if Path(target).suffix in (".binary", ".merl", ".csv", ".txt") or Path(target).is_file():
         hint = "measurements in the RGL's .bsdf format can be verified"
         raise InputError(f"'{target}' is in no format that can be verified", "TARGET", hint)
-    if ":" in target.partition("(")[0]:
+    if ":" in target.partition("(")[0] and ".py:" not in target:
         raise InputError(f"'{target}' is no target", "TARGET", "give MODEL, FILE.py:CLASS or mitsuba:PLUGIN")
     cls, own = notation.taken_apart(target)
     bsdf, values = notation.made(cls, {**own, **given})
     return Subject(bsdf, cls.name, values)
-
-
-# --------------------------------------------------------------------------- the user's own
-
-
-def _class_in(path: Path, name: str) -> type[BSDF]:
-    """The class of a Python file, which is run."""
-    if not path.is_file():
-        raise InputError(f"no file '{path}'", "TARGET")
-    spec = importlib.util.spec_from_file_location(f"gonio_target_{path.stem}", path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except GeneratorExit:
-        raise
-    except BaseException as error:
-        line = subjects._line(None, error) if isinstance(error, Exception) else ""
-        raise InputError(f"{type(error).__name__}: {error}", f"{path} {line}".strip(), "the file must run") from None
-    found = getattr(module, name, None)
-    if not isinstance(found, type):
-        classes = [n for n, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__]
-        raise InputError(
-            f"no class '{name}' in it", str(path), did_you_mean(name, classes) if classes else "it has none"
-        )
-    if isinstance(found, type) and issubclass(found, BSDF):
-        if found.eval is BSDF.eval:
-            raise InputError(f"{name} has no eval", str(path), "write eval(self, wo, wi): f |cos theta_i|")
-        return found
-    return adopt(found, str(path))
-
-
-def adopt(cls: type, where: str = "") -> type[BSDF]:
-    """A class that is no gonio.BSDF but has `eval`, as one: `pdf` and `sample` fall back to cosine sampling."""
-    if not callable(getattr(cls, "eval", None)):
-        raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
-    try:
-        inner = cls()
-    except Exception as error:
-        raise InputError(f"{cls.__name__}() fails: {type(error).__name__}: {error}", where, "give defaults") from None
-    methods: dict[str, Any] = {}
-    for name in ("eval", "pdf", "sample"):
-        if callable(getattr(cls, name, None)):
-            methods[name] = _forward(inner, name)
-    for name in ("transmits", "isotropic", "delta", "stochastic", "breaks", "lossless"):
-        if hasattr(cls, name):
-            methods[name] = getattr(inner, name)
-    namespace = {**methods, "__doc__": cls.__doc__, "__module__": cls.__module__, "__annotations__": {}}
-    return type(cls.__name__, (BSDF,), namespace)
-
-
-def _forward(inner: Any, name: str) -> Any:
-    method = getattr(inner, name)
-    takes_mode = "mode" in inspect.signature(method).parameters
-    if name == "pdf":
-
-        def pdf(self: Any, wo: Any, wi: Any) -> Any:
-            return method(wo, wi)
-
-        return pdf
-
-    def forwarded(self: Any, wo: Any, other: Any, mode: str = "radiance") -> Any:
-        return method(wo, other, mode) if takes_mode else method(wo, other)
-
-    return forwarded
 
 
 # --------------------------------------------------------------------------- Mitsuba's
@@ -185,4 +116,4 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     return Subject(foreign.load({**description, **values}), target, values)
 
 
-__all__ = ["adopt", "resolve"]
+__all__ = ["resolve"]

@@ -107,6 +107,7 @@ def study(
     denoise: bool = False,
     exposure: exposures.Exposure = 0.0,
     allow_outside: bool = False,
+    allow_code: bool = False,
     title: str = "",
 ) -> Sheet:
     """Render a scene with every combination of values, and lay the pictures on one labelled sheet.
@@ -133,6 +134,7 @@ def study(
         denoise=denoise,
         exposure=exposure,
         allow_outside=allow_outside,
+        allow_code=allow_code,
     )
     variations = [Variation(path, tuple(values)) for path, values in vary.items()]
     return render_sheet(request, variations, None if output is None else Path(output), title)

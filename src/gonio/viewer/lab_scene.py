@@ -23,7 +23,7 @@ BALLS = 5  # a row
 ENVIRONMENT = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
 
 
-def stage(path: Path, allow_outside: bool = False) -> Stage:
+def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> Stage:
     """The materials of a lab scene on balls, under its light.
 
     Each distinct material is a ball; materials of one model and the same choices share a row. Each lamp becomes a
@@ -34,7 +34,7 @@ def stage(path: Path, allow_outside: bool = False) -> Stage:
 
     Raises InputError as the reader of scenes does: also where a file lies outside the scene's folder.
     """
-    description = scene.read(path, allow_outside=allow_outside)
+    description = scene.read(path, allow_outside=allow_outside, allow_code=allow_code)
     parts = _materials(description)
     if not parts:
         raise InputError("the scene has no shapes", str(path), "add one, or name a model")

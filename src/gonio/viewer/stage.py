@@ -12,13 +12,12 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, Parameter, model, notation, tree
+from ..models import BSDF, Parameter, model, notation, outside, tree
 from ..optics import fresnel, indices
 from .watch import Code
 
@@ -183,7 +182,7 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
     parameters  "name=value" each, for every model that has it; InputError where none has
     """
-    files = [Path(file) for file in map(_file, targets) if file]
+    files = [file for target in (*targets, *parameters) for file in outside.files_in(target)]
     if not files:
         return _of_targets(targets, parameters)
     code = Code(files, partial(_of_targets, targets, parameters))
@@ -197,7 +196,7 @@ def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
         cls, own = _class(target)
         fits = {*cls.parameters(), *(["preset"] if cls.presets() else [])}
         settings = {**{name: value for name, value in wished.items() if name in fits}, **own}
-        bsdfs.append(notation.made(cls, settings)[0])
+        bsdfs.append(outside.probe(notation.made(cls, settings)[0]))
         given.append({*settings})
         known |= fits
     for name in wished:
@@ -206,20 +205,10 @@ def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
     return of_models(bsdfs, given)
 
 
-def _file(target: str) -> str:
-    """The Python file of FILE.py:CLASS, "" of any other target."""
-    file, colon, _ = target.partition("(")[0].rpartition(":")
-    return file if colon and file.endswith(".py") else ""
-
-
 def _class(target: str) -> tuple[type[BSDF], dict[str, str]]:
     """The class of a target, and the parameters that the target itself sets."""
-    if _file(target):
-        from ..verify import targets
-
-        file, _, name = target.rpartition(":")
-        return targets._class_in(Path(file), name), {}
-    if ":" in target.partition("(")[0]:
+    head = target.partition("(")[0]
+    if ":" in head and not outside.names_code(head):
         hint = "the page's shader code is written from Gonio's models only"
         raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
     return notation.taken_apart(target)

@@ -21,6 +21,7 @@ from types import TracebackType
 from typing import Generic, TypeVar
 
 from ..errors import GonioError
+from ..models import outside
 
 POLL_SECONDS = 0.03
 MISSING_POLLS = 10  # some editors delete a file and write it again: that long is no error
@@ -51,6 +52,7 @@ class Code(Generic[Made]):
             sys.modules.pop(name, None)
         others = set(sys.modules)
         importlib.invalidate_caches()
+        outside.forget()
         linecache.checkcache()  # lines that errors quote
         try:
             with self._importable():

@@ -17,8 +17,8 @@ def explain(model: Model, as_json: Json = False) -> None:
     Example:
       gonio explain conductor
     """
-    from ...models import model as find
+    from ...models import notation
     from ...viewer import manual
 
-    page = manual.page(find(model))
+    page = manual.page(notation.class_named(model))
     print(json.dumps(page.as_dict()) if as_json else page.text(shutil.get_terminal_size().columns))

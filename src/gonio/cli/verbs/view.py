@@ -9,7 +9,7 @@ from typer import Argument, Option
 
 from ...errors import InputError
 from .. import completion
-from ..options import Device, Outside, Parameters
+from ..options import Code, Device, Outside, Parameters
 from ..output import print_warnings
 from .base import PICTURES, verb
 
@@ -33,6 +33,7 @@ def view(
     browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True,
     device: Device = "auto",
     allow_outside: Outside = False,
+    allow_code: Code = False,
 ) -> None:
     """Show materials live on shading balls, in a browser, beside a path-traced reference.
 
@@ -53,7 +54,7 @@ def view(
 
         if param:
             raise InputError("a scene takes no parameters here", "--param", "change the scene, or name a model")
-        shown = lab_scene.stage(Path(target[0]), allow_outside)
+        shown = lab_scene.stage(Path(target[0]), allow_outside, allow_code)
     elif target:
         shown = stage.of_targets(target, param or [])
     else:

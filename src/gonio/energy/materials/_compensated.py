@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...models import BSDF, Sample, bsdf, method
-from ...models.bsdf import Delta, InnerAlbedo
+from ...models.material import Delta, InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
 from ...optics.special import gauss
 from ..compensation import missing, reflecting

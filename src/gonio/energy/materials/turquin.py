@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...models import BSDF, Breach, Sample, bsdf, method
-from ...models.bsdf import Delta, InnerAlbedo
+from ...models.material import Delta, InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
 from ..compensation import missing, reflecting
 from ..compensation.lobe import MissingEnergy

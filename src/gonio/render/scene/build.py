@@ -31,6 +31,7 @@ class _Builder:
         from .. import adapter, lights  # here, since they start Dr.Jit
 
         adapter.register(mi)
+        self.adapter = adapter
         lights.register(mi)
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, Any] = {}
@@ -152,7 +153,7 @@ class _Builder:
 
     def plugin(self, material: MaterialPart, where: str) -> dict[str, Any]:
         """The material as a Mitsuba dict."""
-        plugin: dict[str, Any] = {"type": "gonio_" + material.model.name.replace("-", "_")}
+        plugin: dict[str, Any] = {"type": self.adapter.register_model(self.mi, material.model)}
         # Seen from behind nothing is black, as in the lab; a material that transmits has two sides of its own.
         plugin["two_sided"] = material.two_sided is not False
         if material.preset is not None:

@@ -2,21 +2,35 @@
 
 Two families share the `type` key. The lab's six types keep the lab's keys, meaning and defaults (`LAB`); every model
 of `gonio.models` can be named too, with its own parameters and defaults: as `gonio-conductor`, and without the
-prefix where the lab does not use the name. A new model file needs no change here.
+prefix where the lab does not use the name. A new model file needs no change here, and neither does a material that is
+registered later, or a class in a file beside the scene ("ward.py:Ward"), which runs where code is allowed.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, Union
 
-from pydantic import AfterValidator, Field, Strict, create_model, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Strict,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    create_model,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from ...errors import GonioWarning, InputError
-from ...models import BSDF, Parameter, models
+from ...models import BSDF, Parameter, models, outside
 from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
@@ -270,10 +284,61 @@ def _all() -> list[type[MaterialPart]]:
 
 MATERIALS = _all()
 BY_TYPE = {name: cls for cls in MATERIALS for name in cls.model_fields["type"].annotation.__args__}  # type: ignore
+OWN = "FILE.py:CLASS"  # tag of materials that were not there when this module was loaded
+
+
+@functools.cache
+def _own_part(name: str, model: Model) -> type[MaterialPart]:
+    part = _declare((name,), model, None)
+    part.model_rebuild(_types_namespace={"Material": Material})
+    return part
+
+
+def part_of(name: str) -> type[MaterialPart] | None:
+    """The part that describes materials of a type, also of one that was registered since; None where there is none."""
+    if name in BY_TYPE:
+        return BY_TYPE[name]
+    model: Any = models().get(name.replace("_", "-").removeprefix("gonio-"))  # Any: mypy takes it for unhashable
+    return None if model is None else _own_part(name, model)
+
+
+def _tag(value: object) -> str | None:
+    name = value.get("type") if isinstance(value, dict) else getattr(value, "type", None)
+    if not isinstance(name, str):
+        return OWN if not isinstance(value, dict) or name is not None else None
+    own = name not in BY_TYPE and (outside.names_code(name) or part_of(name) is not None)
+    return OWN if own else name
+
+
+def _own(value: object, info: ValidationInfo) -> object:
+    """A material of the user's own: registered, or of a file, which runs where the user allowed it."""
+    if isinstance(value, MaterialPart):
+        return value
+    if not isinstance(value, dict):
+        raise PydanticCustomError("dict_type", "an object expected")
+    name, context = value["type"], info.context or {}
+    if not isinstance(name, str):
+        raise invalid(f"unknown type '{name}'", "known: " + ", ".join(sorted(BY_TYPE)), "type")
+    part = part_of(name)
+    if part is None:
+        if not context.get("allow_code"):
+            hint = "read the file first; then --allow-code lets the scene run it"
+            raise invalid(f"'{name}' is code, which a scene alone does not run", hint, "type")
+        try:
+            code: Any = outside.load(name, context.get("folder"))
+            part = _own_part(name, code)
+        except InputError as error:
+            raise invalid(f"{error.where}: {error.what}", error.hint, "type") from None
+    return part.model_validate(value, context=context)
+
 
 if TYPE_CHECKING:
     Material: TypeAlias = MaterialPart
 else:
-    Material = Annotated[Union[tuple(MATERIALS)], Field(discriminator="type")]  # noqa: UP007
+    _pattern = {"type": {"type": "string", "pattern": r"\.py:\w+$"}}
+    _schema = {"type": "object", "properties": _pattern, "required": ["type"], "description": "A class in a file."}
+    _members = [Annotated[cls, Tag(name)] for name, cls in BY_TYPE.items()]
+    _members.append(Annotated[MaterialPart, PlainValidator(_own), WithJsonSchema(_schema), Tag(OWN)])
+    Material = Annotated[Union[tuple(_members)], Discriminator(_tag)]  # noqa: UP007
     for _cls in MATERIALS:
         _cls.model_rebuild(_types_namespace={"Material": Material})

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError, did_you_mean
 from ..types import Json
-from .materials import BY_TYPE
+from .materials import part_of
 
 
 def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
@@ -113,5 +113,5 @@ def _that_take(holders: list[Json], key: str) -> list[Json]:
     with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
     if with_key:
         return with_key
-    types = [(h, BY_TYPE.get(str(h.get("type")))) for h in holders if isinstance(h, dict)]
+    types = [(h, part_of(str(h.get("type")))) for h in holders if isinstance(h, dict)]
     return [holder for holder, cls in types if cls is not None and key in cls.known_keys()]

@@ -9,9 +9,10 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from ...errors import InputError, did_you_mean
+from ...models import outside
 from ..types import Json
 from . import overrides as override
-from .materials import MaterialPart, numbers_in
+from .materials import OWN, MaterialPart, numbers_in
 from .schema import SceneDescription
 from .text import kind_of, pointer, read_json
 from .values import Part
@@ -20,11 +21,16 @@ SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to
 
 
 def read(
-    path: Path | str, *, allow_outside: bool = False, overrides: Mapping[str, object] | None = None
+    path: Path | str,
+    *,
+    allow_outside: bool = False,
+    allow_code: bool = False,
+    overrides: Mapping[str, object] | None = None,
 ) -> SceneDescription:
     """A scene from a folder with a scene.json, or from a .json file.
 
     allow_outside  let textures and meshes lie outside the scene's folder
+    allow_code     let materials be classes in Python files, "ward.py:Ward", which then run
     overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
     Raises InputError for everything that is wrong with the file or with what it names.
 
@@ -35,7 +41,7 @@ def read(
     if overrides:
         override.apply(raw, overrides)
     try:
-        description = SceneDescription.model_validate(raw)
+        description = SceneDescription.model_validate(raw, context={"folder": file.parent, "allow_code": allow_code})
     except ValidationError as error:
         raise explain(error, raw, file) from None
     description._path = file
@@ -94,7 +100,7 @@ def _check_material(description: SceneDescription, where: str, material: Materia
             place = description.where(f"{where}/{key}")
             description._warnings.append(f"{place}: ignored, as in the lab; 'gonio-{material.model.name}' uses it")
     try:
-        material.instance()
+        outside.probe(material.instance())
     except InputError as error:
         raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
 
@@ -150,7 +156,8 @@ def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
     elif kind == "expected":
         what, hint = f"expected {detail['msg']}, got {got}", _unquote(value) or f"give {detail['msg']}"
     elif kind == "union_tag_invalid":
-        tag, known = context["tag"], [item.strip(" '") for item in context["expected_tags"].split(",")]
+        tag = str(context["tag"])
+        known = [name for item in context["expected_tags"].split(",") if (name := item.strip(" '")) != OWN]
         what, hint, more = f"unknown type '{tag}'", did_you_mean(tag, known), ("type",)
     elif kind == "union_tag_not_found":
         what, hint = "key 'type' is missing", 'add "type": it says what this object is'
