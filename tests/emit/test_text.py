@@ -13,13 +13,15 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import cli, models, ops
-from gonio.emit import DIALECTS, bundle
-from gonio.emit.dialect import literal, pixels
+from gonio.emit import bundle
+from gonio.emit.languages import languages
+from gonio.emit.syntax import literal
+from gonio.emit.textures import pixels
 from gonio.energy.compensation import curves
 from gonio.ops import Table, lookup
 from variants import COMPENSATED, EVERY, FEW, GOLD
 
-LANGS = ("glsl", "wgsl", "hlsl")
+LANGS = tuple(languages())
 
 
 def _functions(text: str) -> dict[str, str]:
@@ -279,13 +281,13 @@ def test_numbers_do_not_shape_the_code() -> None:
 
 def test_names_are_legal_in_every_language() -> None:
     """GLSL keeps gl_ and every double underscore for itself, and each language its own words."""
-    for lang, dialect in DIALECTS.items():
+    for lang, language in languages().items():
         for name, material in FEW.items():
             code = re.sub("//.*", "", bundle(material, lang).text)
             words = set(re.findall(r"[A-Za-z_]\w*", code))
             assert not [w for w in words if "__" in w or w.startswith(("gl_", "_"))], (lang, name)
             declared = set(re.findall(r"(?:\bfn|\blet|\bvar|\bstruct) (\w+)|^    (?:\w+) (\w+) = ", code, re.M))
-            assert not {w for pair in declared for w in pair} & dialect.reserved, (lang, name)
+            assert not {w for pair in declared for w in pair} & language.reserved, (lang, name)
 
 
 def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None:

@@ -1,4 +1,4 @@
-"""What the shell offers after Tab, without loading Dr.Jit: materials, distributions, presets."""
+"""What the shell offers after Tab, without loading Dr.Jit: materials, presets, laws, languages, ..."""
 
 from __future__ import annotations
 
@@ -19,6 +19,18 @@ def materials_and_distributions(incomplete: str) -> Offers:
     return _starting(incomplete, {name: _first_line(type(d)) for name, d in distributions().items()}) + materials(
         incomplete
     )
+
+
+def languages(incomplete: str) -> Offers:
+    from ..emit.languages import languages
+
+    return _starting(incomplete, {name: language.title for name, language in languages().items()})
+
+
+def laws(incomplete: str) -> Offers:
+    from ..verify.laws import laws
+
+    return _starting(incomplete, {name: law.title for name, law in laws().items()})
 
 
 def presets(context: typer.Context, incomplete: str) -> Offers:

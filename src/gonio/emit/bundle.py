@@ -7,27 +7,26 @@ import json
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import files
-from ..errors import InputError, did_you_mean
+from .._version import __version__
+from ..errors import InputError
 from ..models import BSDF, notation, tree
 from ..ops import graph
 from . import program as programs
-from .dialect import Dialect, axes, literal, pixels, reader, width
-from .glsl import GLSL
-from .hlsl import HLSL
+from .languages import Language
 from .layout import COLUMNS, INDENT, comment
+from .names import Names
 from .program import Program
-from .simplify import SIZES, Record
-from .wgsl import WGSL
-from .writer import Writer
-
-DIALECTS: dict[str, Dialect] = {d.name: d for d in (GLSL, WGSL, HLSL)}
+from .routine import RoutineWriter
+from .simplify import SIZES, Record, stem_of
+from .syntax import literal
+from .textures import axes, pixels, reader, width
 
 # how papers write a parameter
 SYMBOLS = {
@@ -52,7 +51,6 @@ class Bundle:
     text: str
     manifest: dict[str, Any]
     tables: dict[str, np.ndarray]
-    dialect: Dialect = field(repr=False)
 
     def write(self, folder: Path | str) -> list[Path]:
         """Write shader, manifest.json and one raw little-endian float32 file a table; the paths written."""
@@ -73,7 +71,7 @@ def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eva
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
 
     model      a material, or its text as the command line takes it: "conductor(preset=Au)"
-    lang       "glsl" (ES 3.00, WebGL2), "wgsl" (WebGPU) or "hlsl" (shader model 6)
+    lang       a language's name, such as "glsl"; `gonio.emit.languages()` has them all
     functions  of "eval", "pdf", "sample", "terms" (D, G, F, ...; where the model has them)
     Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
     "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
@@ -86,70 +84,68 @@ def bundle(
     model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")
 ) -> Bundle:
     """Shader, manifest and tables of a material; arguments as in `emit`."""
-    if str(lang) not in DIALECTS:
-        raise InputError(f"unknown language '{lang}'", "emit: lang", did_you_mean(str(lang), list(DIALECTS)))
+    language = Language.family.get(str(lang))
     if isinstance(model, str):
         model = notation.named(model)[0]
     functions = programs.check(model, functions, "emit")
-    dialect = DIALECTS[str(lang)]
     numbers = dict(_numbers(model))  # raises where there is more than one material's worth
     try:
         made = Program(model, functions)
     except graph.RecordingError as error:
         raise InputError(f"no shader code for it: {error.what}", error.where, error.hint) from error
-    writer = Writer(made, dialect)
-    text = _text(made, writer)
+    names = Names(made, language)
+    text = _text(made, names)
     tables = {f"table_{t.name}": pixels(t) for t in made.tables}
-    return Bundle(text, _manifest(made, writer, numbers), tables, dialect)
+    return Bundle(text, _manifest(made, names, numbers), tables)
 
 
 # ---------------------------------------------------------------------- text
 
 
-def _text(made: Program, writer: Writer) -> str:
-    dialect = writer.dialect
-    bodies = [writer.routine(routine) for routine in made.routines]
-    parts: list[list[str]] = [_head(made, writer)]
+def _text(made: Program, names: Names) -> str:
+    language = names.language
+    bodies = [RoutineWriter(names, r).text() for r in made.routines if stem_of(r) not in language.native]
+    parts: list[list[str]] = [_head(made, names)]
     constants = []
-    for name, (value, about) in writer.constants.items():
-        line = dialect.constant(name, literal(value))
+    for name, (value, about) in names.constants.items():
+        line = language.constant(name, literal(value))
         if about and len(line) + len(about) + 4 <= 110:
             constants.append(f"{line}  // {about}")
         else:
             constants += [*(f"// {text}" for text in textwrap.wrap(about, 105)), line]
     if constants:
         parts.append(constants)
-    for record in _structs(made, writer):
-        parts.append([*comment(record.doc), *_struct(record, writer)])
+    for record in _structs(made, names):
+        parts.append([*comment(record.doc), *_struct(record, names)])
     for place, table in enumerate(made.tables):
         uniform = f"table_{table.name}"
         size = " x ".join(map(str, table.shape))
         channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
         about = f"// {size} texels, {channels}; linear between texel centres, held outside."
-        binding = dialect.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
-        parts.append([*binding, "", about, *reader(dialect, table)])
-    parts += [body for body in bodies if body]
+        binding = language.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
+        parts.append([*binding, "", about, *reader(language, table)])
+    parts += bodies
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 
 
-def _head(made: Program, writer: Writer) -> list[str]:
-    model, dialect = made.model, writer.dialect
+def _head(made: Program, names: Names) -> list[str]:
+    model, language = made.model, names.language
     entries = sorted(made.entries.items(), key=lambda entry: list(ENTRIES).index(entry[0]))
-    from .. import __version__
-
     choices = [f"{path} = {value}" for path, value in _choices(model)]
     lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
     lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
     if choices:
         lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(choices) + ".", 105))]
     lines += ["//"]
-    names = [f"{writer.names[routine]}({', '.join(_arguments(made, method, dialect))})" for method, routine in entries]
-    for name, (method, _) in zip(names, entries, strict=True):
-        lines.append(f"// {name:{max(map(len, names))}}  {ENTRIES[method]}")
+    calls = [
+        f"{names.routines[routine]}({', '.join(_arguments(made, method, language))})" for method, routine in entries
+    ]
+    for call, (method, _) in zip(calls, entries, strict=True):
+        lines.append(f"// {call:{max(map(len, calls))}}  {ENTRIES[method]}")
     lines += [
         "//",
         "// wo points to the viewer, wi to the light: unit vectors of the local frame, away from the surface; +z is",
-        f"// the shading normal. Colours are linear RGB. {dialect.floats}",
+        f"// the shading normal. Colours are linear RGB. {language.precision}",
     ]
     return lines
 
@@ -164,8 +160,8 @@ ENTRIES = {
 }
 
 
-def _arguments(made: Program, method: str, dialect: Dialect) -> list[str]:
-    first = [dialect.word("self")]
+def _arguments(made: Program, method: str, language: Language) -> list[str]:
+    first = [language.word("self")]
     if method == "derive":
         return first
     return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
@@ -179,20 +175,20 @@ def _choices(model: BSDF) -> list[tuple[str, Any]]:
     ]
 
 
-def _structs(made: Program, writer: Writer) -> list[Record]:
+def _structs(made: Program, names: Names) -> list[Record]:
     own = made.struct_of(made.bound)
     assert own is not None
-    writer.note(own.record)
+    names.note(own.record)
     if made.derived is not None:
-        writer.note(made.derived.record)
-    return list(writer.records.values())
+        names.note(made.derived.record)
+    return list(names.records.values())
 
 
-def _struct(record: Record, writer: Writer) -> list[str]:
-    fields = [(writer.dialect.type(type_), writer.dialect.word(name)) for name, type_ in record.fields]
+def _struct(record: Record, names: Names) -> list[str]:
+    fields = [(names.language.type(type_), names.language.word(name)) for name, type_ in record.fields]
     if not fields:  # a struct must have a member
-        fields = [(writer.dialect.type("float"), "nothing")]
-    lines = writer.dialect.struct(writer.dialect.word(record.name), fields)
+        fields = [(names.language.type("float"), "nothing")]
+    lines = names.language.struct(names.language.word(record.name), fields)
     for place, (name, _) in zip(range(len(lines) - 2, 0, -1), reversed(record.fields), strict=False):
         about = record.docs.get(name) or (_term_doc(name) if record.name.endswith("Terms") else "")
         if about and len(lines[place]) + len(about) + 5 <= COLUMNS + 10:
@@ -205,16 +201,16 @@ def _struct(record: Record, writer: Writer) -> list[str]:
 # ---------------------------------------------------------------------- manifest
 
 
-def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[str, Any]:
-    dialect = writer.dialect
+def _manifest(made: Program, names: Names, numbers: dict[str, Any]) -> dict[str, Any]:
+    language = names.language
     model = made.model
     cls = type(model)
     struct = made.struct_of(made.bound)
     assert struct is not None
-    offsets, size = layout([type_ for _, type_ in struct.record.fields], dialect.name)
+    offsets, size = layout([type_ for _, type_ in struct.record.fields], language)
     fields = [
         {
-            "name": dialect.word(name),
+            "name": language.word(name),
             "path": path,
             "type": type_,
             "value": numbers[path],
@@ -227,20 +223,20 @@ def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[st
     derived = made.derived
     return {
         "version": 1,
-        "lang": dialect.name,
+        "lang": language.name,
         "model": cls.name,
         "title": cls.__name__,
         "doc": inspect.cleandoc(cls.__doc__ or ""),
-        "shader": cls.name + dialect.suffix,
-        "struct": dialect.word(struct.record.name),
+        "shader": cls.name + language.suffix,
+        "struct": language.word(struct.record.name),
         "size": size,
         "fields": fields,
         "derived": derived
         and {
-            "struct": dialect.word(derived.record.name),
-            "fields": [{"name": dialect.word(name), "type": type_} for name, type_ in derived.record.fields],
+            "struct": language.word(derived.record.name),
+            "fields": [{"name": language.word(name), "type": type_} for name, type_ in derived.record.fields],
         },
-        "functions": {method: writer.names[routine] for method, routine in made.entries.items()},
+        "functions": {method: names.routines[routine] for method, routine in made.entries.items()},
         "terms": [
             {"name": name, "type": type_, "doc": _term_doc(name)}
             for name, type_ in (terms.record.fields if terms and terms.record else [])
@@ -265,17 +261,13 @@ def _manifest(made: Program, writer: Writer, numbers: dict[str, Any]) -> dict[st
     }
 
 
-def layout(types: list[str], lang: str) -> tuple[list[int], int]:
+def layout(types: list[str], language: Language) -> tuple[list[int], int]:
     """(offset of each field in bytes, size of the struct) in a uniform buffer: std140, WGSL's, or a cbuffer of HLSL."""
     offsets, end = [], 0
     for type_ in types:
         size = 4 * SIZES.get(type_, 1)
-        if lang == "hlsl":  # packed, but no vector crosses a row of 16 bytes
-            start = end if end % 16 + size <= 16 else end + -end % 16
-        else:
-            start = end + -end % {4: 4, 8: 8, 12: 16, 16: 16}[size]
-        offsets.append(start)
-        end = start + size
+        offsets.append(language.offset(end, size))
+        end = offsets[-1] + size
     return offsets, max(16, end + -end % 16)
 
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
-from .dialect import AND, ATOM, CHOICE, NATIVE, OPERATORS, OR, SIGN, SUM
 from .layout import INDENT, comment, common_head, wrap
+from .names import Names
 from .program import Struct, flat, place
 from .simplify import Routine, Value, needed, stem_of
 from .source import returned_by
-
-if TYPE_CHECKING:
-    from .writer import Writer
+from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
 
 INLINE = 88  # characters: a longer part of an expression gets a line of its own
 
@@ -23,11 +20,11 @@ SELECTED = ("parameter", "constant", "component", "swizzle", "element")
 class RoutineWriter:
     """Writes one routine: which values get a line, what they are called, and the text of each."""
 
-    def __init__(self, writer: Writer, routine: Routine) -> None:
-        self.writer, self.routine, self.dialect = writer, routine, writer.dialect
-        self.program = writer.program
+    def __init__(self, names: Names, routine: Routine) -> None:
+        self.names, self.routine, self.language = names, routine, names.language
+        self.program = names.program
         self.arguments = self.program.recorded[routine].arguments if routine in self.program.recorded else {}
-        self.taken: set[str] = {*writer.names.values()}
+        self.taken: set[str] = {*names.routines.values()}
         self.parameter_names: dict[int, str] = {}
         self.heads: list[tuple[str, str]] = []
         self.objects: dict[str, tuple[Struct, str]] = {}  # "struct name" -> (struct, name of the parameter)
@@ -60,24 +57,24 @@ class RoutineWriter:
                 if parameter in mine or entry:
                     name = self.fresh(flat(parameter.static))
                     self.parameter_names[parameter.order] = name
-                    if self.dialect.parameters_change:
+                    if self.language.parameters_change:
                         self.holders[name] = parameter
-                    self.heads.append((self.dialect.type(parameter.type), name))
+                    self.heads.append((self.language.type(parameter.type), name))
 
     def _object(self, struct: Struct, name: str, parameters: list[Value]) -> None:
         name = self.fresh(name) if struct.record.name not in self.objects else self.objects[struct.record.name][1]
         if struct.record.name not in self.objects:
             self.objects[struct.record.name] = (struct, name)
-            self.heads.append((self.writer.note(struct.record), name))
+            self.heads.append((self.names.note(struct.record), name))
         for parameter in parameters:
             field = flat(place(parameter.static)[1])
-            self.parameter_names[parameter.order] = f"{name}.{self.dialect.word(field)}"
+            self.parameter_names[parameter.order] = f"{name}.{self.language.word(field)}"
 
     def fresh(self, name: str) -> str:
         """A name that is free in this function."""
-        base = self.dialect.word(name)
+        base = self.language.word(name)
         found, count = base, 1
-        while found in self.taken or found in self.dialect.reserved:
+        while found in self.taken or found in self.language.reserved:
             count += 1
             # a digit without the dash is a power, x2 is x squared; and GLSL keeps "__" for itself
             found = f"{base.rstrip('_')}_{count}"
@@ -95,7 +92,7 @@ class RoutineWriter:
         for index, value in enumerate(statements):
             self._define(value, index, last_use)
         body = self._result()
-        head = self.dialect.signature(self.writer.note(routine.type), self.writer.names[routine], self.heads)
+        head = self.language.signature(self.names.note(routine.type), self.names.routines[routine], self.heads)
         return [*comment(self._doc()), *wrap(head, ""), *self.lines, *body, "}"]
 
     def _doc(self) -> str:
@@ -125,8 +122,8 @@ class RoutineWriter:
         if called is not None:
             return wrap(f"return {self.whole(called)};", INDENT)
         parts = [self.splat(value, type_) for value, (_, type_) in zip(values, record.fields, strict=True)]
-        name = self.writer.note(record)
-        if self.dialect.struct_literal:
+        name = self.names.note(record)
+        if self.language.struct_literal:
             return wrap(f"return {name}({', '.join(parts)});", INDENT)
         result = self.fresh("result")
         lines = wrap(f"{name} {result} = {{ {', '.join(parts)} }};", INDENT)
@@ -208,18 +205,18 @@ class RoutineWriter:
 
     def _define(self, value: Value, index: int, last_use: dict[int, int]) -> None:
         text = self.whole(value)
-        type_ = self.writer.note(value.type)
-        wanted = self.dialect.word(self._name_for(value))
+        type_ = self.names.note(value.type)
+        wanted = self.language.word(self._name_for(value))
         name = self._served(wanted, value, index, last_use)
         if name:  # Python gave the name anew when the old value had served: so does the shader
             if name in self.first_lines:
                 line = self.first_lines[name]
-                self.lines[line] = self.lines[line].replace("let ", "var ", 1)
+                self.lines[line] = self.language.changeable(self.lines[line])
             self.lines += wrap(f"{name} = {text};", INDENT)
         else:
             name = self.fresh(wanted)
             self.first_lines[name] = len(self.lines)
-            self.lines += wrap(self.dialect.local(type_, name, text), INDENT)
+            self.lines += wrap(self.language.local(type_, name, text), INDENT)
         self.holders[name] = value
         self.locals[value.order] = name
 
@@ -274,7 +271,7 @@ class RoutineWriter:
     def whole(self, value: Value) -> str:
         """The text of a statement's value."""
         text = self.expression(value, root=True)[0]
-        if self.dialect.name == "wgsl" and value.op in ("lt", "le", "and", "or") and "," not in text:
+        if self.language.templates and value.op in ("lt", "le", "and", "or") and "," not in text:
             text = re.sub(r"(?<!\w)\(([\w.]+ <=? [\w.]+)\)", r"\1", text)  # nothing here can be read as a template
         return text
 
@@ -290,7 +287,7 @@ class RoutineWriter:
         text, level = self.compose(value)
         if not root and len(text) > INLINE and value.op not in (*SELECTED, "call"):  # a call is broken at its commas
             name = self.fresh(self._name_for(value))
-            self.lines += wrap(self.dialect.local(self.writer.note(value.type), name, text), INDENT)
+            self.lines += wrap(self.language.local(self.names.note(value.type), name, text), INDENT)
             self.locals[value.order] = name
             return name, ATOM
         return text, level
@@ -307,17 +304,16 @@ class RoutineWriter:
             return f"{self.part(args[0], ATOM)}.{value.static}", ATOM
         if op == "element":
             field = value.args[0].static.record.fields[value.static][0]
-            return f"{self.part(args[0], ATOM)}.{self.dialect.word(field)}", ATOM
+            return f"{self.part(args[0], ATOM)}.{self.language.word(field)}", ATOM
         if op == "splat":
             return self.splat(args[0], value.type), SIGN
         if op == "vector":
             parts = [self.whole_or_local(a) for a in args]
-            return f"{self.dialect.type(value.type)}({', '.join(parts)})", ATOM
-        if op == "call" and stem_of(value.static) in NATIVE:
-            kind = value.type if self.dialect.splat else "float"
-            return f"{self.writer.names[value.static]}({', '.join(self.splat(a, kind) for a in args)})", ATOM
+            return f"{self.language.type(value.type)}({', '.join(parts)})", ATOM
+        if op == "call" and stem_of(value.static) in self.language.native:
+            return f"{self.names.routines[value.static]}({', '.join(self.splat(a, value.type) for a in args)})", ATOM
         if op == "call":
-            return f"{self.writer.names[value.static]}({', '.join(self.call_arguments(value))})", ATOM
+            return f"{self.names.routines[value.static]}({', '.join(self.call_arguments(value))})", ATOM
         if op == "texel":
             return self.texel(value), ATOM
         if op == "neg":
@@ -327,10 +323,10 @@ class RoutineWriter:
         if op == "not" and value.type == "bool":
             return f"!{self.part(args[0], SIGN)}", SIGN
         wide = value.type.startswith("bvec")
-        if op in OPERATORS and not (wide and op in self.dialect.compare):
+        if op in OPERATORS and not (wide and op in self.language.compare):
             return self.infix(value)
-        template = self.dialect.compare[op] if wide else self.dialect.words[op]
-        spread = self.dialect.splat and (wide or op in ("minimum", "maximum"))
+        template = self.language.compare[op] if wide else self.language.words[op]
+        spread = wide or op in ("minimum", "maximum")
         kind = max((a.type for a in args), key=lambda t: t.startswith("vec"))
         parts = [self.splat(a, kind) if spread else self.whole_or_local(a) for a in args]
         return template.format(*parts), ATOM
@@ -359,14 +355,14 @@ class RoutineWriter:
             )
         if value.type.startswith("bvec"):
             left, right = self.splat(a, "vec" + value.type[-1]), self.splat(b, "vec" + value.type[-1])
-        if value.op in ("lt", "le") and self.dialect.name == "wgsl":  # or `a < b, c > d` is read as a template
+        if value.op in ("lt", "le") and self.language.templates:  # or `a < b, c > d` is read as a template
             return f"({left} {symbol} {right})", ATOM
         return f"{left} {symbol} {right}", level
 
     def choice(self, value: Value) -> tuple[str, int]:
         mask, a, b = value.args
         vector = mask.type.startswith("bvec")
-        template = self.dialect.choice[vector]
+        template = self.language.choice[vector]
         infix = "?" in template
         parts = [self.part(mask, OR) if infix else self.whole_or_local(mask)]
         parts += [self.splat(x, value.type, CHOICE + 1 if infix else CHOICE) for x in (a, b)]
@@ -382,14 +378,14 @@ class RoutineWriter:
 
     def spread(self, type_: str, text: tuple[str, int]) -> str:
         """A float spread over a vector."""
-        inside = text[0] if "({1})" in self.dialect.spread or text[1] == ATOM else f"({text[0]})"
-        return self.dialect.spread.format(self.dialect.type(type_), inside)
+        inside = text[0] if "({1})" in self.language.spread or text[1] == ATOM else f"({text[0]})"
+        return self.language.spread.format(self.language.type(type_), inside)
 
     def constant(self, value: Value) -> tuple[str, int]:
         if value.type in ("bool",) or value.type.startswith("bvec"):
             text = "true" if value.static else "false"
-            return (text if value.type == "bool" else f"{self.dialect.type(value.type)}({text})"), ATOM
-        text = self.writer.number(value)
+            return (text if value.type == "bool" else f"{self.language.type(value.type)}({text})"), ATOM
+        text = self.names.number(value)
         if value.type != "float":
             return self.spread(value.type, (text, SIGN if text.startswith("-") else ATOM)), SIGN
         return text, SIGN if text.startswith("-") else ATOM
@@ -435,7 +431,7 @@ class RoutineWriter:
         if name in self.objects:
             own = self.objects[name][1]
             if all(
-                self.parameter_names.get(v.order) == f"{own}.{self.dialect.word(field)}"
+                self.parameter_names.get(v.order) == f"{own}.{self.language.word(field)}"
                 for field, (v, used) in fields.items()
                 if used
             ):
@@ -452,9 +448,9 @@ class RoutineWriter:
         key = (name, tuple(parts))
         if key not in self.built:
             local = self.fresh(common_head(parts) or name[0].lower() + name[1:])
-            type_name = self.writer.note(struct.record)
-            if self.dialect.struct_literal:
-                line = self.dialect.local(type_name, local, f"{type_name}({', '.join(parts)})")
+            type_name = self.names.note(struct.record)
+            if self.language.struct_literal:
+                line = self.language.local(type_name, local, f"{type_name}({', '.join(parts)})")
             else:
                 line = f"{type_name} {local} = {{ {', '.join(parts)} }};"
             self.lines += wrap(line, INDENT)
@@ -468,7 +464,7 @@ class RoutineWriter:
         struct = self.program.derived_of(value) if derived or isinstance(value, dict) else self.program.struct_of(value)
         if struct is not None and struct.record.name in self.objects and path in struct.paths:
             own = self.objects[struct.record.name][1]
-            self.parameter_names[parameter.order] = f"{own}.{self.dialect.word(flat(path))}"
+            self.parameter_names[parameter.order] = f"{own}.{self.language.word(flat(path))}"
 
 
 def _squares(value: Value) -> bool:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from typer import Option
 
+from .. import completion
 from ..options import Json, Material, Model
 from .base import MATERIALS, verb
 
@@ -17,7 +18,9 @@ from .base import MATERIALS, verb
 def emit(
     model: Model,
     *,
-    lang: Annotated[str, Option(metavar="glsl|wgsl|hlsl", help="The shader language.")] = "glsl",
+    lang: Annotated[
+        str, Option(metavar="NAME", help="The shader language.", autocompletion=completion.languages)
+    ] = "glsl",
     functions: Annotated[str, Option(metavar="NAME,..", help="Which of eval, pdf, sample, terms.")] = "eval,pdf,sample",
     made: Material,
     output: Annotated[
@@ -28,7 +31,7 @@ def emit(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write a material as shader code, traced from its own source: GLSL ES 3.00, WGSL or HLSL.
+    """Write a material as shader code, traced from its own source: GLSL, WGSL, HLSL, or a language of yours.
 
     \b
     Examples:

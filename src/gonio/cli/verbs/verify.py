@@ -32,7 +32,10 @@ def verify(
     quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False,
     deep: Annotated[bool, Option("--deep", help="More samples, more directions, more widths.")] = False,
     seed: Annotated[int, Option(metavar="N", help="Of all random numbers.")] = 1,
-    law: Annotated[list[str] | None, Option("--law", metavar="NAME", help="Only this law; repeatable.")] = None,
+    law: Annotated[
+        list[str] | None,
+        Option("--law", metavar="NAME", help="Only this law; repeatable.", autocompletion=completion.laws),
+    ] = None,
     at: Annotated[
         str, Option(metavar="O/I", help="Only print both ways of one pair, theta,phi/theta,phi in degrees.")
     ] = "",

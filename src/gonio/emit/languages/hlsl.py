@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from .dialect import Dialect
-from .glsl import WORDS as GLSL_WORDS
+from collections.abc import Mapping
+from typing import ClassVar
 
-TYPES = {
-    "vec2": "float2",
-    "vec3": "float3",
-    "vec4": "float4",
-    "bvec2": "bool2",
-    "bvec3": "bool3",
-}
+from .base import Language
 
-WORDS = {
-    **GLSL_WORDS,
-    "atan2": "atan2({0}, {1})",
-    "exponent": "float((asint({0}) >> 23) - 127)",
-    "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
-}
-
-_WORDS = """
+_RESERVED = """
     AppendStructuredBuffer asm asm_fragment BlendState bool break Buffer ByteAddressBuffer case cbuffer centroid
     class column_major compile compile_fragment CompileShader const continue ComputeShader
     ConsumeStructuredBuffer default DepthStencilState DepthStencilView discard do double DomainShader dword else
@@ -39,52 +26,42 @@ _WORDS = """
     mad max min modf mul noise normalize pow radians rcp reflect refract round rsqrt saturate select sign sin
     sincos sinh smoothstep sqrt step tan tanh transpose trunc main
 """
-RESERVED = frozenset(_WORDS.split())
 
 
-def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str:
-    return f"{result} {name}({', '.join(f'{type_} {p}' for type_, p in parameters)}) {{"
+class HLSL(Language):
+    """HLSL 2021."""
 
+    name = "hlsl"
+    title = "HLSL 2021 (shader model 6)"
+    suffix = ".hlsl"
+    precision = "float is 32 bits: min16float will not do."
+    types: ClassVar[Mapping[str, str]] = {
+        "vec2": "float2",
+        "vec3": "float3",
+        "vec4": "float4",
+        "bvec2": "bool2",
+        "bvec3": "bool3",
+    }
+    words: ClassVar[Mapping[str, str]] = {
+        **Language.words,
+        "exponent": "float((asint({0}) >> 23) - 127)",
+        "scaled": "{0} * asfloat((int({1}) + 127) << 23)",
+    }
+    choice = ("{0} ? {1} : {2}", "select({0}, {1}, {2})")
+    spread = "({0}){1}"
+    mix = "lerp"
+    reserved = frozenset(_RESERVED.split())
+    struct_literal = False
 
-def _local(type_: str, name: str, text: str) -> str:
-    return f"{type_} {name} = {text};"
+    def constant(self, name: str, text: str) -> str:
+        return f"static const float {name} = {text};"
 
+    def binding(self, name: str, dimension: int, place: int) -> list[str]:
+        return [f"Texture{dimension}D<float4> {name} : register(t{place});"]
 
-def _constant(name: str, text: str) -> str:
-    return f"static const float {name} = {text};"
+    def fetch(self, table: str, places: list[str]) -> str:
+        return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"
 
-
-def _struct(name: str, fields: list[tuple[str, str]]) -> list[str]:
-    return [f"struct {name} {{", *(f"    {type_} {field};" for type_, field in fields), "};"]
-
-
-def _binding(name: str, dimension: int, place: int) -> list[str]:
-    return [f"Texture{dimension}D<float4> {name} : register(t{place});"]
-
-
-def _fetch(table: str, places: list[str]) -> str:
-    return f"{table}.Load(int{len(places) + 1}({', '.join(places)}, 0))"
-
-
-HLSL = Dialect(
-    name="hlsl",
-    suffix=".hlsl",
-    types=TYPES,
-    words=WORDS,
-    compare={},
-    choice=("{0} ? {1} : {2}", "select({0}, {1}, {2})"),
-    spread="({0}){1}",
-    splat=True,
-    overloads=True,
-    floats="float is 32 bits: min16float will not do.",
-    parameters_change=True,
-    struct_literal=False,
-    reserved=RESERVED,
-    signature=_signature,
-    local=_local,
-    constant=_constant,
-    struct=_struct,
-    binding=_binding,
-    fetch=_fetch,
-    mix="lerp",
-)
+    def offset(self, end: int, size: int) -> int:
+        """Packed, but no vector crosses a row of 16 bytes."""
+        return end if end % 16 + size <= 16 else end + -end % 16

@@ -1,15 +1,15 @@
-"""What the routines of a shader share: their names, the constants and structs that they come to need."""
+"""What the routines of a shader share: their names, and the constants and structs that they come to need."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from .dialect import NATIVE, Dialect, literal
+from .languages import Language
 from .program import Program
-from .routine import RoutineWriter
 from .simplify import Record, Routine, Value, check_single, stem_of
 from .source import module_constant
+from .syntax import literal
 
 CONSTANTS = {
     "PI": math.pi,
@@ -19,29 +19,34 @@ CONSTANTS = {
 }
 
 
-class Writer:
-    """Writes the routines of a program in a dialect."""
+class Names:
+    """Names in the shader of a program: of its routines, and of what they come to need while they are written.
 
-    def __init__(self, program: Program, dialect: Dialect) -> None:
-        self.program, self.dialect = program, dialect
+    routines   the name of each
+    constants  name -> (number, what it is)
+    records    name -> struct
+    """
+
+    def __init__(self, program: Program, language: Language) -> None:
+        self.program, self.language = program, language
         self.constants: dict[str, tuple[float, str]] = {}
-        self.names: dict[Routine, str] = {}
+        self.routines: dict[Routine, str] = {}
         self.records: dict[str, Record] = {}
         self.signatures: dict[tuple, Routine] = {}
         taken: set[str] = set()
         for routine in program.routines:
             name = self._routine_name(routine, taken)
             taken.add(name)
-            self.names[routine] = name
+            self.routines[routine] = name
 
     def _routine_name(self, routine: Routine, taken: set[str]) -> str:
-        name = self.dialect.word(stem_of(routine))
-        of_floats = any(n == name and r.type == "float" for r, n in self.names.items())
-        if of_floats and routine.type == "vec3" and not self.dialect.overloads:
+        name = self.language.word(stem_of(routine))
+        of_floats = any(n == name and r.type == "float" for r, n in self.routines.items())
+        if of_floats and routine.type == "vec3" and not self.language.overloads:
             name = f"{name}_rgb"
-        if stem_of(routine) in NATIVE:
+        if stem_of(routine) in self.language.native:
             return stem_of(routine)
-        if self.dialect.overloads:
+        if self.language.overloads:
             types = tuple(v.type for v in routine.parameters)
             if self.signatures.setdefault((name, types), routine) is routine and self._same_doc(name, routine):
                 return name
@@ -54,7 +59,7 @@ class Writer:
 
     def _told_apart(self, name: str, routine: Routine) -> str:
         """The name with what a copy was recorded for, where that is a flag or a word: "masking_shadowing_transmits"."""
-        first = next(r for r, known in self.names.items() if known == name)
+        first = next(r for r, known in self.routines.items() if known == name)
         if first.source != routine.source:
             return name
         before, now = (self.program.recorded[r].arguments for r in (first, routine))
@@ -67,7 +72,7 @@ class Writer:
 
     def _same_doc(self, name: str, routine: Routine) -> bool:
         """Whether a name stands for one function of the source, in different types."""
-        return all(self.names[r] != name or r.source == routine.source for r in self.names)
+        return all(self.routines[r] != name or r.source == routine.source for r in self.routines)
 
     def note(self, record: Any) -> str:
         """The name of a type in the language; structs are noted, to be declared."""
@@ -75,14 +80,8 @@ class Writer:
             record = record.record
         if isinstance(record, Record):
             self.records.setdefault(record.name, record)
-            return self.dialect.word(record.name)
-        return self.dialect.type(record)
-
-    def routine(self, routine: Routine) -> list[str]:
-        """The text of a function, its documentation above it; nothing where the language has its own."""
-        if stem_of(routine) in NATIVE:
-            return []
-        return RoutineWriter(self, routine).text()
+            return self.language.word(record.name)
+        return self.language.type(record)
 
     def number(self, value: Value) -> str:
         """A constant by its name, where it has one, or in digits."""

@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-from .dialect import Dialect
-from .glsl import WORDS as GLSL_WORDS
+from collections.abc import Mapping
+from typing import ClassVar
 
-TYPES = {
-    "float": "f32",
-    "int": "i32",
-    "vec2": "vec2f",
-    "vec3": "vec3f",
-    "vec4": "vec4f",
-    "bvec2": "vec2<bool>",
-    "bvec3": "vec3<bool>",
-}
-
-WORDS = {
-    **GLSL_WORDS,
-    "atan2": "atan2({0}, {1})",
-    "exponent": "f32((bitcast<i32>({0}) >> 23) - 127)",
-    "scaled": "{0} * bitcast<f32>((i32({1}) + 127) << 23)",
-}
+from .base import Language
 
 # keywords, and the words that the specification keeps for later
-_WORDS = """
+_RESERVED = """
     alias break case const const_assert continue continuing default diagnostic discard else enable false fn for
     if let loop override requires return struct switch true var while NULL Self abstract active alignas alignof
     as asm asm_fragment async attribute auto await become cast catch class co_await co_return co_yield coherent
@@ -42,52 +27,52 @@ _WORDS = """
     min mix modf normalize pow radians reflect refract round saturate sign sin sinh smoothstep sqrt step tan
     tanh transpose trunc main
 """
-RESERVED = frozenset(_WORDS.split())
 
 
-def _signature(result: str, name: str, parameters: list[tuple[str, str]]) -> str:
-    return f"fn {name}({', '.join(f'{p}: {type_}' for type_, p in parameters)}) -> {result} {{"
+class WGSL(Language):
+    """WGSL."""
 
+    name = "wgsl"
+    title = "WGSL (WebGPU)"
+    suffix = ".wgsl"
+    precision = "f32 throughout: f16 will not do."
+    types: ClassVar[Mapping[str, str]] = {
+        "float": "f32",
+        "int": "i32",
+        "vec2": "vec2f",
+        "vec3": "vec3f",
+        "vec4": "vec4f",
+        "bvec2": "vec2<bool>",
+        "bvec3": "vec3<bool>",
+    }
+    words: ClassVar[Mapping[str, str]] = {
+        **Language.words,
+        "exponent": "f32((bitcast<i32>({0}) >> 23) - 127)",
+        "scaled": "{0} * bitcast<f32>((i32({1}) + 127) << 23)",
+    }
+    choice = ("select({2}, {1}, {0})", "select({2}, {1}, {0})")
+    reserved = frozenset(_RESERVED.split())
+    overloads = False
+    parameters_change = False
+    templates = True
 
-def _local(type_: str, name: str, text: str) -> str:
-    return f"let {name} = {text};"
+    def signature(self, result: str, name: str, parameters: list[tuple[str, str]]) -> str:
+        return f"fn {name}({', '.join(f'{p}: {type_}' for type_, p in parameters)}) -> {result} {{"
 
+    def local(self, type_: str, name: str, text: str) -> str:
+        return f"let {name} = {text};"
 
-def _constant(name: str, text: str) -> str:
-    return f"const {name} = {text}f;" if "e" in text else f"const {name}: f32 = {text};"
+    def changeable(self, line: str) -> str:
+        return line.replace("let ", "var ", 1)
 
+    def constant(self, name: str, text: str) -> str:
+        return f"const {name} = {text}f;" if "e" in text else f"const {name}: f32 = {text};"
 
-def _struct(name: str, fields: list[tuple[str, str]]) -> list[str]:
-    return [f"struct {name} {{", *(f"    {field}: {type_}," for type_, field in fields), "}"]
+    def struct(self, name: str, fields: list[tuple[str, str]]) -> list[str]:
+        return [f"struct {name} {{", *(f"    {field}: {type_}," for type_, field in fields), "}"]
 
+    def binding(self, name: str, dimension: int, place: int) -> list[str]:
+        return [f"@group(0) @binding({place}) var {name}: texture_{dimension}d<f32>;"]
 
-def _binding(name: str, dimension: int, place: int) -> list[str]:
-    return [f"@group(0) @binding({place}) var {name}: texture_{dimension}d<f32>;"]
-
-
-def _fetch(table: str, places: list[str]) -> str:
-    return f"textureLoad({table}, vec{len(places)}i({', '.join(places)}), 0)"
-
-
-WGSL = Dialect(
-    name="wgsl",
-    suffix=".wgsl",
-    types=TYPES,
-    words=WORDS,
-    compare={},
-    choice=("select({2}, {1}, {0})", "select({2}, {1}, {0})"),
-    spread="{0}({1})",
-    splat=True,
-    overloads=False,
-    floats="f32 throughout: f16 will not do.",
-    parameters_change=False,
-    struct_literal=True,
-    reserved=RESERVED,
-    signature=_signature,
-    local=_local,
-    constant=_constant,
-    struct=_struct,
-    binding=_binding,
-    fetch=_fetch,
-    mix="mix",
-)
+    def fetch(self, table: str, places: list[str]) -> str:
+        return f"textureLoad({table}, vec{len(places)}i({', '.join(places)}), 0)"

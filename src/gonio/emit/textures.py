@@ -1,0 +1,80 @@
+"""Tables as textures: their size and contents, and the function that reads one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..ops.table import Table
+from .languages import Language
+
+
+def axes(table: Table) -> tuple[int, ...]:
+    """Texels along x, y, z of a table's texture: the last axis is x; groups of four channels are stacked last."""
+    sizes = [*reversed(table.shape)]
+    if groups(table) > 1:
+        if len(sizes) == 3:
+            sizes[2] *= groups(table)
+        else:
+            sizes.append(groups(table))
+    return tuple(sizes if len(sizes) > 1 else [*sizes, 1])
+
+
+def width(table: Table) -> int:
+    """Channels of a texel."""
+    return table.channels if table.channels in (1, 2) else 4
+
+
+def groups(table: Table) -> int:
+    """How many textures' worth of channels."""
+    return -(-table.channels // width(table))
+
+
+def pixels(table: Table) -> np.ndarray:
+    """The texture's contents in the order of upload, x fastest, channels last; float32."""
+    padded = np.zeros((*table.shape, groups(table) * width(table)))
+    padded[..., : table.channels] = table.values
+    split = padded.reshape(*table.shape, groups(table), width(table))
+    return np.ascontiguousarray(np.moveaxis(split, -2, 0), dtype=np.float32).reshape(*reversed(axes(table)), -1)
+
+
+def reader(language: Language, table: Table) -> list[str]:
+    """The function that reads a table: linear in each axis between texel centres, held outside (`gonio.ops.table`).
+
+    A shader's own filtering would not do: its weights have eight bits.
+    """
+    names = list("xyz"[: len(table.shape)])  # in the order of a lookup, slowest axis first
+    sizes = dict(zip(names, table.shape, strict=True))
+    many = groups(table) > 1
+    channels = width(table)
+    real, whole = language.type("float"), language.type("int")
+    result = real if channels == 1 else language.type(f"vec{channels}")
+    parameters = [(real, name) for name in names] + [(whole, "group")] * many
+    lines = [language.signature(result, f"lookup_{table.name}", parameters)]
+    for axis, count in sizes.items():
+        at, cell = f"at_{axis}", f"{axis}0"
+        for type_, name, text in (
+            (real, at, f"clamp({axis} * {count}.0 - 0.5, 0.0, {count - 1}.0)"),
+            (whole, cell, f"min({whole}({at}), {max(count - 2, 0)})"),
+            (real, f"t_{axis}", f"{at} - {real}({cell})"),
+        ):
+            lines.append("    " + language.local(type_, name, text))
+
+    def texel(steps: dict[str, int]) -> str:
+        places = [f"{axis}0" + (" + 1" if steps[axis] and sizes[axis] > 1 else "") for axis in reversed(names)]
+        if many and len(places) == 3:
+            places[2] = f"group * {sizes[names[0]]} + {places[2]}"
+        elif many:
+            places.append("group")
+        elif len(places) == 1:
+            places.append("0")
+        return language.fetch(f"table_{table.name}", places) + {1: ".r", 2: ".rg", 4: ""}[channels]
+
+    def between(rest: list[str], steps: dict[str, int], indent: str) -> str:
+        if not rest:
+            return indent + texel(steps)
+        axis, *others = rest
+        low, high = (between(others, {**steps, axis: step}, indent + "    ") for step in (0, 1))
+        return f"{indent}{language.mix}(\n{low},\n{high},\n{indent}    t_{axis})"
+
+    body = between(names, {}, "    ").strip()
+    return [*lines, *f"    return {body};".splitlines(), "}"]
