@@ -9,16 +9,13 @@ Copies are made in this file and nowhere else.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from ..ops import backend
 from . import tree
-from .parameters import Parameter
+from .parameters import Material, Parameter
 
-if TYPE_CHECKING:
-    from .material import BSDF
-
-M = TypeVar("M", bound="BSDF")
+M = TypeVar("M", bound=Material)
 
 DERIVED = "derived"  # the part of a bound copy that holds what `derive` gave, in recordings and their names
 
@@ -64,7 +61,7 @@ def with_derived(material: M, derived: Any) -> M:
     return bound_copy(material, {}, derived)
 
 
-def settled(material: BSDF) -> Any:
+def settled(material: Material) -> Any:
     """What a bound copy derives, evaluated now: where no parameter varies from ray to ray and none is being
     differentiated, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
     if not material.derives:
@@ -77,7 +74,7 @@ def settled(material: BSDF) -> Any:
     return derived
 
 
-def values(material: BSDF) -> Iterator[Any]:
+def values(material: Material) -> Iterator[Any]:
     """The numeric values of a bound copy, inner materials' included."""
     for leaf in tree.leaves(material):
         if leaf.parameter.numeric and leaf.value is not None:
@@ -91,6 +88,6 @@ def shift(material: M, path: str, change: Callable[[Any], Any]) -> M:
     return bound_copy(material, {name: shift(value, rest, change) if rest else change(value)})
 
 
-def _plain(material: BSDF) -> bool:
+def _plain(material: Material) -> bool:
     """Whether all numbers are plain ones, which cannot change behind our back as arrays can."""
     return all(isinstance(leaf.value, int | float | tuple) for leaf in tree.leaves(material) if leaf.parameter.numeric)

@@ -18,10 +18,8 @@ from .. import ops
 from ..errors import InputError
 from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
 from . import binding, tree
+from .parameters import Material
 from .sample import Sample
-
-if TYPE_CHECKING:
-    from .material import BSDF
 
 MODES = ("radiance", "importance")
 UNIT = 1e-2  # how far from 1 a direction's length may be: rounding, and what people type by hand
@@ -87,7 +85,7 @@ def method(formula: Any, /) -> Any:
     takes_mode = "mode" in inspect.signature(formula).parameters
 
     @functools.wraps(formula)
-    def enter(self: BSDF, wo: Any, other: Any, mode: Mode = "radiance", precision: Precision | None = None) -> Any:
+    def enter(self: Material, wo: Any, other: Any, mode: Mode = "radiance", precision: Precision | None = None) -> Any:
         args = (mode,) if takes_mode else ()
         if self.is_bound:
             return inner(self, wo, other, *args)
@@ -113,7 +111,7 @@ if TYPE_CHECKING:
 
 
 def _on_numpy(
-    material: BSDF, name: str, inner: Callable[..., Any], wo: Any, other: Any, args: tuple[Any, ...], precision: Any
+    material: Material, name: str, inner: Callable[..., Any], wo: Any, other: Any, args: tuple[Any, ...], precision: Any
 ) -> Any:
     types = backend.types(precision)
     first, second, count = _rows(wo, other, name)
@@ -168,7 +166,7 @@ def _check_unit(array: NDArray[Any], where: str) -> None:
         )
 
 
-def _check_rows(material: BSDF, count: int) -> None:
+def _check_rows(material: Material, count: int) -> None:
     """Raise InputError where a parameter has one value a ray, for another number of rays."""
     if count == 1:
         return

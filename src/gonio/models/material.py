@@ -105,13 +105,8 @@ class BSDF(Material):
     breaks: ClassVar[Mapping[str, Breach]] = {}
     stochastic: ClassVar[bool] = False
     lossless: ClassVar[float | None] = None
-    derives: ClassVar[bool] = False  # whether `derive` is written
     has_terms: ClassVar[bool] = False  # whether `terms` is written
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
-
-    _bound: ClassVar[bool] = False
-    _plain: ClassVar[Any] = None
-    _derived: ClassVar[Any] = None
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -122,7 +117,7 @@ class BSDF(Material):
         for formula in ("eval", "pdf", "sample", "terms"):
             if formula in own:
                 setattr(cls, formula, method(own[formula]))
-        cls.derives = cls.derive is not BSDF.derive
+        cls.derives = cls.derive is not Material.derive
         cls.has_terms = cls.terms is not BSDF.terms
         dataclass(frozen=True, eq=False, repr=False)(cls)
 
@@ -177,10 +172,6 @@ class BSDF(Material):
         """A colour for denoisers to tell materials apart by: near the albedo seen from wo, without noise."""
         shares = [name for name, p in self.parameters().items() if p.white == 1.0]
         return getattr(self, shares[0]) if shares else 1.0
-
-    def derive(self) -> Any:
-        """What follows from the parameters alone and is expensive to compute for every ray: a NamedTuple, or None."""
-        return None
 
     # ------------------------------------------------------------------ facts
 
@@ -291,16 +282,6 @@ class BSDF(Material):
         return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
 
     # ------------------------------------------------------------------ bound copies and recordings
-
-    @property
-    def is_bound(self) -> bool:
-        """Whether this is a bound copy."""
-        return self._bound
-
-    @property
-    def plain(self) -> Self:
-        """The material as it was made: itself, or what a bound copy was bound from. Facts that shape code ask it."""
-        return self if self._plain is None else self._plain
 
     @property
     def derived(self) -> Any:

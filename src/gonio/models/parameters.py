@@ -16,7 +16,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,32 @@ else:
 
 
 class Material:
-    """What a parameter may hold as a material inside a material: `BSDF`."""
+    """What the tree of materials is made of, and a parameter may hold: `BSDF`, as far as parameters go."""
+
+    derives: ClassVar[bool] = False  # whether `derive` is written
+
+    _bound: ClassVar[bool] = False
+    _plain: ClassVar[Any] = None
+    _derived: ClassVar[Any] = None
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """The declared parameters by name."""
+        raise NotImplementedError
+
+    def derive(self) -> Any:
+        """What follows from the parameters alone and is expensive to compute for every ray: a NamedTuple, or None."""
+        return None
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether this is a bound copy."""
+        return self._bound
+
+    @property
+    def plain(self) -> Self:
+        """The material as it was made: itself, or what a bound copy was bound from. Facts that shape code ask it."""
+        return self if self._plain is None else self._plain
 
 
 @dataclass(frozen=True)

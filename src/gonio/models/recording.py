@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from .. import ops
 from ..ops import Mode, graph
 from . import binding
+from .parameters import Material
 
-if TYPE_CHECKING:
-    from .material import BSDF
-
-M = TypeVar("M", bound="BSDF")
+M = TypeVar("M", bound=Material)
 
 
 def symbols(material: M) -> M:
@@ -20,7 +18,7 @@ def symbols(material: M) -> M:
     return binding.bind(material, lambda parameter, value: parameter.symbol(value))
 
 
-def record(material: BSDF, method: str = "eval", mode: Mode = "radiance") -> graph.Graph:
+def record(material: Material, method: str = "eval", mode: Mode = "radiance") -> graph.Graph:
     """A method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
     inner = inspect.unwrap(getattr(type(material), method))
     more: dict[str, Any] = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}

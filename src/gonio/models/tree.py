@@ -9,18 +9,15 @@ Works on materials as they were made and on bound ones alike.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from ..errors import InputError, did_you_mean
-from .parameters import Parameter
+from .parameters import Material, Parameter
 
-if TYPE_CHECKING:
-    from .material import BSDF
-
-M = TypeVar("M", bound="BSDF")
+M = TypeVar("M", bound=Material)
 
 
-class Leaf(NamedTuple):
+class Leaf(NamedTuple, Generic[M]):
     """A parameter in a tree of materials.
 
     path       "alpha", "base.alpha"
@@ -32,22 +29,22 @@ class Leaf(NamedTuple):
     path: str
     parameter: Parameter
     value: Any
-    owner: BSDF
+    owner: M
 
 
-def children(material: BSDF) -> dict[str, BSDF]:
+def children(material: M) -> dict[str, M]:
     """The materials that a material holds, by the parameter's name."""
     return {name: getattr(material, name) for name, p in material.parameters().items() if p.inner}
 
 
-def walk(material: BSDF, path: str = "") -> Iterator[tuple[str, BSDF]]:
+def walk(material: M, path: str = "") -> Iterator[tuple[str, M]]:
     """Every material in the tree with its path, itself ("") first: "base", "base.a"."""
     yield path, material
     for name, inner in children(material).items():
         yield from walk(inner, join(path, name))
 
 
-def leaves(material: BSDF, path: str = "") -> Iterator[Leaf]:
+def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
     """Every parameter that holds no material, here and in inner materials, in order of declaration."""
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
@@ -62,7 +59,7 @@ def join(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
-def value_at(material: BSDF, path: str) -> Any:
+def value_at(material: Material, path: str) -> Any:
     """What stands at a path; InputError where there is nothing."""
     value: Any = material
     for name in path.split("."):
