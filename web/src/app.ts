@@ -2,6 +2,7 @@
 import { attachCamera } from "./camera";
 import type { PageData, Values, Vec3 } from "./data";
 import { type EnvironmentPicture, environmentFromData } from "./environment";
+import { Evaluator } from "./evaluator";
 import { type MeshBuffers, type Mesh, shaderBall, torus, upload } from "./meshes";
 import type { App, Panel, Picked, Picture, Presenter } from "./panel";
 import { type Hit, hitBalls, hitSphere } from "./pick";
@@ -31,6 +32,7 @@ export class PageApp implements App {
   readonly gl: WebGL2RenderingContext;
   readonly shaders: ShaderLibrary;
   readonly renderer: Renderer;
+  private ownEvaluator: Evaluator | null = null;
   environment: EnvironmentPicture | null = null;
   presenter: Presenter | null = null;
   /** Resolves with the first picture on the canvas. */
@@ -93,6 +95,11 @@ export class PageApp implements App {
 
   get state(): State {
     return this.store.state;
+  }
+
+  /** Made when it is first asked for: a browser may lack what it needs, and the page draws all the same. */
+  get evaluator(): Evaluator {
+    return (this.ownEvaluator ??= new Evaluator(this.shaders));
   }
 
   get frames(): number {

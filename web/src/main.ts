@@ -3,7 +3,10 @@ import "./app.css";
 import { PageApp } from "./app";
 import { readPageData } from "./data";
 import { Live } from "./live";
-import { install, panels, testHooks } from "./panels";
+import type { Panel } from "./panel";
+import { panels } from "./panels";
+import { testHooks } from "./plots/hooks";
+import { installMarker } from "./plots/marker";
 import { Change, type State } from "./state";
 import { element } from "./ui/dom";
 import { Layout, frame } from "./ui/layout";
@@ -13,21 +16,27 @@ function start(host: HTMLElement): void {
   const data = readPageData();
   const parts = frame(host);
   const app = new PageApp(data, parts.canvas, parts.overlay);
-  const layout = new Layout(app, parts, panels);
+  const layout = new Layout(app, parts);
   app.onRefresh = (what) => layout.refresh(what);
   app.store.subscribe((change) => layout.update(change));
-  install(app);
+  for (const panel of panels) layout.dock.add(panel);
+  installMarker(app, layout.dock.panels);
+  // Such as a panel from outside that cannot be loaded. (Browsers also tell of observers that they put off, without an error.)
+  addEventListener("error", ({ error, message }) => {
+    if (error) app.say(message, "error");
+  });
   layout.update(new Change(new Set([""])));
   if (data.socket) {
     layout.live = new Live(app, data.socket);
     layout.live.onStatus = () => layout.showStatus();
   }
-  // What tests, and people at the console, drive the page by.
+  // What panels from outside call, and what tests and people at the console drive the page by.
   Object.assign(window, {
     gonio: {
       app,
       data,
       ready: app.ready,
+      addPanel: (panel: Panel) => layout.dock.add(panel),
       live: layout.live,
       get state() {
         return app.state;

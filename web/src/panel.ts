@@ -3,8 +3,11 @@
  *
  * A panel lives in one tab. `mount` runs once, when its tab is first opened; `update` runs after every change of the
  * state while it is open, and when it opens again.
+ *
+ * A panel that comes from outside calls `gonio.addPanel` with such an object; docs/viewer.md shows one.
  */
 import type { PageData, Values, Vec3 } from "./data";
+import type { Evaluator } from "./evaluator";
 import type { Change, State, Store } from "./state";
 import type { Shader, ShaderLibrary } from "./shaders";
 
@@ -14,6 +17,12 @@ export interface Panel {
   readonly title: string;
   /** One line for the tab's tooltip. */
   readonly doc?: string;
+  /** Tabs stand in this order; those that give none come last, by title. */
+  readonly order?: number;
+  /** Whether it speaks of the clicked point, which is then marked on its ball. */
+  readonly marksPoint?: boolean;
+  /** Runs once when the page stands, though the tab may never be opened. */
+  install?(app: App): void;
   mount(host: HTMLElement, app: App): void;
   update?(change: Change): void;
   /** After a new raster picture, reference picture or picked point, while the tab is open. */
@@ -60,6 +69,8 @@ export interface App {
   /** One context for all. Who uses it binds what it needs and leaves no VAO, framebuffer or scissor bound. */
   readonly gl: WebGL2RenderingContext;
   readonly shaders: ShaderLibrary;
+  /** What the materials' own shaders say: eval, pdf, samples, terms, albedo, as arrays of float32. */
+  readonly evaluator: Evaluator;
   readonly canvas: HTMLCanvasElement;
   /** The element over the canvas for handles, marks and labels (pointer-events: none; children may switch it on). */
   readonly overlay: HTMLElement;

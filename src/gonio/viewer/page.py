@@ -24,7 +24,7 @@ from ..emit import bundle as written_for
 from ..energy.tables import bake
 from ..errors import InputError, MachineError
 from ..models import BSDF
-from . import stage
+from . import panels, stage
 from .stage import Stage
 
 VERSION = 1
@@ -132,11 +132,12 @@ def split_sum_data() -> dict[str, Any]:
 
 
 def html(data: dict[str, Any], policy: bool = True) -> str:
-    """One file: style, data and script inline, no address in it that a browser would fetch.
+    """One file: style, data and scripts inline, no address in it that a browser would fetch.
 
     policy  put the Content-Security-Policy into the file itself; a server sends it as a header instead
     """
     script, style = _script(), _style()
+    more = "".join(f'<script type="module">{panel}</script>\n' for panel in _panels())
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     text = text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
     # a file on disk has no secret and no network; programs that drive a browser wait by evaluating text in it
@@ -152,16 +153,16 @@ def html(data: dict[str, Any], policy: bool = True) -> str:
         '<div id="app"></div>\n'
         "<noscript>This page draws with WebGL 2 and needs JavaScript.</noscript>\n"
         f'<script type="application/json" id="gonio-data">{text}</script>\n'
-        f"<script>{script}</script>\n</body>\n</html>\n"
+        f"<script>{script}</script>\n{more}</body>\n</html>\n"
     )
 
 
 def content_policy(socket: str = "") -> str:
-    """What the page may do: run its own script and style, read what the user drops, reach its own socket."""
+    """What the page may do: run the scripts that came with it, read what the user drops, reach its own socket."""
     connect = " ".join(["blob:", "data:", *([socket] if socket else [])])
     parts = {
         "default-src": "'none'",
-        "script-src": _digest(_script()),
+        "script-src": " ".join(map(_digest, (_script(), *_panels()))),
         "style-src": _digest(_style()),
         "img-src": "data: blob:",
         "worker-src": "blob:",
@@ -178,8 +179,16 @@ def _digest(text: str) -> str:
 
 @lru_cache
 def _script() -> str:
-    # what would end the element early; within a JavaScript string or regular expression the backslash changes nothing
-    return _static("app.js").replace("</script", "<\\/script").replace("<!--", "<\\!--")
+    return _inline(_static("app.js"))
+
+
+def _panels() -> list[str]:
+    return [_inline(script) for script in panels.scripts()]
+
+
+def _inline(script: str) -> str:
+    """Without what would end the element early; in a string or regular expression the backslash changes nothing."""
+    return script.replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
 @lru_cache

@@ -1,11 +1,11 @@
 /** The albedo curve E(mu): the share of power that comes back, from the mean weight of the emitted sample(). */
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { channelOf, element, evaluatorOf, latest, legend, type Model, overlaid, range, select, short, CHANNELS, type Channel } from "./base";
-import { Curves, type Series } from "./curves";
-import { polar, RADIANS } from "./directions";
+import { channelOf, element, latest, legend, type Model, overlaid, range, select, short, CHANNELS, type Channel } from "../plots/base";
+import { Curves, type Series } from "../plots/curves";
+import { polar, RADIANS } from "../plots/directions";
 import type { AlbedoEstimate } from "../evaluator";
-import { channelIn } from "./viewing";
+import { channelIn } from "../plots/viewing";
 
 const DEFAULTS = { phi: 0 };
 /** Where E is estimated: even in mu, closer at grazing angles, where the curves bend. */
@@ -15,6 +15,7 @@ const TARGET = 5e-4;
 class AlbedoPanel implements Panel {
   readonly id = "albedo";
   readonly title = "Albedo";
+  readonly order = 4;
   readonly doc = "E(μ): the share of power given back, with the white furnace's line at 1";
   private app!: App;
   private curves!: Curves;
@@ -77,7 +78,7 @@ class AlbedoPanel implements Panel {
         }
         return generation === this.generation;
       };
-      await evaluatorOf(app).albedo(model.shader, model.values, wo, { error: TARGET, progress });
+      await app.evaluator.albedo(model.shader, model.values, wo, { error: TARGET, progress });
     });
     await Promise.all(estimated);
     if (generation === this.generation) this.draw(models, estimates, channel);
@@ -122,4 +123,4 @@ class AlbedoPanel implements Panel {
   }
 }
 
-export const albedoPanel = new AlbedoPanel();
+export default new AlbedoPanel();

@@ -1,9 +1,9 @@
 /** Compare with the path-traced reference: how it is shown, and by how much the two differ. */
 import type { App, Panel } from "../panel";
 import type { Change, CompareMode } from "../state";
-import { type Control, element, select } from "./base";
-import { COMPARISON, type Comparison, comparisonOf, type Kind, KINDS } from "./comparison";
-import { type Pixels, PIXELS } from "./metrics";
+import { type Control, element, select } from "../plots/base";
+import { COMPARISON, type Comparison, comparisonOf, type Kind, KINDS } from "../plots/comparison";
+import { type Pixels, PIXELS } from "../plots/metrics";
 
 const MODES: Record<CompareMode, string> = { off: "raster only", side: "side by side", wipe: "wipe", difference: "difference" };
 const RANGES = { auto: "fits the picture", "1": "0 to 1", "0.1": "0 to 0.1", "0.01": "0 to 0.01", "0.001": "0 to 0.001" };
@@ -11,6 +11,7 @@ const RANGES = { auto: "fits the picture", "1": "0 to 1", "0.1": "0 to 0.1", "0.
 class ComparePanel implements Panel {
   readonly id = COMPARISON;
   readonly title = "Compare";
+  readonly order = 6;
   readonly doc = "The raster picture beside the path-traced reference";
   private app!: App;
   private comparison!: Comparison;
@@ -20,6 +21,11 @@ class ComparePanel implements Panel {
   private pixels!: Control<Pixels>;
   private table!: HTMLTableElement;
   private note!: HTMLElement;
+
+  /** At once: a link may open a page that already compares. */
+  install(app: App): void {
+    comparisonOf(app);
+  }
 
   mount(host: HTMLElement, app: App): void {
     this.app = app;
@@ -78,4 +84,4 @@ class ComparePanel implements Panel {
   }
 }
 
-export const comparePanel = new ComparePanel();
+export default new ComparePanel();

@@ -5,12 +5,12 @@
  */
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { type Channel, CHANNELS, channelOf, check, type Control, element, evaluatorOf, exact, latest, legend, type Model, overlaid, range, select, short, Sketch } from "./base";
-import { Curves } from "./curves";
-import { fromHalf, RADIANS } from "./directions";
-import { paint } from "./colormaps";
-import { quantile } from "./metrics";
-import { channelIn } from "./viewing";
+import { type Channel, CHANNELS, channelOf, check, type Control, element, exact, latest, legend, type Model, overlaid, range, select, short, Sketch } from "../plots/base";
+import { Curves } from "../plots/curves";
+import { fromHalf, RADIANS } from "../plots/directions";
+import { paint } from "../plots/colormaps";
+import { quantile } from "../plots/metrics";
+import { channelIn } from "../plots/viewing";
 
 const DEFAULTS = { show: "image" as Show, thetaH: 0, thetaD: 0, phiD: 90, log: false, exposure: 0, falseColor: false, model: 0 };
 type Show = "image" | "half" | "difference";
@@ -27,6 +27,7 @@ interface Image {
 class HalfDifferencePanel implements Panel {
   readonly id = "half-difference";
   readonly title = "θh θd";
+  readonly order = 3;
   readonly doc = "Half and difference angles: curves and the image slice";
   private app!: App;
   private controls!: Record<"thetaH" | "thetaD" | "phiD" | "exposure", Control<number>>;
@@ -113,7 +114,7 @@ class HalfDifferencePanel implements Panel {
     const series = [];
     for (const model of models) {
       if (!above.length) break;
-      const { value } = await evaluatorOf(app).evaluate(model.shader, model.values, above.flatMap((p) => p.wo), above.flatMap((p) => p.wi));
+      const { value } = await app.evaluator.evaluate(model.shader, model.values, above.flatMap((p) => p.wo), above.flatMap((p) => p.wi));
       const values = above.map(({ wi }, i) => channelOf(value, i, channel) / wi[2]);
       series.push({ label: model.letter, color: model.color, values: settings.log ? values.map((v) => (v > 0 ? v : null)) : values });
     }
@@ -145,7 +146,7 @@ class HalfDifferencePanel implements Panel {
       }
     const images: Image[] = [];
     for (const model of models) {
-      const { value } = await evaluatorOf(app).evaluate(model.shader, model.values, wo, wi);
+      const { value } = await app.evaluator.evaluate(model.shader, model.values, wo, wi);
       for (let i = 0; i < up.length; i++) {
         const cos = wi[3 * i + 2] as number;
         for (let c = 0; c < 3; c++) value[3 * i + c] = up[i] ? (value[3 * i + c] as number) / cos : Number.NaN;
@@ -288,4 +289,4 @@ function srgbImage(rgb: Float32Array, scale: number): ImageData {
   return image;
 }
 
-export const halfDifferencePanel = new HalfDifferencePanel();
+export default new HalfDifferencePanel();

@@ -1,22 +1,7 @@
-/** The panels of the dock, in the order of their tabs; `install` puts up what works without an open tab. */
+/** The panels of the dock, a file each: the default export of whatever stands in this folder. */
 import "./panels.css";
-import type { App, Panel } from "../panel";
-import { albedoPanel } from "./albedo";
-import { comparePanel } from "./compare";
-import { comparisonOf } from "./comparison";
-import { halfDifferencePanel } from "./half_difference";
-import { lobePanel } from "./lobe";
-import { installMarker } from "./marker";
-import { probePanel } from "./probe";
-import { slicesPanel } from "./slices";
-import { tablesPanel } from "./tables";
+import type { Panel } from "../panel";
 
-export const panels: Panel[] = [lobePanel, slicesPanel, halfDifferencePanel, albedoPanel, tablesPanel, comparePanel, probePanel];
+const files = import.meta.glob<{ default: Panel }>(["./*.ts", "!./index.ts"], { eager: true });
 
-/** The page calls it once, when the app stands: a link may open a page that already compares. */
-export function install(app: App): void {
-  comparisonOf(app);
-  installMarker(app);
-}
-
-export { testHooks } from "./hooks";
+export const panels: Panel[] = Object.values(files).map((file) => file.default);

@@ -2,12 +2,12 @@
 import type { Vec3 } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { channelOf, check, element, evaluatorOf, latest, legend, limitsOf, overlaid, select, short } from "./base";
-import { colorTable } from "./colormaps";
-import { type Lobe, lobeIndices, lobeOf, radius } from "./lobe_mesh";
-import { type Arrow, LobeView, type Surface } from "./lobe_view";
-import { rgb } from "./theme";
-import { channelIn, viewingTouched, ViewingControls, woOf } from "./viewing";
+import { channelOf, check, element, latest, legend, limitsOf, overlaid, select, short } from "../plots/base";
+import { colorTable } from "../plots/colormaps";
+import { type Lobe, lobeIndices, lobeOf, radius } from "../plots/lobe_mesh";
+import { type Arrow, LobeView, type Surface } from "../plots/lobe_view";
+import { rgb } from "../plots/theme";
+import { channelIn, viewingTouched, ViewingControls, woOf } from "../plots/viewing";
 
 const DECADES = 4;
 const DEFAULTS = { log: false, color: "auto" as "auto" | "model" | "value" };
@@ -15,6 +15,8 @@ const DEFAULTS = { log: false, color: "auto" as "auto" | "model" | "value" };
 class LobePanel implements Panel {
   readonly id = "lobe";
   readonly title = "Lobe";
+  readonly order = 1;
+  readonly marksPoint = true;
   readonly doc = "The lobe in 3-D at the clicked point";
   private app!: App;
   private view!: LobeView;
@@ -62,7 +64,7 @@ class LobePanel implements Panel {
     this.viewing.show(models.some((m) => m.shader.manifest.transmits));
     this.log.show(log);
     this.color.show(color);
-    const lobes: Lobe[] = await Promise.all(models.map((model) => lobeOf(evaluatorOf(app), model, wo, channel)));
+    const lobes: Lobe[] = await Promise.all(models.map((model) => lobeOf(app.evaluator, model, wo, channel)));
     const peak = Math.max(...lobes.map((l) => l.peak), 0);
     const byValue = color === "value" || (color === "auto" && lobes.length === 1);
     const surfaces = lobes.map((lobe): Surface => {
@@ -98,4 +100,4 @@ class LobePanel implements Panel {
   }
 }
 
-export const lobePanel = new LobePanel();
+export default new LobePanel();

@@ -1,11 +1,12 @@
 /** The numbers under the pointer: linear radiance of the raster picture and of the reference, and their difference. */
 import type { App, Panel, Picture } from "../panel";
-import { channelOf, element, exact } from "./base";
-import { comparisonOf } from "./comparison";
+import { channelOf, element, exact } from "../plots/base";
+import { comparisonOf } from "../plots/comparison";
 
 class ProbePanel implements Panel {
   readonly id = "probe";
   readonly title = "Probe";
+  readonly order = 7;
   readonly doc = "Pixel values under the pointer";
   private app!: App;
   private table!: HTMLTableElement;
@@ -90,4 +91,4 @@ class ProbePanel implements Panel {
   }
 }
 
-export const probePanel = new ProbePanel();
+export default new ProbePanel();

@@ -1,11 +1,11 @@
 /** The BSDF in one plane through the normal: polar and Cartesian, with wo marked. */
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { channelOf, check, element, evaluatorOf, latest, legend, limitsOf, type Model, overlaid, range, select, short, Sketch } from "./base";
-import { Curves } from "./curves";
-import { phiOf, polar, RADIANS, thetaOf } from "./directions";
-import { radius } from "./lobe_mesh";
-import { channelIn, viewingTouched, ViewingControls, woOf } from "./viewing";
+import { channelOf, check, element, latest, legend, limitsOf, type Model, overlaid, range, select, short, Sketch } from "../plots/base";
+import { Curves } from "../plots/curves";
+import { phiOf, polar, RADIANS, thetaOf } from "../plots/directions";
+import { radius } from "../plots/lobe_mesh";
+import { channelIn, viewingTouched, ViewingControls, woOf } from "../plots/viewing";
 
 type Quantity = "eval" | "f" | "pdf";
 const QUANTITIES: Record<Quantity, string> = { eval: "f |cos θi|", f: "f", pdf: "pdf of sample" };
@@ -20,6 +20,8 @@ interface Slice {
 class SlicesPanel implements Panel {
   readonly id = "slices";
   readonly title = "Slices";
+  readonly order = 2;
+  readonly marksPoint = true;
   readonly doc = "Polar and Cartesian slices in the plane of incidence, or turned out of it";
   private app!: App;
   private viewing!: ViewingControls;
@@ -81,7 +83,7 @@ class SlicesPanel implements Panel {
     const azimuth = phiOf(wo) + Math.PI + turn * RADIANS;
     const read = async (model: Model, angles: number[]): Promise<number[]> => {
       const wi = angles.flatMap((a) => polar(a * RADIANS, azimuth));
-      const { value, pdf } = await evaluatorOf(app).evaluate(model.shader, model.values, wo, wi);
+      const { value, pdf } = await app.evaluator.evaluate(model.shader, model.values, wo, wi);
       return angles.map((angle, i) => {
         if (quantity === "pdf") return pdf[i] as number;
         const cos = Math.abs(Math.cos(angle * RADIANS));
@@ -200,4 +202,4 @@ class SlicesPanel implements Panel {
   }
 }
 
-export const slicesPanel = new SlicesPanel();
+export default new SlicesPanel();

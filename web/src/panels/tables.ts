@@ -2,8 +2,8 @@
 import { decodeFloats } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
-import { check, element, exact, range, select, short, Sketch } from "./base";
-import { colorTable, css, paint } from "./colormaps";
+import { check, element, exact, range, select, short, Sketch } from "../plots/base";
+import { colorTable, css, paint } from "../plots/colormaps";
 
 interface Table {
   label: string;
@@ -21,6 +21,7 @@ const DEFAULTS = { table: "", channel: -1, layer: 0, fixed: false };
 class TablesPanel implements Panel {
   readonly id = "tables";
   readonly title = "Tables";
+  readonly order = 5;
   readonly doc = "The precomputed tables as pictures, with a float read-out";
   private app!: App;
   private which!: ReturnType<typeof select<string>>;
@@ -246,4 +247,4 @@ export function colorBar(context: CanvasRenderingContext2D, x: number, y: number
   context.fillText(short(low), x + 17, y + height);
 }
 
-export const tablesPanel = new TablesPanel();
+export default new TablesPanel();

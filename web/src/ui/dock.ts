@@ -10,10 +10,9 @@ export class Dock {
   private readonly bodies = new Map<string, HTMLElement>();
   private open: string | null = null;
 
-  constructor(
-    private readonly app: PageApp,
-    private readonly panels: readonly Panel[],
-  ) {
+  readonly panels: Panel[] = [];
+
+  constructor(private readonly app: PageApp) {
     this.tabs.setAttribute("role", "tablist");
     const grip = element("div", { class: "grip", title: "Drag to resize" });
     grip.addEventListener("pointerdown", (event) => {
@@ -23,13 +22,22 @@ export class Dock {
       grip.addEventListener("pointermove", move);
       grip.addEventListener("lostpointercapture", () => grip.removeEventListener("pointermove", move), { once: true });
     });
-    for (const panel of panels) {
-      const tab = button(panel.title, panel.doc ?? panel.title, () => app.store.set("dock.open", app.state.dock.open === panel.id ? null : panel.id));
-      tab.setAttribute("role", "tab");
-      tab.dataset["panel"] = panel.id;
-      this.tabs.append(tab);
-    }
     this.host.append(grip, this.tabs, element("div", { class: "bodies" }));
+  }
+
+  add(panel: Panel): void {
+    const { app, panels } = this;
+    if (!panel?.id || !panel.title || typeof panel.mount !== "function") throw new Error("A panel needs an id, a title and mount(host, app).");
+    if (panels.some(({ id }) => id === panel.id)) throw new Error(`There is a panel '${panel.id}' already.`);
+    const tab = button(panel.title, panel.doc ?? panel.title, () => app.store.set("dock.open", app.state.dock.open === panel.id ? null : panel.id));
+    tab.setAttribute("role", "tab");
+    tab.dataset["panel"] = panel.id;
+    const place = (one: Panel) => one.order ?? Infinity;
+    const next = panels.findIndex((one) => place(one) > place(panel) || (place(one) === place(panel) && one.title > panel.title));
+    this.tabs.insertBefore(tab, next < 0 ? null : (this.tabs.children[next] ?? null));
+    panels.splice(next < 0 ? panels.length : next, 0, panel);
+    this.guard(() => panel.install?.(app));
+    this.update(new Change(new Set([""]))); // a link may ask for it to be open
   }
 
   update(change: Change): void {

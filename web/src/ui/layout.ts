@@ -2,7 +2,6 @@
 import { GUI } from "lil-gui";
 import type { Fault, PageApp } from "../app";
 import type { Live } from "../live";
-import type { Panel } from "../panel";
 import type { Change } from "../state";
 import { Dock } from "./dock";
 import { button, element } from "./dom";
@@ -37,7 +36,7 @@ export class Layout {
   private readonly view: ViewSection;
   private readonly terms: ReturnType<typeof termBar>;
   private readonly labels: Labels;
-  private readonly dock: Dock;
+  readonly dock: Dock;
   private readonly status = element("div", { class: "status" });
   private readonly fault = element("div", { class: "fault", hidden: true });
   private readonly furnace: HTMLButtonElement;
@@ -47,7 +46,6 @@ export class Layout {
   constructor(
     private readonly app: PageApp,
     private readonly parts: Frame,
-    panels: readonly Panel[],
   ) {
     const actions: Actions = { copyLink: () => void this.copyLink(), screenshot: () => void this.screenshot(), theme: () => this.theme() };
     const notes = app.data.notes ?? [];
@@ -79,7 +77,7 @@ export class Layout {
     this.terms = termBar(app);
     this.fault.setAttribute("role", "alert");
     parts.stage.append(this.status, this.fault);
-    this.dock = new Dock(app, panels);
+    this.dock = new Dock(app);
     // Above the picture, not over it: three rows of balls fill its height.
     const top = element("div", { class: "top" }, this.terms.host, this.solo, this.terms.note);
     const center = element("div", { class: "center" }, element("div", { class: "view" }, top, parts.stage), this.dock.host);

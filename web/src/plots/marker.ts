@@ -1,13 +1,12 @@
 /** Marks the clicked point on its ball while a panel that speaks of it is open: a ring, and the normal as a stroke. */
-import type { App } from "../panel";
+import type { App, Panel } from "../panel";
 import { add, cameraFrame, scale, toPixel } from "../vectors";
 import { element } from "./base";
 
-const PANELS = new Set(["lobe", "slices"]);
 /** Length of the normal's stroke, in radii of a ball. */
 const STROKE = 0.35;
 
-export function installMarker(app: App): void {
+export function installMarker(app: App, panels: readonly Panel[]): void {
   const ring = element("i", "p-mark");
   const stroke = element("i", "p-mark-normal");
   app.overlay.append(stroke, ring);
@@ -18,7 +17,7 @@ export function installMarker(app: App): void {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     const at = toPixel(frame, position, width, height);
     const tip = toPixel(frame, add(position, scale(normal, STROKE)), width, height);
-    const shown = state.dock.open !== null && PANELS.has(state.dock.open) && (state.compare.mode === "off" || state.compare.mode === "wipe");
+    const shown = panels.some(({ id, marksPoint }) => marksPoint && id === state.dock.open) && (state.compare.mode === "off" || state.compare.mode === "wipe");
     ring.hidden = stroke.hidden = !shown || !at || !tip;
     if (!at || !tip) return;
     const color = app.slotColor(app.picked.slot);

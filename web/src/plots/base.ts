@@ -1,6 +1,5 @@
 /** What every panel needs: the models it overlays, small controls, and work where the newest request wins. */
 import type { Values, Vec3 } from "../data";
-import { Evaluator } from "../evaluator";
 import type { App } from "../panel";
 import type { Shader } from "../shaders";
 
@@ -42,17 +41,6 @@ export function limitsOf(models: readonly Model[]): string {
     (delta ? ` ${delta}: a mirror's or smooth glass's light goes into single directions, has no finite value and is not drawn.` : "") +
     (noisy ? ` ${noisy}: values are random, right in the mean only.` : "")
   );
-}
-
-const evaluators = new WeakMap<App, Evaluator>();
-
-export function evaluatorOf(app: App): Evaluator {
-  let known = evaluators.get(app);
-  if (!known) {
-    known = new Evaluator(app.shaders);
-    evaluators.set(app, known);
-  }
-  return known;
 }
 
 /** Calls `work` at most once at a time; requests that come meanwhile become one more run with the newest state. */

@@ -1,7 +1,6 @@
 /** What the tests drive from outside: the evaluator by slot and ball, and the metrics, on plain arrays. */
 import type { App } from "../panel";
 import { comparisonOf, type Comparison } from "./comparison";
-import { evaluatorOf } from "./base";
 import { flipMap } from "./flip";
 import { counted, measure, type Pair, type Pixels } from "./metrics";
 
@@ -19,13 +18,12 @@ export interface TestHooks {
 }
 
 export function testHooks(app: App): TestHooks {
-  const evaluator = () => evaluatorOf(app);
   return {
-    evaluate: async (slot, ball, wo, wi) => plainAll(await evaluator().evaluate(app.shaderOf(slot), app.valuesOf(slot, ball), wo, wi)),
-    sample: async (slot, ball, wo, u) => plainAll(await evaluator().sample(app.shaderOf(slot), app.valuesOf(slot, ball), wo, u)),
-    terms: async (slot, ball, wo, wi) => plainAll(await evaluator().terms(app.shaderOf(slot), app.valuesOf(slot, ball), wo, wi)),
+    evaluate: async (slot, ball, wo, wi) => plainAll(await app.evaluator.evaluate(app.shaderOf(slot), app.valuesOf(slot, ball), wo, wi)),
+    sample: async (slot, ball, wo, u) => plainAll(await app.evaluator.sample(app.shaderOf(slot), app.valuesOf(slot, ball), wo, u)),
+    terms: async (slot, ball, wo, wi) => plainAll(await app.evaluator.terms(app.shaderOf(slot), app.valuesOf(slot, ball), wo, wi)),
     albedo: async (slot, ball, wo, error) => {
-      const estimate = await evaluator().albedo(app.shaderOf(slot), app.valuesOf(slot, ball), wo, { error });
+      const estimate = await app.evaluator.albedo(app.shaderOf(slot), app.valuesOf(slot, ball), wo, { error });
       return { value: plain(estimate.value), error: plain(estimate.error), samples: estimate.samples };
     },
     flip: async (test, reference, width, height) => plain(await flipMap(test, reference, width, height)),

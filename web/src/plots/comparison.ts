@@ -63,7 +63,7 @@ export class Comparison {
 
   /** Whether anybody looks at figures or differences. */
   private wanted(): boolean {
-    return this.app.state.compare.mode === "difference" || this.app.state.dock.open === COMPARISON || this.app.state.dock.open === "probe";
+    return this.app.state.compare.mode === "difference" || this.app.state.dock.open === COMPARISON;
   }
 
   private update(change: Change): void {
