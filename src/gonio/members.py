@@ -65,10 +65,12 @@ class Family(Generic[Member]):
 
     def get(self, name: str, where: str = "") -> Member:
         """The member of that name. InputError with the nearest known spelling where there is none."""
-        known = self.all()
-        if name not in known:
-            raise InputError(f"unknown {self.kind} '{name}'", where or self.where, did_you_mean(name, list(known)))
-        return known[name]
+        if self._found is None:
+            self.all()
+        for known in (self._added, self._found or {}):  # asked at every call of a formula: nothing is sorted here
+            if name in known:
+                return known[name]
+        raise InputError(f"unknown {self.kind} '{name}'", where or self.where, did_you_mean(name, list(self.all())))
 
     def titles(self) -> dict[str, str]:
         """Name -> first line of the member's docstring, without its full stop: what help and the manual print."""

@@ -104,7 +104,49 @@ def test_changed_formulas_make_new_tables(folder, monkeypatch):
     cache.remember(("trial", 1), lambda: np.arange(3.0))
     monkeypatch.setattr(cache, "_formulas", lambda: "other")
     assert cache.remember(("trial", 1), lambda: np.ones(1))[0] == 1.0
-    assert len(list(folder.iterdir())) == 2
+    assert len(list(folder.glob("trial-*"))) == 2
+
+
+def test_the_hash_of_formulas_hears_code_and_not_comments():
+    plain = "def f(x):\n    return x * 2.0\n"
+    said = '"""A module."""\ndef f(x):\n    """Twice."""  # twice\n\n    return x * 2.0\n'
+    assert cache._meaning(plain) == cache._meaning(said)
+    assert cache._meaning(plain) != cache._meaning(plain.replace("2.0", "3.0"))
+
+
+def test_every_room_that_a_table_depends_on_is_hashed():
+    assert {"ops", "optics", "models", "energy"} <= set(cache.ROOMS)
+
+
+def test_the_hash_of_formulas_is_kept_until_a_file_changes(folder, monkeypatch):
+    cache._formulas.cache_clear()
+    first = cache._formulas()
+    with monkeypatch.context() as patch:
+        patch.setattr(cache, "_meaning", lambda source: never())
+        cache._formulas.cache_clear()
+        assert cache._formulas() == first
+    (folder / "formulas.txt").write_text("nonsense")
+    cache._formulas.cache_clear()
+    assert cache._formulas() == first
+
+
+def test_a_distribution_that_changed_in_its_file_makes_new_tables(folder, tmp_path):
+    from gonio.models import outside
+    from gonio.optics.ndf import NDF
+
+    file = tmp_path / "mine.py"
+    text = "from gonio.optics.ndf.ggx import GGX\n\n\nclass Mine(GGX):\n    name = 'mine'\n"
+    try:
+        file.write_text(text)
+        outside.member(f"{file}:Mine")
+        before, table = cache.origin("mine"), curves.isotropic("mine", "smith-correlated")
+        assert curves.isotropic("mine", "smith-correlated") is table
+        file.write_text(text + "\n    long_tailed = True  # and more\n")
+        outside.member(f"{file}:Mine")
+        assert cache.origin("mine") != before and cache.origin("ggx") == ()
+        assert curves.isotropic("mine", "smith-correlated") is not table
+    finally:
+        NDF.family.remove("mine")
 
 
 def test_a_folder_that_cannot_be_written_is_no_hindrance(monkeypatch):

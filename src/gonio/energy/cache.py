@@ -7,18 +7,27 @@ ours is rebuilt, with a warning; a folder that cannot be written is no hindrance
 
 from __future__ import annotations
 
+import ast
+import contextlib
+import functools
 import hashlib
+import inspect
 import io
 import os
+import sys
 import warnings
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import GonioWarning
+from ..members import Family
+from ..optics.fresnel import Fresnel
+from ..optics.masking import Masking
+from ..optics.ndf import NDF
 
 Kept = TypeVar("Kept")
 
@@ -37,12 +46,65 @@ def content_hash(values: np.ndarray) -> str:
     return hashlib.sha256(repr(array.shape).encode() + array.tobytes()).hexdigest()
 
 
+ROOMS = ("energy", "models", "ops", "optics")  # whose formulas a table depends on
+
+
 @lru_cache
 def _formulas() -> str:
-    """Hash of the source of every room that a table depends on: changed optics make new tables."""
+    """Hash of what the code of these rooms says, comments and docstrings left out: changed optics make new tables.
+
+    Parsing takes a tenth of a second, so the hash is kept for as long as no file changes.
+    """
     package = Path(__file__).parent.parent
-    files = sorted(p for room in ("energy", "models", "optics") for p in (package / room).rglob("*.py"))
-    return hashlib.sha256(b"\0".join(p.read_bytes() for p in files)).hexdigest()
+    files = sorted(p for room in ROOMS for p in (package / room).rglob("*.py"))
+    states = [(str(p.relative_to(package)), p.stat().st_mtime_ns, p.stat().st_size) for p in files]
+    state = hashlib.sha256(repr((sys.version_info[:2], package, states)).encode()).hexdigest()
+    note = folder() / "formulas.txt"
+    with contextlib.suppress(OSError, ValueError):
+        known, hashed = note.read_text().split()
+        if known == state and len(hashed) == 64:
+            return hashed
+    hashed = hashlib.sha256("\n".join(_meaning(p.read_text(encoding="utf-8")) for p in files).encode()).hexdigest()
+    with contextlib.suppress(OSError):  # a read-only home costs time, not correctness
+        note.parent.mkdir(parents=True, exist_ok=True)
+        part = note.with_name(f".{note.name}.{os.getpid()}.part")
+        part.write_text(f"{state} {hashed}")
+        os.replace(part, note)
+    return hashed
+
+
+def _meaning(source: str) -> str:
+    """What a file says to the interpreter: its syntax tree without docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
+            node.body = node.body[1:]
+    return ast.dump(tree, annotate_fields=False)
+
+
+FAMILIES: tuple[Family[Any], ...] = (NDF.family, Masking.family, Fresnel.family)  # whose members shape tables
+
+
+def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
+    """Keep in memory what a function makes of a distribution, a masking term and a Fresnel kind, given by name in this
+    order; where another member has the name by now, it is made anew."""
+    made: dict[tuple[object, ...], Kept] = {}
+
+    @functools.wraps(build)
+    def kept(*names: str) -> Kept:
+        key = tuple(family.get(name) for family, name in zip(FAMILIES, names, strict=False))
+        if key not in made:
+            made[key] = build(*names)
+        return made[key]
+
+    return kept
+
+
+def origin(*names: str) -> tuple[str, ...]:
+    """Hashes of the files of those among these members that are not Gonio's own: part of a key on disk."""
+    members = [type(family.get(name)) for family, name in zip(FAMILIES, names, strict=False)]
+    files = [inspect.getsourcefile(cls) for cls in members if not cls.__module__.startswith("gonio.")]
+    return tuple(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if file)
 
 
 def _path(key: tuple) -> tuple[Path, str]:

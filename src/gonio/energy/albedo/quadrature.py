@@ -76,13 +76,13 @@ class TwoWays(NamedTuple):
 
 
 @lru_cache
-def longest_slope(name: str) -> float:
+def longest_slope(ndf: NDF) -> float:
     """The stretched slope t beyond which a distribution holds less than about 1e-9 of its normals."""
     t = np.logspace(-1, 8, 400)
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
     m = kind.vec3(kind.float(t * c), kind.float(0.0 * t), kind.float(c))
-    density = np.asarray(distribution(name).D(m, kind.vec2(1.0, 1.0)).numpy()) * c**4 * np.pi * t**2
+    density = np.asarray(ndf.D(m, kind.vec2(1.0, 1.0)).numpy()) * c**4 * np.pi * t**2
     beyond = np.flatnonzero(density < 1e-9)
     return float(t[beyond[0]]) if len(beyond) else float(t[-1])
 
@@ -210,7 +210,7 @@ def _over_azimuths(
     side = dr.select(azimuth < n_azimuth, kind.float(1.0), kind.float(-1.0))
     rule = gauss(n_azimuth) if not through else _in_three(n_azimuth // 3)
     chi_node, chi_weight = [dr.gather(kind.float, kind.float(a), at) for a in rule]
-    limit = dr.opaque(kind.float, longest_slope(ndf.name))
+    limit = dr.opaque(kind.float, longest_slope(ndf))
     sums = _over_slopes(
         ndf, terms, channels, mu, kind.vec2(ax, ay), phi, eta if through else None, chi_node, chi_weight, side, n_slope,
         limit,

@@ -16,7 +16,6 @@ two axes, see `anisotropic`.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -85,7 +84,7 @@ def evaluate(form: Form, coefficients: np.ndarray, bend: np.ndarray, mu: np.ndar
     return np.einsum("rnk,rk->rn", bernstein(fall, form.degree), coefficients)
 
 
-@lru_cache
+@cache.of_members
 def isotropic(ndf: str, masking: str) -> Table:
     """Coefficients over roughness (ROWS, CHANNELS) of a distribution and masking."""
 
@@ -98,11 +97,11 @@ def isotropic(ndf: str, masking: str) -> Table:
             lambda mu: 1.0 - quadrature.moments(ndf, masking, mu, alpha[:, None]).whole,
         )
 
-    key = ("curves", ndf, masking, ROWS, DEGREE)
+    key = ("curves", ndf, masking, *cache.origin(ndf, masking), ROWS, DEGREE)
     return Table(f"missing_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
-@lru_cache
+@cache.of_members
 def lobe(ndf: str, masking: str) -> Table:
     """mu^2 over (roughness, u): the inverse of the share of M mu below mu, to sample the lobe proportional to it."""
     alpha = np.maximum(np.linspace(0.0, 1.0, ROWS) ** 2, quadrature.SMALLEST_ALPHA)
@@ -119,7 +118,7 @@ AZIMUTHS = 13  # nodes to fit them
 TURNED = 4 * -(-((DEGREE + 1) * HARMONICS + 1) // 4)  # channels: terms in z by terms in y, M_avg, padding
 
 
-@lru_cache
+@cache.of_members
 def anisotropic(ndf: str, masking: str) -> Table:
     """Coefficients over (sqrt(alpha_min / alpha_max), sqrt(alpha_max)) of a metal with two widths.
 
@@ -166,7 +165,7 @@ def anisotropic(ndf: str, masking: str) -> Table:
         table[:, -1] = average
         return table.reshape(ASPECTS, ASPECT_ROWS, TURNED)
 
-    key = ("turned", ndf, masking, ASPECTS, ASPECT_ROWS, HARMONICS, DEGREE)
+    key = ("turned", ndf, masking, *cache.origin(ndf, masking), ASPECTS, ASPECT_ROWS, HARMONICS, DEGREE)
     return Table(f"missing_turned_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
@@ -184,7 +183,7 @@ LARGEST_ROOT = 2.0 / 3.0  # eta = 5
 SIDES = ("thin", "dense")
 
 
-@lru_cache
+@cache.of_members
 def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     """Coefficients over (root of sqrt(F0), roughness) of rough glass, for light from its thin and its dense side."""
 
@@ -204,13 +203,13 @@ def glass(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
             sides.append(fit(form, numpy_knee(form, masking, alphas), missing, nodes=36))
         return np.array(sides).reshape(2, GLASS_ETAS, GLASS_ROWS, -1)
 
-    key = ("glass", ndf, masking, fresnel, GLASS_ETAS, GLASS_ROWS)
+    key = ("glass", ndf, masking, fresnel, *cache.origin(ndf, masking, fresnel), GLASS_ETAS, GLASS_ROWS)
     values = cache.remember(key, build)
     stem = f"missing_glass_{ndf}_{masking}_{fresnel}".replace("-", "_")
     return {side: Table(f"{stem}_{side}", v) for side, v in zip(SIDES, values, strict=True)}
 
 
-@lru_cache
+@cache.of_members
 def glass_lobe(ndf: str, masking: str, fresnel: str) -> dict[str, Table]:
     """As `lobe`, over (the root of sqrt(F0), roughness, u), for either side."""
     alpha = np.maximum(np.linspace(0.0, 1.0, GLASS_ROWS) ** 2, quadrature.SMALLEST_ALPHA)

@@ -32,7 +32,7 @@ class Derived(NamedTuple):
 
 
 def returned(lost: MissingEnergy, color: str) -> Spectrum:
-    """f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017, p. 17), or F_avg times that, by `color`."""
+    """f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times that, by `color`."""
     F_avg, E_avg = lost.F_avg, 1.0 - lost.average
     f_add = F_avg * E_avg / (1.0 - F_avg * (1.0 - E_avg))
     return (f_add * F_avg if color == "bounce" else f_add) * lost.factor
@@ -80,7 +80,7 @@ class KullaConty(_Compensated):
         return self.base.eval(wo, wi, mode) + self.added(wo, wi, mode)
 
     def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """f_add f_ms |cos theta_i|, f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) (Kulla2017, p. 12).
+        """f_add f_ms |cos theta_i|, f_ms = (1 - E(mu_o)) (1 - E(mu_i)) / (pi (1 - E_avg)) (Kulla2017).
 
         M is 1 - E, found without that difference, and `over_average` 1 / (pi (1 - E_avg)). Glass splits the lobe
         between both sides by `share` (p. 30).

@@ -173,7 +173,9 @@ def cached(target: str | BSDF, **options: Any) -> Baked:
     if isinstance(target, BSDF) and not tabulated(target):
         return bake(target, **options)
     widths_of = None if isinstance(target, str) else _aspect(target, 1.0)
-    key = ("baked", _describe(target), widths_of, sorted(options.items()))
+    surface = None if isinstance(target, str) else target.microsurface
+    names = (target, options.get("masking") or "smith-correlated") if surface is None else surface[:3]
+    key = ("baked", _describe(target), widths_of, cache.origin(*names), sorted(options.items()))
     text = repr(key)
 
     def write(made: Baked) -> bytes:

@@ -7,7 +7,6 @@ A + B is E at F = 1, and B the albedo at F = (1 - o.m)^5.
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from ..albedo.monte_carlo import hammersley
 SIZE = 128  # bilinear between them errs by 3e-4 for roughness >= .1
 
 
-@lru_cache
+@cache.of_members
 def schlick_table(ndf: str, masking: str) -> Table:
     """B over (roughness, sqrt(mu)), nodes at both ends of each axis."""
 
@@ -31,7 +30,7 @@ def schlick_table(ndf: str, masking: str) -> Table:
         ends = np.linspace(0.0, 1.0, SIZE)
         return quadrature.moments(ndf, masking, ends**2, ends[:, None] ** 2).schlick[..., None]
 
-    key = ("split-sum", ndf, masking, SIZE)
+    key = ("split-sum", ndf, masking, *cache.origin(ndf, masking), SIZE)
     return Table(f"schlick_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
