@@ -43,6 +43,12 @@ def test_conductor_is_the_textbook_formula_with_a_complex_index() -> None:
     np.testing.assert_allclose(got, 0.5 * (np.abs(s) ** 2 + np.abs(p) ** 2), rtol=1e-9)
 
 
+def test_conductor_is_the_mean_of_r_s_and_r_p() -> None:
+    cos_i, eta, k = number(RNG.random(10_000)), number(RNG.uniform(0.05, 4, 10_000)), number(RNG.uniform(0, 8, 10_000))
+    r_s, r_p = exact.polarized(cos_i, eta, k)
+    np.testing.assert_allclose(exact.conductor(cos_i, eta, k).numpy(), (0.5 * (r_s + r_p)).numpy(), rtol=1e-11)
+
+
 def test_conductor_without_absorption_is_a_dielectric() -> None:
     cos_i, eta = RNG.random(2000) * 0.999 + 1e-3, RNG.uniform(1.01, 4, 2000)
     conductor = exact.conductor(number(cos_i), number(eta), number(np.zeros(2000))).numpy()

@@ -41,16 +41,15 @@ class BlinnPhong(_Empirical):
     def _peak(self, wo: Direction, wi: Direction) -> Scalar:
         """(n.h)^p."""
         h = half_vector(wo, wi)
-        return power_of_cosine(h.z, sin2(h), self.p)
+        return power_of_cosine(h.z, sin2(h), self._exponent)
 
     @function
     def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of wi when h has density (p + 1) / (2 pi) cos^p: over 4 (v.h) (Walter2007, eq. 14)."""
-        p: Scalar = self.p  # type: ignore[assignment]  # mypy forgets that an inherited field is a declared parameter
-        lobe = (p + 1.0) * (0.5 * inv_pi) * self._peak(wo, wi)
+        lobe = (self._exponent + 1.0) * (0.5 * inv_pi) * self._peak(wo, wi)
         return safe_div(lobe, 4.0 * dot(wo, half_vector(wo, wi)))
 
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """The viewer mirrored at a sampled half vector."""
-        return reflect(wo, square_to_power_lobe(u1, u2, self.p))
+        return reflect(wo, square_to_power_lobe(u1, u2, self._exponent))

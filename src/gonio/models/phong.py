@@ -53,6 +53,11 @@ class _Empirical(BSDF):
                     "change a coefficient, or leave check_sum out",
                 )
 
+    @property
+    def _exponent(self) -> Scalar:
+        """p; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        return self.p
+
     def _highlight_power(self) -> np.ndarray:
         """The most that int (highlight)^p dwi comes to."""
         raise NotImplementedError
@@ -131,12 +136,12 @@ class Phong(_Empirical):
     @function
     def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of a cos^p lobe about the mirrored viewer, 1/sr."""
-        return square_to_power_lobe_pdf(dot(mirror(wo), wi), self.p)
+        return square_to_power_lobe_pdf(dot(mirror(wo), wi), self._exponent)
 
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """A direction of a cos^p lobe about the mirrored viewer."""
-        return _around(mirror(wo), square_to_power_lobe(u1, u2, self.p))
+        return _around(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))
 
 
 @function

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from .. import ops
-from ..ops import dot, function, sqr, vec3
+from ..ops import Direction, Pair, Scalar, dot, function, sqr, vec3
 
 
 @function
-def reflect(w: Any, m: Any) -> Any:
+def reflect(w: Direction, m: Direction) -> Direction:
     """w mirrored at the normal m: 2 (w.m) m - w."""
     return m * (2.0 * dot(w, m)) - w
 
 
-def mirror(w: Any) -> Any:
+def mirror(w: Direction) -> Direction:
     """w mirrored at the surface normal z."""
     return vec3(-w.x, -w.y, w.z)
 
 
 @function
-def refract(w: Any, m: Any, cos_t: Any, eta: Any) -> Any:
+def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction:
     """w refracted at the normal m (on w's side): Snell's law, eta sin t_t = sin t_w.
 
     cos_t  cosine of the transmitted direction, positive, from `fresnel.cos_transmitted`
@@ -29,14 +27,14 @@ def refract(w: Any, m: Any, cos_t: Any, eta: Any) -> Any:
     return m * (dot(w, m) / eta - cos_t) - w * (1.0 / eta)
 
 
-def upright(like: Any) -> Any:
+def upright(like: Direction) -> Direction:
     """The surface normal, one for every ray of `like`."""
     zero = 0.0 * like.z
     return vec3(zero, zero, 1.0 + zero)
 
 
 @function
-def rotate(w: Any, rotation: Any) -> Any:
+def rotate(w: Direction, rotation: Pair | None) -> Direction:
     """w in a frame that is turned about z by an angle given as the vector (cos, sin)."""
     if rotation is None:  # known before anything runs: no rotation at all
         return w
@@ -44,20 +42,20 @@ def rotate(w: Any, rotation: Any) -> Any:
 
 
 @function
-def rotate_back(w: Any, rotation: Any) -> Any:
+def rotate_back(w: Direction, rotation: Pair | None) -> Direction:
     """The inverse of `rotate`."""
     if rotation is None:
         return w
     return vec3(rotation.x * w.x - rotation.y * w.y, rotation.x * w.y + rotation.y * w.x, w.z)
 
 
-def sin2(w: Any) -> Any:
+def sin2(w: Direction) -> Scalar:
     """Squared sine of the angle to the normal, from x and y: 1 - z^2 would cancel near the normal."""
     return sqr(w.x) + sqr(w.y)
 
 
 @function
-def half_vector(wo: Any, wi: Any) -> Any:
+def half_vector(wo: Direction, wi: Direction) -> Direction:
     """Normal of the facet that mirrors wo into wi, unit; z where wo = -wi, which no facet above does."""
     h = wo + wi
     length2 = dot(h, h)

@@ -6,7 +6,8 @@ colour is close to, not equal to, that of the full spectrum under daylight.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple, TypeVar
 
 from ..errors import InputError, did_you_mean
 
@@ -56,15 +57,15 @@ MEDIA = {
 }
 
 
-def _find(table: dict, name: str, what: str):
-    by_long_name = {entry.name.lower(): key for key, entry in table.items()}
-    key = name if name in table else by_long_name.get(name.lower(), "")
-    if not key:
-        by_lower = {k.lower(): k for k in table}
-        key = by_lower.get(name.lower(), "")
-    if not key:
-        raise InputError(f"unknown {what} '{name}'", "preset", did_you_mean(name, [*table, *by_long_name]))
-    return table[key]
+Entry = TypeVar("Entry", Metal, Medium)
+
+
+def _find(table: Mapping[str, Entry], name: str, what: str) -> Entry:
+    known: dict[str, str] = {symbol.lower(): symbol for symbol in table}
+    known |= {entry.name.lower(): symbol for symbol, entry in table.items()}
+    if name.lower() not in known:
+        raise InputError(f"unknown {what} '{name}'", "preset", did_you_mean(name, [*table, *known]))
+    return table[known[name.lower()]]
 
 
 def metal(name: str) -> Metal:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import ops
-from ..ops import exp, function, log, minimum, sqr, sqrt, where
+from ..ops import Scalar, abs, erf, exp, fma, function, is_short, log, minimum, sqr, sqrt, where
 
 # Giles2010, the single-precision polynomial: coefficients in falling powers.
 # fmt: off
@@ -22,6 +21,9 @@ _TAIL = (
     -0.0076224613, 0.00943887047, 1.00167406, 2.83297682,
 )
 # fmt: on
+SQRT_PI = ops.pi**0.5
+_RAMP_OVER = (1.0, 1.73967429, 1.25322189, 0.54497537, 0.22630499, 0.08571726, 0.03586975)
+_RAMP_UNDER = (3.54490742, -0.11616595, 1.10290261, 0.09772537, 0.10158618, 0.03505152)
 
 
 @lru_cache
@@ -32,8 +34,11 @@ def gauss(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @function
-def erfinv(x: Any) -> Any:
-    """Inverse error function on (-1, 1): Giles2010's polynomial, relative error about 4e-7."""
+def erfinv(x: Scalar) -> Scalar:
+    """Inverse error function on (-1, 1): Giles2010's polynomial, relative error about 4e-7.
+
+    That is float32's last digits; in float64 a step of Newton's method follows, error 1e-12 up to |x| = 1 - 1e-7.
+    """
     w = -log((1.0 - x) * (1.0 + x))
     centre = w < 5.0
     t = where(centre, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
@@ -41,11 +46,36 @@ def erfinv(x: Any) -> Any:
     value = where(centre, _CENTRE[0] * t + _CENTRE[1], _TAIL[0] * t + _TAIL[1])
     for a, b in zip(_CENTRE[2:], _TAIL[2:], strict=True):
         value = where(centre, value * t + a, value * t + b)
-    return value * x
+    y = value * x
+    if is_short(x):
+        return y
+    # exp(y^2) magnifies the rounding of erf: further out the polynomial is better
+    return where(abs(y) < 4.5, y - (erf(y) - x) * exp(sqr(y)) * (0.5 * SQRT_PI), y)
 
 
 @function
-def power_of_cosine(cos_theta: Any, sin2: Any, p: Any) -> Any:
+def gaussian_ramp(a: Scalar) -> Scalar:
+    """int_-inf^a (a - x) exp(-x^2) dx / sqrt(pi) = a (1 + erf a) / 2 + exp(-a^2) / (2 sqrt(pi)), for a >= 0.
+
+    The part of a Gaussian's slopes below a. In float32 a rational function, within 8e-8 of it: with erf and exp
+    Beckmann's pdf took 1.8 times as long. Its coefficients are our own fit, by least squares of the relative error,
+    reweighted toward the largest at 4000 Chebyshev points; from a = 4 on it is a, to 2e-10.
+    """
+    if not is_short(a):
+        return 0.5 * a * (1.0 + erf(a)) + (0.5 / SQRT_PI) * exp(-sqr(a))
+    return where(a < 4.0, _horner(a, _RAMP_OVER) / _horner(a, _RAMP_UNDER), a)
+
+
+def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
+    """The polynomial with these coefficients, in rising powers."""
+    value = fma(x, coefficients[-1], coefficients[-2])
+    for c in reversed(coefficients[:-2]):
+        value = fma(value, x, c)
+    return value
+
+
+@function
+def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
     """cos(theta)^p, from the squared sine where that is under 0.1: near 1 a cosine is rounded too coarsely for large p.
 
     log cos^2 = log(1 - sin^2) = 2 atanh(sin^2 / (sin^2 - 2)), whose next term is under 1e-18.
@@ -59,7 +89,7 @@ def power_of_cosine(cos_theta: Any, sin2: Any, p: Any) -> Any:
 
 
 @function
-def log_share(q: Any, p: Any) -> Any:
+def log_share(q: Scalar, p: Scalar) -> Scalar:
     """log q of a share, p = 1 - q given beside it: by 2 atanh(p / (p - 2)) for p <= 1/2, where log would cancel.
 
     The next term of the series is under 4e-10 of its value.
@@ -67,14 +97,14 @@ def log_share(q: Any, p: Any) -> Any:
     t = minimum(p, 0.5)
     z = t / (t - 2.0)
     z2 = sqr(z)
-    series: Any = 1 / 17
-    for odd in range(15, 0, -2):
+    series = 1 / 15 + z2 * (1 / 17)
+    for odd in range(13, 0, -2):
         series = series * z2 + 1.0 / odd
     return where(p <= 0.5, 2.0 * z * series, log(ops.maximum(q, 1e-30)))
 
 
 @function
-def _stirling(x: Any) -> Any:
+def _stirling(x: Scalar) -> Scalar:
     """The series of log Gamma beyond its leading terms; the next term is under 2e-9 at x = 4."""
     r = 1.0 / x
     r2 = sqr(r)
@@ -83,7 +113,7 @@ def _stirling(x: Any) -> Any:
 
 
 @function
-def beta(a: Any, b: Any) -> Any:
+def beta(a: Scalar, b: Scalar) -> Scalar:
     """Euler's beta function B(a, b) for a, b >= 1, without the cancellation of three log-gammas.
 
     Both arguments are moved up by three with B(a, b) = B(a + 1, b) (a + b) / a, then Stirling's series is taken with
@@ -91,7 +121,7 @@ def beta(a: Any, b: Any) -> Any:
     1e8 count as 1e8: the fourth power of one must stay a float32.
     """
     a, b = minimum(a, 1e8), minimum(b, 1e8)
-    ratio: Any = 1.0
+    ratio: Scalar | float = 1.0
     s = a + b
     for j in range(3):
         ratio = ratio * ((s + (2.0 * j)) * (s + (2.0 * j + 1.0))) / ((a + float(j)) * (b + float(j)))

@@ -82,7 +82,8 @@ def longest_slope(ndf: NDF) -> float:
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
     m = kind.vec3(kind.float(t * c), kind.float(0.0 * t), kind.float(c))
-    density = np.asarray(ndf.D(m, kind.vec2(1.0, 1.0)).numpy()) * c**4 * np.pi * t**2
+    found: Any = ndf.D(m, kind.vec2(1.0, 1.0))
+    density = np.asarray(found.numpy()) * c**4 * np.pi * t**2
     beyond = np.flatnonzero(density < 1e-9)
     return float(t[beyond[0]]) if len(beyond) else float(t[-1])
 
