@@ -89,7 +89,7 @@ def controls() -> None:
     broken = [cls for cls in (*FACETS, *SURFACES, *GLASS) if cls.caught_by]
     caught = 0
     for cls in broken:
-        report = verify(cls(), effort="quick", laws=[cls.caught_by])
+        report = verify(cls(), quick=True, law=[cls.caught_by])
         caught += not report.passed
         word = "MISSED" if report.passed else "caught"
         print(f"{cls.__name__:24} {cls.caught_by:12} {word} {report[cls.caught_by].shown}")
@@ -103,7 +103,7 @@ def alarms(seeds: int) -> None:
         start = time.perf_counter()
         bad = []
         for seed in range(1, seeds + 1):
-            report = verify(model, effort="quick", seed=seed)
+            report = verify(model, quick=True, seed=seed)
             bad += [f"seed {seed}: {v.law}: {'; '.join(v.why)}" for v in report.failures]
         failed += len(bad)
         print(f"{name:28} {seeds} seeds, {len(bad)} failed verdicts, {time.perf_counter() - start:.1f} s", flush=True)

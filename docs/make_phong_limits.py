@@ -82,7 +82,7 @@ def even_power() -> str:
     axis.set_ylabel("reflected, light of intensity 1", fontsize=9)
     axis.legend(frameon=False, fontsize=8)
     save(figure, "even-power")
-    report = verify(typed, effort="quick", laws=["pdf"])
+    report = verify(typed, quick=True, law=["pdf"])
     return verdict(report, "pdf")
 
 
@@ -101,7 +101,7 @@ def below() -> str:
     axis.set_ylabel("reflected", fontsize=9)
     axis.legend(frameon=False, fontsize=8)
     save(figure, "below")
-    return verdict(verify(NoHorizon(kd=0.3, ks=0.5, p=8.0), effort="quick", laws=["positivity"]), "positivity")
+    return verdict(verify(NoHorizon(kd=0.3, ks=0.5, p=8.0), quick=True, law=["positivity"]), "positivity")
 
 
 def reflected_power(model: go.BSDF, theta: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ def energy() -> tuple[str, list[str]]:
     rows = []
     for p, color in zip((1.0, 4.0, 16.0, 64.0), COLORS, strict=True):
         model = go.Phong(kd=0.0, ks=1.0, p=p)
-        report = verify(model, effort="quick", laws=["energy", "reciprocity"])
+        report = verify(model, quick=True, law=["energy", "reciprocity"])
         curves = report["energy"].evidence
         angle = directions.angles(curves.wo)[:, 0]
         order = np.argsort(angle)
@@ -145,7 +145,7 @@ def energy() -> tuple[str, list[str]]:
 
 
 def reciprocity() -> str:
-    report = verify(go.Phong(), effort="quick", laws=["reciprocity"])
+    report = verify(go.Phong(), quick=True, law=["reciprocity"])
     figure, axes = canvas(1, 3.6)
     image = axes[0].imshow(
         report["reciprocity"].evidence.difference, origin="lower", extent=(0, 90, 0, 90), cmap="magma", vmin=0, vmax=1

@@ -117,7 +117,7 @@ def _clean(text: str) -> str:
 def main() -> int:
     """Write all pages; returns the exit code, 0 whatever the laws say."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--effort", default="quick")
+    parser.add_argument("--effort", default="quick", choices=("quick", "default"))
     parser.add_argument("--only", default="")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
@@ -129,7 +129,7 @@ def main() -> int:
         print(target, flush=True)
         name = target.replace(":", "-")
         try:
-            report = verify(trials(target), effort=options.effort, seed=options.seed)
+            report = verify(trials(target), quick=options.effort == "quick", seed=options.seed)
         except go.GonioError as error:
             reason = " ".join(str(error).split())
             results[target] = {"not judged": reason}

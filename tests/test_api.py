@@ -9,7 +9,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio import cli, emit, render
+from gonio import cli, emit, render, verify
 from gonio.errors import GonioWarning, InputError
 from gonio.render import images
 
@@ -20,10 +20,11 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
     "plot": go.plot,
     "render": render.render,
     "study": go.study,
+    "verify": verify.verify,
 }
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
 TEXT = {"param", "preset", "as_json"}
-ONLY_TYPED = {"emit": {"output", "bundle"}}
+ONLY_TYPED = {"verify": {"at"}, "emit": {"output", "bundle"}}
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
 
@@ -73,6 +74,16 @@ def test_a_study_is_shown_and_saved(tmp_path: Path, scene: Path) -> None:
     for vary in ({}, {"scene.shapes.0.material.p": []}):
         with pytest.raises(InputError, match="nothing is varied"):
             go.study(scene, vary)
+
+
+def test_a_trial_takes_the_command_lines_options(tmp_path: Path) -> None:
+    report = go.verify("lambert", quick=True, law="reciprocity", sweep="albedo=0.1,0.5", report=tmp_path / "r")
+    assert len(report.cards) == 2 and report.passed and (tmp_path / "r/report.html").is_file()
+    assert "reciprocity" in report._repr_html_() and "<pre>" in report._repr_html_()
+    with pytest.raises(InputError, match="quick and deep"):
+        go.verify("lambert", quick=True, deep=True)
+    with pytest.raises(InputError, match="sweep of an object"):
+        go.verify(go.Lambert(), sweep="albedo=0.1,0.5")
 
 
 def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,7 +34,7 @@ def test_there_are_enough_controls_and_every_judging_law_has_one() -> None:
 
 @pytest.mark.parametrize("control", BROKEN, ids=lambda cls: cls.__name__)
 def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> None:
-    report = verify(control(), effort="quick", laws=[control.caught_by])
+    report = verify(control(), quick=True, law=[control.caught_by])
     verdict = report[control.caught_by]
     assert verdict.failed and not report.passed and report.exit_code == 1
     assert verdict.why and verdict.command and verdict.meaning
@@ -42,11 +42,11 @@ def test_the_mistake_is_caught_by_the_law_meant_to_catch_it(control: type) -> No
 
 @pytest.mark.parametrize("control", SOUND, ids=lambda cls: cls.__name__)
 def test_the_sound_twin_passes_every_law(control: type) -> None:
-    report = verify(control(), effort="quick")
+    report = verify(control(), quick=True)
     assert report.passed, str(report)
 
 
 def test_a_mistake_in_an_inner_material_is_caught_too() -> None:
     inner = next(cls for cls in BROKEN if cls.caught_by == "gradients" and cls in FACETS)
-    verdict = verify(go.mix(go.Lambert(), inner(), 0.5), effort="quick", laws=["gradients"])["gradients"]
+    verdict = verify(go.mix(go.Lambert(), inner(), 0.5), quick=True, law=["gradients"])["gradients"]
     assert verdict.failed and "b.alpha" in str(verdict.worst)

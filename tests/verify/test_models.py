@@ -25,7 +25,7 @@ def test_every_model_is_in_the_list() -> None:
 
 @pytest.mark.parametrize("name", FEW)
 def test_a_model_passes_every_law(name: str) -> None:
-    report = verify(MODELS[name], effort="quick", seed=2013)
+    report = verify(MODELS[name], quick=True, seed=2013)
     assert report.passed, str(report)
 
 
@@ -33,17 +33,17 @@ def test_a_model_passes_every_law(name: str) -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_passes_twenty_seeds_in_a_row(name: str) -> None:
     for seed in range(20):
-        report = verify(MODELS[name], effort="quick", seed=seed)
+        report = verify(MODELS[name], quick=True, seed=seed)
         assert report.passed, str(report)
 
 
 def test_another_value_compiles_no_kernel() -> None:
     dr = backend.drjit()
     laws = ["reciprocity", "energy", "pdf", "weight", "precision"]
-    verify(go.Conductor.preset("Au", alpha=0.3), effort="quick", laws=laws)
+    verify(go.Conductor.preset("Au", alpha=0.3), quick=True, law=laws)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
-        verify(go.Conductor.preset("Cu", alpha=0.5), effort="quick", laws=laws, seed=2)
+        verify(go.Conductor.preset("Cu", alpha=0.5), quick=True, law=laws, seed=2)
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert len(kernels) > 20
     assert sum(not k["cache_hit"] for k in kernels) == 0

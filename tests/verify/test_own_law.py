@@ -74,12 +74,12 @@ def test_a_law_can_be_registered_in_a_program(tmp_path: Path, monkeypatch: pytes
     monkeypatch.syspath_prepend(tmp_path)
     name = laws.Law.family.add(importlib.import_module("my_darkness").Dim)
     try:
-        report = verify(go.Lambert(0.5), effort="quick", laws=["reciprocity", "dim"])
+        report = verify(go.Lambert(0.5), quick=True, law=["reciprocity", "dim"])
         assert report["dim"].status == "pass" and report["dim"].number == 100
     finally:
         laws.Law.family.remove(name)
     with pytest.raises(go.InputError, match="unknown law 'dim'"):
-        verify(go.Lambert(0.5), effort="quick", laws=["dim"])
+        verify(go.Lambert(0.5), quick=True, law=["dim"])
 
 
 def test_what_is_no_law_is_refused() -> None:

@@ -70,24 +70,24 @@ def test_a_declared_breach_is_no_failure_unless_it_is_larger_or_absent() -> None
 
 
 def test_the_threshold_is_corrected_over_the_whole_report() -> None:
-    one = verify(go.Lambert(0.5), effort="quick", laws=["pdf"])
-    two = verify([go.Lambert(0.5), go.Lambert(0.6)], effort="quick", laws=["pdf"])
+    one = verify(go.Lambert(0.5), quick=True, law=["pdf"])
+    two = verify([go.Lambert(0.5), go.Lambert(0.6)], quick=True, law=["pdf"])
     assert two.tests == 2 * one.tests
     assert 1.0 - (1.0 - two.threshold) ** two.tests == pytest.approx(report.SIGNIFICANCE)
 
 
 def test_phong_breaks_what_it_declares_and_exits_with_0() -> None:
-    found = verify(go.Phong(), effort="quick", laws=["reciprocity", "energy"])
+    found = verify(go.Phong(), quick=True, law=["reciprocity", "energy"])
     assert [v.status for v in found.cards[0].verdicts] == ["breaks as declared"] * 2
     assert found.passed and found.exit_code == 0
-    dim = verify(go.Phong(kd=0.1, ks=0.0), effort="quick", laws=["reciprocity", "energy"])
+    dim = verify(go.Phong(kd=0.1, ks=0.0), quick=True, law=["reciprocity", "energy"])
     assert [v.status for v in dim.cards[0].verdicts] == ["pass"] * 2
 
 
 def test_same_seed_same_report() -> None:
-    first, second = (verify(go.Conductor(alpha=0.3), effort="quick", laws=["pdf", "energy"], seed=5) for _ in range(2))
+    first, second = (verify(go.Conductor(alpha=0.3), quick=True, law=["pdf", "energy"], seed=5) for _ in range(2))
     assert [v.p for v in first.cards[0].verdicts] == [v.p for v in second.cards[0].verdicts]
-    other = verify(go.Conductor(alpha=0.3), effort="quick", laws=["pdf"], seed=6)
+    other = verify(go.Conductor(alpha=0.3), quick=True, law=["pdf"], seed=6)
     assert other["pdf"].p != first["pdf"].p
 
 
@@ -99,7 +99,7 @@ class Stops(go.Lambert):
 
 
 def test_a_failing_law_hides_no_other_and_names_the_line() -> None:
-    found = verify(Stops(0.5), effort="quick")
+    found = verify(Stops(0.5), quick=True)
     statuses = {v.law: v.status for v in found.cards[0].verdicts}
     assert statuses["pdf"] == "fail" and statuses["reciprocity"] == "pass" and statuses["linearity"] == "pass"
     assert "KeyError in" in found["pdf"].why[0] and "test_report.py:" in found["pdf"].why[0]
@@ -132,7 +132,7 @@ class Random(go.Lambert):
 
 
 def test_a_stochastic_model_is_judged_by_its_expectations() -> None:
-    found = verify(Random(0.5), effort="quick")
+    found = verify(Random(0.5), quick=True)
     assert found.passed, str(found)
     assert found["weight"].p is not None and found["reciprocity"].p is not None
     assert found["precision"].status == "does not apply"
@@ -141,9 +141,7 @@ def test_a_stochastic_model_is_judged_by_its_expectations() -> None:
 def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
     from gonio.verify import page
 
-    found = verify(
-        go.Dielectric(alpha=0.3), effort="quick", laws=["reciprocity", "energy", "pdf", "precision", "shader"]
-    )
+    found = verify(go.Dielectric(alpha=0.3), quick=True, law=["reciprocity", "energy", "pdf", "precision", "shader"])
     page.write(found, tmp_path / "down")
     data = json.loads((tmp_path / "down/report.json").read_text())
     assert data["schema"] == "gonio-verify/1" and data["seed"] == 1
@@ -156,5 +154,5 @@ def test_the_files_hold_everything_and_need_nothing(tmp_path: Path) -> None:
 
 
 def test_a_report_prints_as_the_terminal_shows_it() -> None:
-    text = str(verify(go.Lambert(0.5), effort="quick", laws=["reciprocity"]))
+    text = str(verify(go.Lambert(0.5), quick=True, law=["reciprocity"]))
     assert "reciprocity" in text and "all laws hold" in text

@@ -65,7 +65,7 @@ def test_a_users_own_class(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 def test_a_users_class_that_is_no_bsdf_but_has_eval(tmp_path: Path) -> None:
     path = file(tmp_path, GOOD.replace("(go.BSDF)", "").replace(', mode="radiance"', ""))
-    assert verify(f"{path}:Good", effort="quick", laws=["reciprocity", "weight", "pdf"]).passed
+    assert verify(f"{path}:Good", quick=True, law=["reciprocity", "weight", "pdf"]).passed
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_a_wrong_answer_fails_the_law_with_its_place(
 def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "LIMIT", 1.0)
     text = GOOD + "    def sample(self, wo, u, mode='radiance'):\n        while True:\n            pass\n"
-    found = verify(f"{file(tmp_path, text)}:Good", effort="quick", laws=["weight", "shader"])
+    found = verify(f"{file(tmp_path, text)}:Good", quick=True, law=["weight", "shader"])
     assert "no end after 1 s" in found["weight"].why[0] and found["shader"].status == "does not apply"
 
 
@@ -155,11 +155,11 @@ def test_the_exit_code_tells_of_a_broken_law(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_mitsubas_plugins_and_descriptions(tmp_path: Path) -> None:
-    assert verify("mitsuba:diffuse", effort="quick").passed
-    assert verify('{"type": "diffuse"}', effort="quick", laws=["energy"]).passed
+    assert verify("mitsuba:diffuse", quick=True).passed
+    assert verify('{"type": "diffuse"}', quick=True, law=["energy"]).passed
     xml = tmp_path / "glass.xml"
     xml.write_text('<bsdf version="3.0.0" type="dielectric"/>')
-    assert verify(str(xml), effort="quick", laws=["energy", "weight"]).passed
+    assert verify(str(xml), quick=True, law=["energy", "weight"]).passed
     own = tmp_path / "own.json"
     own.write_text(json.dumps({"type": "gonio_conductor", "alpha": 0.3, "preset": "Au"}))
-    assert verify(str(own), effort="quick", laws=["energy", "pdf", "weight", "isotropy"]).passed
+    assert verify(str(own), quick=True, law=["energy", "pdf", "weight", "isotropy"]).passed

@@ -81,3 +81,11 @@ class Report:
         out = io.StringIO()
         self.show(Console(file=out, width=120, no_color=True))
         return out.getvalue()
+
+    def _repr_html_(self) -> str:
+        """The same in a notebook."""
+        from rich.console import Console
+
+        console = Console(file=io.StringIO(), width=120, record=True, force_jupyter=False)
+        self.show(console)
+        return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")

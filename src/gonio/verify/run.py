@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
-from ..errors import GonioWarning, InputError, did_you_mean
+from .. import files
+from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import directions, statistics, subject
+from . import directions, page, statistics, subject
 from .effort import EFFORTS, Effort
 from .laws import Law, chosen
 from .report import SIGNIFICANCE, Report
@@ -24,9 +26,12 @@ Target = BSDF | Subject | str
 def verify(
     target: Target | Sequence[Target],
     *,
-    effort: str = "default",
+    sweep: str = "",
+    quick: bool = False,
+    deep: bool = False,
     seed: int = DEFAULT_SEED,
-    laws: Sequence[str] | None = None,
+    law: str | Sequence[str] | None = None,
+    report: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Report:
     """Put a BSDF, or several, on trial.
@@ -34,35 +39,44 @@ def verify(
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
     target    a material; or a target's name as `gonio verify` takes it; or a list of either
-    effort    "quick", "default" or "deep"
+    sweep     of a target's name: "alpha=0.01..1", a card for each of five values, or "alpha=0.1,0.5"
+    quick     a first look, in seconds
+    deep      more samples, more directions, more widths
     seed      of all random numbers; same seed, same report
-    laws      names of the laws to ask, all where None
+    law       a law's name, or several; all where None
+    report    folder for report.html and report.json; None writes nothing
     progress  called with steps done, steps in all, and what is next
     Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; printed, it is the terminal's table.
-    Raises InputError for unknown efforts, laws and targets. A failing BSDF raises nothing: the law fails.
+    Raises InputError for unknown laws and targets. A failing BSDF raises nothing: the law fails.
     """
-    if effort not in EFFORTS:
-        raise InputError(f"unknown effort '{effort}'", "verify: effort", did_you_mean(str(effort), list(EFFORTS)))
-    asked = chosen(laws)
-    subjects = _subjects(target)
+    if quick and deep:
+        raise InputError("quick and deep together", "--quick", "give one of them")
+    if report is not None:
+        files.check_folder(report)
+    effort = "quick" if quick else "deep" if deep else "default"
+    asked = chosen([law] if isinstance(law, str) else law)
+    subjects = _subjects(target, sweep)
     started = time.perf_counter()
     steps = len(subjects) * len(asked)
     found: list[tuple[Subject, Law, Finding | Verdict, float]] = []
     for one in subjects:
-        for law in asked:
+        for each in asked:
             if progress:
-                progress(len(found), steps, f"{one.title}: {law.name}")
+                progress(len(found), steps, f"{one.title}: {each.name}")
             began = time.perf_counter()
-            found.append((one, law, _judge(law, one, EFFORTS[effort], seed), time.perf_counter() - began))
+            found.append((one, each, _judge(each, one, EFFORTS[effort], seed), time.perf_counter() - began))
     tests = sum(len(what.trials) for _, _, what, _ in found if isinstance(what, Finding))
     threshold = statistics.sidak(SIGNIFICANCE, tests)
     cards: dict[int, Card] = {}
-    for one, law, what, seconds in found:
+    for one, each, what, seconds in found:
         began = time.perf_counter()
-        verdict = decide(law, one, what, threshold, seed) if isinstance(what, Finding) else what
+        verdict = decide(each, one, what, threshold, seed) if isinstance(what, Finding) else what
         verdict.seconds = seconds + time.perf_counter() - began
         cards.setdefault(id(one), Card(one, [])).verdicts.append(verdict)
-    return Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
+    made = Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
+    if report is not None:
+        page.write(made, Path(report))
+    return made
 
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
@@ -137,11 +151,13 @@ def decide(law: Law, one: Subject, finding: Finding, threshold: float, seed: int
     )
 
 
-def _subjects(target: Target | Sequence[Target]) -> list[Subject]:
+def _subjects(target: Target | Sequence[Target], sweep: str) -> list[Subject]:
     if isinstance(target, list | tuple):
-        return [one for item in target for one in _subjects(item)]
+        return [one for item in target for one in _subjects(item, sweep)]
     if isinstance(target, str):
         from .targets import resolve
 
-        return resolve(target)
+        return resolve(target, sweep=sweep)
+    if sweep:
+        raise InputError("a sweep of an object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
     return [subject.of(target)]

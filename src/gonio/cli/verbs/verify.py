@@ -8,7 +8,6 @@ from typing import Annotated
 
 from typer import Argument, Exit, Option
 
-from ...errors import InputError
 from .. import completion
 from ..options import Json, Parameters
 from ..output import Bar
@@ -60,30 +59,21 @@ def verify(
     from ...verify import run, targets, terminal
     from ...verify.directions import parse
 
-    if quick and deep:
-        raise InputError("--quick and --deep together", "--quick", "give one of them")
     subjects = targets.resolve(target, param or [], sweep)
+    console = Console(emoji=False)
     if at:
         for subject in subjects:
             if as_json:
                 print(json.dumps(terminal.pair(subject, *parse(at))))
             else:
-                terminal.show_pair(subject, *parse(at), Console(emoji=False))
+                terminal.show_pair(subject, *parse(at), console)
         return
-    if report is not None:
-        from ... import files
-        from ...verify import page
-
-        files.check_folder(report)
-    effort = "quick" if quick else "deep" if deep else "default"
     with Bar(target) as bar:
-        found = run.verify(subjects, effort=effort, seed=seed, laws=law, progress=bar.step)
-    if report is not None:
-        page.write(found, report)
+        found = run.verify(subjects, quick=quick, deep=deep, seed=seed, law=law, report=report, progress=bar.step)
     if as_json:
         print(json.dumps(found.as_dict()))
     else:
-        found.show(Console(emoji=False))
+        found.show(console)
         if report is not None:
             print(report / "report.html")
     if not found.passed:
