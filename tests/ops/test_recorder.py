@@ -130,3 +130,17 @@ def test_constants_true_and_one_are_not_taken_for_each_other() -> None:
 
     graph = record(lambda a: chosen(a, True) + chosen(a, 1), a="float")
     assert graph.evaluate(a=np.array([1.0])) == pytest.approx([11.0])
+
+
+def test_a_graph_is_printed_a_value_a_line() -> None:
+    graph = ops.record(lambda a, b: ops.sqrt(a * a + b.z), a="float", b="vec3")
+    lines = [" ".join(line.split()) for line in str(graph).splitlines()]
+    assert lines[0].endswith("(a: float, b: vec3)")
+    assert lines[1:] == [
+        "%2 float mul(a, a)",
+        "%3 float b.z",
+        "%4 float add(%2, %3)",
+        "%5 float sqrt(%4)",
+        "return %5",
+    ]
+    assert graph._repr_html_().startswith("<pre>&lt;lambda&gt;(")

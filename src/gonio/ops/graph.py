@@ -14,6 +14,7 @@ others. A spectrum has as many channels as whoever evaluates the graph gives it.
 from __future__ import annotations
 
 import functools
+import html
 import inspect
 import math
 import sys
@@ -171,6 +172,14 @@ class Function:
         self.parameters[name] = type
         return Node(self, "parameter", type, (), static=name)
 
+    def __str__(self) -> str:
+        """A line for each value: its number, its name in the source, its type, and what it is made of."""
+        lines = [f"{self.name}({', '.join(f'{name}: {type}' for name, type in self.parameters.items())})"]
+        for node in self.nodes:
+            if node.op != "parameter":
+                lines.append(f"  %{node.index:<3} {node.name:<12} {node.type:<9} {_written(node)}".rstrip())
+        return "\n".join([*lines, f"  return {', '.join(map(_reference, _leaves(self.result)))}"])
+
 
 class Graph:
     """Recorded functions in order of definition; `entry` is the last.
@@ -188,6 +197,12 @@ class Graph:
     def entry(self) -> Function:
         return self.functions[-1]
 
+    def __str__(self) -> str:
+        return "\n\n".join(map(str, self.functions))
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(str(self))}</pre>"
+
     def evaluate(self, **values: Any) -> Any:
         """Run the graph on NumPy arrays in float64, as an independent reading of the same source.
 
@@ -201,6 +216,24 @@ class Graph:
             raise RecordingError(f"no value for {', '.join(missing)}", self.entry.name)
         with np.errstate(all="ignore"):
             return _run(self.entry, [given[n.replace(".", "_")] for n in self.entry.parameters])
+
+
+def _written(node: Node) -> str:
+    """ "dot(%17, %19)"; what is no value stands behind the name, as in "element[1](%17)"."""
+    arguments = ", ".join(map(_reference, node.args))
+    if node.op == "constant":
+        return str(node.static)
+    if node.op == "component":
+        return f"{arguments}.{'xyz'[node.static]}"
+    if node.op == "call":
+        return f"{node.static.name}({arguments})"
+    return f"{node.op}({arguments})" if node.static is None else f"{node.op}[{node.static}]({arguments})"
+
+
+def _reference(value: object) -> str:
+    if not isinstance(value, Node):
+        return f"{value:g}" if isinstance(value, float) else str(value)
+    return str(value.static) if value.op == "parameter" else f"%{value.index}"
 
 
 _stack: list[tuple[Graph, Function]] = []
