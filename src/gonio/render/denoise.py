@@ -1,4 +1,4 @@
-"""Remove the noise of few samples with Intel Open Image Denoise, an optional extra (`gonio[denoise]`)."""
+"""Remove the noise of few samples with Intel Open Image Denoise, which comes with Gonio where pyoidn has a wheel."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from ..errors import InputError, MachineError
 
-_INSTALL = "pip install 'gonio[denoise]', or leave --denoise out"
+INSTALL = "pip install pyoidn (Linux x86-64, Windows, macOS)"
+_HINT = f"{INSTALL}, or leave --denoise out"
 
 
 def available() -> str:
@@ -22,7 +23,7 @@ def available() -> str:
 def require() -> None:
     """Raise MachineError where OIDN is missing: asked before a render, so that no time is lost."""
     if not available():
-        raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _INSTALL)
+        raise MachineError("Open Image Denoise (pyoidn) is not installed", "--denoise", _HINT)
 
 
 def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndarray | None = None) -> np.ndarray:
@@ -47,9 +48,9 @@ def denoise(image: np.ndarray, albedo: np.ndarray | None = None, normal: np.ndar
 
         return np.asarray(filter_picture(np.maximum(colour, 0), hdr=True, **guides))
     except ImportError as error:
-        raise MachineError(f"pyoidn {available()} cannot be used: {error}", "--denoise", _INSTALL) from error
+        raise MachineError(f"pyoidn {available()} cannot be used: {error}", "--denoise", _HINT) from error
     except (RuntimeError, OSError) as error:
-        raise MachineError(f"Open Image Denoise failed: {error}", "--denoise", _INSTALL) from error
+        raise MachineError(f"Open Image Denoise failed: {error}", "--denoise", _HINT) from error
 
 
 def _checked(name: str, picture: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

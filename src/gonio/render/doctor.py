@@ -87,7 +87,7 @@ def examine() -> Report:
     if found:
         findings.append(Finding("ok", "denoiser", f"Open Image Denoise by pyoidn {found}"))
     else:
-        findings.append(Finding("missing", "denoiser", "for --denoise: pip install 'gonio[denoise]'"))
+        findings.append(Finding("missing", "denoiser", f"for --denoise: {denoise.INSTALL}"))
     return Report(tuple(findings), devices)
 
 
