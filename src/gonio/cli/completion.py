@@ -41,7 +41,7 @@ def presets(context: typer.Context, incomplete: str) -> Offers:
     names = [first] if isinstance(first, str) else first if isinstance(first, list) else []
     known = models()
     chosen = [known[name] for name in names if name in known] or list(known.values())
-    return _starting(incomplete, {name: cls.name for cls in chosen for name in getattr(cls, "presets", ())})
+    return _starting(incomplete, {name: preset.title for cls in chosen for name, preset in cls.presets().items()})
 
 
 def _starting(incomplete: str, known: dict[str, str]) -> Offers:
