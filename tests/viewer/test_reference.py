@@ -219,14 +219,14 @@ def test_values_reach_the_picture() -> None:
     assert more[..., 2].sum() == 0.0
 
 
-def test_a_class_of_the_users_own_is_rendered_and_no_model_of_that_name(tmp_path: Path) -> None:
+def test_a_class_of_the_users_own_is_rendered(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(
-        "from gonio.models.base import BSDF, spectrum\nfrom gonio import ops\n\n"
-        "class Lambert(BSDF):\n    tint_: object = spectrum(default=0.25, doc='share', high=1.0)\n\n"
+        "import gonio as go\nfrom gonio import ops\n\n"
+        "class Matte(go.BSDF):\n    tint_: go.Colour = go.spectrum(default=0.25, doc='share', high=1.0)\n\n"
         "    def eval(self, wo, wi, mode='radiance'):\n"
         "        return self.tint_ * ops.where((wo.z > 0.0) & (wi.z > 0.0), wi.z * ops.inv_pi, 0.0)\n"
     )
-    own = one_ball(stage.of_targets([f"{tmp_path / 'own.py'}:Lambert"]).materials["m0"].bsdf)
+    own = one_ball(stage.of_targets([f"{tmp_path / 'own.py'}:Matte"]).materials["m0"].bsdf)
     built_in = one_ball(go.Lambert(albedo=0.5))
     quarter = picture(Reference(own), scene(own, [SUN], balls=[{"tint_": [0.25] * 3}]))
     half = picture(Reference(built_in), scene(built_in, [SUN]))

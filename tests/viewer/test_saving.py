@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -98,6 +100,18 @@ def test_what_it_imports_from_its_folder_is_followed(file: Path) -> None:
     assert what.code.located(caught.value).where == "wide.py:1"
     wide.write_text("SLOPE = 0.7\n")
     assert slope(what.code.run()) == 0.7
+
+
+def test_old_classes_go(file: Path) -> None:
+    code = shown(file).code
+    made = []
+    for _ in range(4):
+        what = code.run()
+        page.page_data(what)
+        made.append(weakref.ref(type(what.materials["m0"].bsdf)))
+    del what
+    gc.collect()
+    assert sum(cls() is not None for cls in made) <= 1
 
 
 @pytest.mark.parametrize("name", list(BROKEN))

@@ -149,7 +149,7 @@ def split_values(text: str) -> list[Any]:
     return [parse_value(piece) for piece in pieces]
 
 
-def show_value(value: Any, longest: int = 28) -> str:
+def show_value(value: object, longest: int = 28) -> str:
     """A value as a label shows it."""
     if isinstance(value, bool):
         return "yes" if value else "no"

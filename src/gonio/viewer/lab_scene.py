@@ -6,21 +6,24 @@ import base64
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..models import BSDF, tree
+from ..models import BSDF, notation, tree
 from ..render import engine, scene
 from ..render.scene import schema, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
 from ..render.scene.values import ImageTexture, rgb
-from .stage import SUN, Ball, Material, Row, Stage, replaced, walk
+from .stage import CAMERA, SUN, Ball, Camera, Light, Material, Row, Stage, Value, replaced
+
+Vector: TypeAlias = "NDArray[np.float64]"
 
 LARGEST_IMAGE = 1024  # pixels across of an environment in a page; a wider one is averaged down
 BALLS = 5  # a row
-ENVIRONMENT = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
+ENVIRONMENT: Light = {"type": "environment", "image": None, "constant": [1.0] * 3, "rotation": 0.0, "scale": 1.0}
 
 
 def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> Stage:
@@ -44,11 +47,11 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
     name = path.stem if path.stem != "scene" else path.resolve().parent.name
     if path.is_dir():
         name = path.resolve().name
-    camera = {"elevation": round(_axes(description.camera.transform)[1], 4)}
+    camera: Camera = {**CAMERA, "elevation": round(_axes(description.camera.transform)[1], 4)}
     return Stage(f"Materials of {name}", materials, rows, lights, camera, (*description.warnings, *notes, *more))
 
 
-def _materials(description: Any) -> list[MaterialPart]:
+def _materials(description: schema.SceneDescription) -> list[MaterialPart]:
     """The distinct materials, in the order of the shapes; a shape without one is matte."""
     found: list[MaterialPart] = []
     for shape in description.shapes:
@@ -63,16 +66,14 @@ def _bsdf(part: MaterialPart) -> BSDF:
     return replaced(part.instance(), dict(_indices(part)))
 
 
-def _indices(part: MaterialPart, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _indices(part: MaterialPart, path: str = "") -> Iterator[tuple[str, Value]]:
     """The values that presets stand for, by path."""
     if part.preset is not None:
-        named = part.model.preset(part.preset)  # type: ignore[attr-defined]
-        for name in ("eta", "k"):
-            if name in named.parameters():
-                yield prefix + name, getattr(named, name)
+        for name, value in notation.settings(part.model.preset(part.preset)).items():
+            yield tree.join(path, name), value
     for name, (value, _, _) in part.arguments().items():
         if isinstance(value, MaterialPart):
-            yield from _indices(value, f"{prefix}{name}.")
+            yield from _indices(value, tree.join(path, name))
 
 
 def _textured(part: MaterialPart) -> Iterator[str]:
@@ -87,7 +88,7 @@ def _textured(part: MaterialPart) -> Iterator[str]:
 
 def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
     """Materials of one code (model, choices, number of widths) share rows; each ball has its own numbers."""
-    groups: dict[Any, list[BSDF]] = {}
+    groups: dict[tuple[object, ...], list[BSDF]] = {}
     for bsdf in bsdfs:
         groups.setdefault(_code(bsdf), []).append(bsdf)
     materials, rows = {}, []
@@ -100,24 +101,25 @@ def _rows(bsdfs: list[BSDF]) -> tuple[dict[str, Material], tuple[Row, ...]]:
     return materials, tuple(rows[:8])
 
 
-def _code(bsdf: BSDF) -> Any:
-    facts: list[Any] = [type(bsdf).__name__]
-    for path, parameter, owner in walk(bsdf):
-        value = tree.value_at(bsdf, path)
-        facts.append((type(owner).__name__, path))
+def _code(bsdf: BSDF) -> tuple[object, ...]:
+    """What shapes a material's shader."""
+    facts: list[object] = [(path, type(inner)) for path, inner in tree.walk(bsdf)]
+    for path, parameter, value, _ in tree.leaves(bsdf):
         if not parameter.numeric:
-            facts.append(value)
+            facts.append((path, value))
         elif parameter.kind == "alpha":
-            facts.append(isinstance(value, tuple))
+            facts.append((path, isinstance(value, tuple)))
         elif parameter.kind == "angle":
-            facts.append(value == 0)
+            facts.append((path, value == 0))
     return tuple(facts)
 
 
 def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
     """A ball each, named by what tells it from the others; its numbers are those in which it differs from the first."""
-    paths = [path for path, parameter, _ in walk(members[0]) if parameter.numeric]
-    values = [{path: _listed(tree.value_at(member, path)) for path in paths} for member in members]
+    values = [
+        {leaf.path: _listed(leaf.value) for leaf in tree.leaves(member) if leaf.parameter.numeric} for member in members
+    ]
+    paths = list(values[0])
     telling = [path for path in paths if any(v[path] != values[0][path] for v in values)]
     numbers = [path for path in telling if not isinstance(values[0][path], list)]
     balls = []
@@ -128,28 +130,28 @@ def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
     return tuple(balls)
 
 
-def _text(value: Any) -> str:
+def _text(value: float | list[float]) -> str:
     return " ".join(f"{v:.3g}".removeprefix("0") or "0" for v in (value if isinstance(value, list) else [value]))
 
 
-def _listed(value: Any) -> Any:
-    return [float(v) for v in value] if isinstance(value, tuple | list | np.ndarray) else float(value)
+def _listed(value: ArrayLike) -> float | list[float]:
+    array = np.asarray(value, float)
+    return [float(v) for v in array] if array.ndim else float(array)
 
 
 # --------------------------------------------------------------------------- lights
 
 
-def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
+def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], list[str]]:
     """The scene's lights as the page has them, and notes on what became of them."""
     placed = description.camera.transform
     target = np.array(placed.look_at, float)
     axes, _ = _axes(placed)
-    found: list[dict[str, Any]] = []
+    found: list[Light] = []
     notes: list[str] = []
-    around = [light for light in description.lights if _surrounds(light, target)]
-    if around:  # nothing from beyond such a lamp arrives
-        constant = [float(x) for x in rgb(around[0].energy)]
-        return ({**ENVIRONMENT, "constant": constant},), notes
+    for light in description.lights:
+        if isinstance(light, schema.AreaLight) and _surrounds(light, target):  # nothing from beyond arrives
+            return ({**ENVIRONMENT, "constant": [float(x) for x in rgb(light.energy)]},), []
     for light in description.lights:
         if isinstance(light, schema.EnvironmentLight):
             found.append(_environment(description, light, axes))
@@ -171,15 +173,15 @@ def _lights(description: Any) -> tuple[tuple[dict[str, Any], ...], list[str]]:
     return tuple(found), notes
 
 
-def _surrounds(light: Any, target: np.ndarray) -> bool:
+def _surrounds(light: schema.AreaLight, target: Vector) -> bool:
     """Whether a lamp is a sphere around the point."""
-    if not isinstance(light, schema.AreaLight) or not isinstance(light.shape, schema.Sphere):
+    if not isinstance(light.shape, schema.Sphere):
         return False
     centre = (light.shape.transform.matrix() @ [*light.shape.center, 1.0])[:3]
     return float(np.linalg.norm(centre - target)) < light.shape.radius
 
 
-def _axes(placed: Any) -> tuple[np.ndarray, float]:
+def _axes(placed: schema.CameraTransform) -> tuple[Vector, float]:
     """(the page's x, y, z in the scene, elevation of the camera): the scene turned so that its camera looks along -z.
 
     Where up is the scene's +y, it stays so and the camera keeps its elevation; else the camera's own axes are taken.
@@ -195,7 +197,7 @@ def _axes(placed: Any) -> tuple[np.ndarray, float]:
     return np.array([right, np.cross(back, right), back]), 0.0
 
 
-def _area(light: Any, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _area(light: schema.AreaLight, target: Vector) -> tuple[Vector, Vector]:
     """(vector to the lamp's middle, irradiance on a surface that faces it): L A cos / r^2, as if it were far away."""
     shape, radiance = light.shape, np.array(rgb(light.energy))
     matrix = shape.transform.matrix()
@@ -214,9 +216,10 @@ def _area(light: Any, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return away, radiance * seen / max(float(away @ away), 1e-12)
 
 
-def _environment(description: Any, light: Any, axes: np.ndarray) -> dict[str, Any]:
+def _environment(description: schema.SceneDescription, light: schema.EnvironmentLight, axes: Vector) -> Light:
     source = light.texture if light.texture is not None else light.radiance
     found = {**ENVIRONMENT, "rotation": -math.atan2(axes[2][0], axes[2][2])}
+    assert source is not None  # the reader has checked that one is given
     if not isinstance(source, ImageTexture):
         return {**found, "constant": [float(x) for x in rgb(source)]}
     where = description.where("/scene/lights")

@@ -8,12 +8,15 @@ from __future__ import annotations
 import json
 import math
 import struct
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from ..errors import GonioError, InputError
+from .page import PageData
 
 TEXT_BYTES = 64 << 10  # a scene of 64 balls with all their parameters is a tenth of this
 UPLOAD_BYTES = 64 << 20  # an environment of 4096 x 2048 half floats in RGBA
@@ -145,7 +148,7 @@ class Wish(Part):
 
 
 Message = Annotated[Scene | Ack | Upload | Wish, Field(discriminator="type")]
-_message: TypeAdapter[Any] = TypeAdapter(Message)
+_message: TypeAdapter[Message] = TypeAdapter(Message)
 
 
 def parse(text: str) -> Scene | Ack | Upload | Wish:
@@ -183,7 +186,7 @@ def _check(scene: Scene) -> None:
         raise InputError("more than one environment", "scene/state/lights", "keep one")
 
 
-def environment(upload: Upload, content: bytes) -> np.ndarray:
+def environment(upload: Upload, content: bytes) -> NDArray[np.float32]:
     """The pixels of an upload: (height, width, 3) float32; InputError where they are not what was announced."""
     if len(content) != upload.size:
         raise InputError(f"{len(content)} bytes came, {upload.size} were announced", "upload", "send float16 RGBA")
@@ -201,13 +204,13 @@ def failure(error: GonioError, kind: str = "error") -> str:
     return json.dumps({"type": kind, "what": error.what, "where": error.where, "hint": error.hint})
 
 
-def stage(data: dict[str, Any]) -> str:
+def stage(data: PageData) -> str:
     """Other materials and rows in the place of those that the page has."""
-    parts = {name: data[name] for name in ("revision", "materials", "scene")}
+    parts = {"revision": data["revision"], "materials": data["materials"], "scene": data["scene"]}
     return json.dumps({"type": "stage", **parts}, allow_nan=False)
 
 
-def frame(header: dict[str, Any], pixels: np.ndarray) -> bytes:
+def frame(header: Mapping[str, object], pixels: NDArray[np.float32]) -> bytes:
     """A frame: length of the header (uint32), header (JSON, padded so that the pixels lie on 4 bytes), float16 RGBA.
 
     pixels  (height, width, 4), row 0 on top

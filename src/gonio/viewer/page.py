@@ -11,21 +11,60 @@ import hashlib
 import html as escaping
 import itertools
 import json
-import math
 import threading
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .. import __version__
+from .._version import __version__
 from ..emit import bundle as written_for
 from ..energy.tables import bake
 from ..errors import InputError, MachineError
 from ..models import BSDF
 from . import panels, stage
-from .stage import Stage
+from .stage import PresetData, Stage, Value
+
+Json: TypeAlias = "dict[str, object]"  # what becomes JSON, as docs/viewer.md describes it
+
+
+class VariantData(TypedDict):
+    """A material with some choices made, as shader code."""
+
+    key: str
+    choices: dict[str, Value]
+    manifest: Json
+    text: str
+    tables: dict[str, str]
+
+
+class MaterialData(TypedDict):
+    """A material of the page."""
+
+    id: str
+    title: str
+    presets: list[PresetData]
+    variants: list[VariantData]
+
+
+class PageData(TypedDict):
+    """All that the page is made from."""
+
+    version: int
+    generator: str
+    title: str
+    mode: str
+    socket: str | None
+    revision: int
+    materials: list[MaterialData]
+    scene: Json
+    display: Json
+    notes: list[str]
+    dfg: Json
+
 
 VERSION = 1
 _recording = threading.Lock()  # the recorder is one for all threads: the server's, and the one that watches files
@@ -42,7 +81,7 @@ TABLES = {
 }
 
 
-def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> dict[str, Any]:
+def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> PageData:
     """The page's data, as JSON holds it.
 
     socket    where the live reference is reached, such as "/ws?token=..."; None for a page without a server
@@ -78,7 +117,7 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> dict
     }
 
 
-def material_data(key: str, material: stage.Material) -> dict[str, Any]:
+def material_data(key: str, material: stage.Material) -> MaterialData:
     """A material with its presets and one variant for every combination of its choices, the model's own first."""
     names = list(material.choices)
     combinations = [dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())]
@@ -90,39 +129,28 @@ def material_data(key: str, material: stage.Material) -> dict[str, Any]:
     }
 
 
-def variant_data(bsdf: BSDF, choices: dict[str, Any]) -> dict[str, Any]:
+def variant_data(bsdf: BSDF, choices: Mapping[str, Value]) -> VariantData:
     """Shader, manifest and tables of a model with some choices made otherwise."""
     with _recording:
         bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl")
     tables = {name: encode(values) for name, values in bundle.tables.items()}
-    manifest = _finite(bundle.manifest)
+    manifest = bundle.manifest
     for texture in manifest["textures"]:
         name = texture["uniform"].removeprefix("table_")
         axes, doc = next((what for start, what in TABLES.items() if name.startswith(start)), ([], ""))
         texture |= {"axes": axes, "doc": doc}
     code = "".join([bundle.text, *(f"{name} {data}" for name, data in sorted(tables.items()))])
     key = hashlib.sha256(code.encode()).hexdigest()[:16]
-    return {"key": key, "choices": choices, "manifest": manifest, "text": bundle.text, "tables": tables}
+    return {"key": key, "choices": dict(choices), "manifest": manifest, "text": bundle.text, "tables": tables}
 
 
-def _finite(value: Any) -> Any:
-    """JSON knows no infinity: a range without an end has None there."""
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def encode(values: np.ndarray) -> str:
+def encode(values: NDArray[np.floating]) -> str:
     """Little-endian float32 in base64."""
     return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
 
 
 @lru_cache
-def split_sum_data() -> dict[str, Any]:
+def split_sum_data() -> Json:
     """A and B of the split sum (Karis2013) for GGX, over mu (x) and roughness (y), at texel centres."""
     values = bake.bake("ggx", lut=["dfg"], size=DFG_SIZE).arrays["dfg"]
     return {"size": [DFG_SIZE, DFG_SIZE], "channels": 2, "data": encode(values)}
@@ -131,7 +159,7 @@ def split_sum_data() -> dict[str, Any]:
 # --------------------------------------------------------------------------- HTML
 
 
-def html(data: dict[str, Any], policy: bool = True) -> str:
+def html(data: PageData, policy: bool = True) -> str:
     """One file: style, data and scripts inline, no address in it that a browser would fetch.
 
     policy  put the Content-Security-Policy into the file itself; a server sends it as a header instead

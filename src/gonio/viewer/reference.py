@@ -22,16 +22,23 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any
+from collections.abc import Mapping, Sequence
+from types import ModuleType
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..models import BSDF, tree
 from ..render import adapter, engine, foreground, integrators, lights
 from ..render.scene import textures
+from ..render.types import MitsubaBSDF, OfVariant, Plugin, PluginDict, Scene, Sensor, Shape
 from . import messages, stage
 from .stage import Stage
+
+Pixels: TypeAlias = "NDArray[np.float32]"  # (height, width, channels), row 0 on top
+Structure: TypeAlias = tuple[object, ...]  # equal for what one kernel serves
 
 PASS_SECONDS = 0.05  # of work before someone may interrupt: half of what a slider's change may take to be seen
 MOST_PER_PASS = 64
@@ -53,12 +60,12 @@ class Reference:
         adapter.register(self.mi)
         lights.register(self.mi)
         self.stage = what
-        self.pictures: dict[str, np.ndarray] = {}
+        self.pictures: Mapping[str, Pixels] = {}
         self.scene: messages.Scene | None = None
         self._render: foreground.Foreground | None = None
         self._balls = _Balls(self.mi)
         self._lamps = _Lamps(self.mi)
-        self._whole: tuple[tuple[Any, Any], Any] = ((None, None), None)
+        self._whole: tuple[tuple[dict[str, Plugin], dict[str, Plugin]], Scene] = (({}, {}), None)
         self._first_pass = 0.0  # seconds
         self._per_sample = QUICKEST
 
@@ -99,14 +106,14 @@ class Reference:
         bsdf = stage.replaced(self.stage.materials[row.material].bsdf, dict(row.choices), f"{where}/choices")
         return [stage.replaced(bsdf, dict(ball), f"{where}/balls/{i}") for i, ball in enumerate(row.balls)]
 
-    def _together(self) -> Any:
+    def _together(self) -> Scene:
         """Balls and lights in one scene."""
         parts = (self._balls.parts, self._lamps.parts)
         if any(a is not b for a, b in zip(self._whole[0], parts, strict=True)):
             self._whole = parts, self.mi.load_dict({"type": "scene", **parts[0], **parts[1]})
         return self._whole[1]
 
-    def _sensor(self, scene: messages.Scene) -> Any:
+    def _sensor(self, scene: messages.Scene) -> Sensor:
         camera, mi = scene.state.camera, self.mi
         sin_a, cos_a = math.sin(camera.azimuth), math.cos(camera.azimuth)
         sin_e, cos_e = math.sin(camera.elevation), math.cos(camera.elevation)
@@ -154,7 +161,7 @@ class Reference:
         else:  # whatever held it up may be over: soon two are tried again
             self._per_sample = max(self._per_sample / 2, QUICKEST)
 
-    def image(self) -> np.ndarray:
+    def image(self) -> Pixels:
         """(height, width, 4) float32: linear radiance of the balls alone, averaged over the pixel, and coverage."""
         if self._render is None:
             raise InputError("nothing to show yet", "Reference.image", "call show first")
@@ -167,16 +174,16 @@ class Reference:
 class _Balls:
     """The balls' scene, kept as long as only values change."""
 
-    def __init__(self, mi: Any):
+    def __init__(self, mi: ModuleType):
         self.mi = mi
-        self.parts: dict[str, Any] = {}
-        self._structure: Any = None
-        self._scene: Any = None
-        self._parameters: list[Any] = []
+        self.parts: dict[str, Shape] = {}
+        self._structure: Structure = ()
+        self._scene: Scene = None
+        self._parameters: list[OfVariant] = []
 
-    def place(self, rows: list[list[BSDF]], spacing: float) -> Any:
+    def place(self, rows: Sequence[Sequence[BSDF]], spacing: float) -> Scene:
         flat = [bsdf for row in rows for bsdf in row]
-        structure = ([[_structure(bsdf) for bsdf in row] for row in rows], spacing)
+        structure = (spacing, *([_structure(bsdf) for bsdf in row] for row in rows))
         if structure != self._structure:
             bsdfs = [self.mi.load_dict(self._plugin(bsdf)) for bsdf in flat]
             places = [
@@ -194,14 +201,14 @@ class _Balls:
             parameters.update()
         return self._scene
 
-    def _ball(self, place: list[float], bsdf: Any) -> Any:
+    def _ball(self, place: Sequence[float], bsdf: MitsubaBSDF) -> Shape:
         to_world = np.eye(4)
         to_world[:3, :3], to_world[:3, 3] = SPHERE_AXES, place
         return self.mi.load_dict({"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world), "bsdf": bsdf})
 
-    def _plugin(self, bsdf: BSDF) -> dict[str, Any]:
+    def _plugin(self, bsdf: BSDF) -> PluginDict:
         """A material as a plugin; numbers as their slots name them."""
-        plugin: dict[str, Any] = {"type": adapter.register_model(self.mi, type(bsdf))}
+        plugin: PluginDict = {"type": adapter.register_model(self.mi, type(bsdf))}
         for name, inner in tree.children(bsdf).items():
             plugin[name] = self._plugin(inner)
         for name, parameter in bsdf.parameters().items():
@@ -215,7 +222,7 @@ class _Balls:
 
 def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
     """The numbers of a material by the adapter's names: two widths are alpha_x and alpha_y, no turn is no slot."""
-    slots: dict[str, Any] = {}
+    slots: dict[str, float | tuple[float, ...]] = {}
     for path, parameter, value, _ in tree.leaves(bsdf):
         if parameter.kind == "spectrum":
             colour = np.broadcast_to(np.asarray(value, float), 3)
@@ -227,7 +234,7 @@ def _slots(bsdf: BSDF) -> dict[str, float | tuple[float, ...]]:
     return slots
 
 
-def _structure(bsdf: BSDF) -> Any:
+def _structure(bsdf: BSDF) -> Structure:
     """What shapes a material's code: classes, choices, and which numbers there are."""
     shape = [(path, type(inner), inner.delta) for path, inner in tree.walk(bsdf)]
     choices = [leaf.value for leaf in tree.leaves(bsdf) if not leaf.parameter.numeric]
@@ -240,21 +247,21 @@ def _structure(bsdf: BSDF) -> Any:
 class _Lamps:
     """The lights' scene, kept as long as only values change."""
 
-    def __init__(self, mi: Any):
+    def __init__(self, mi: ModuleType):
         self.mi = mi
-        self.parts: dict[str, Any] = {}
-        self._shown: list[np.ndarray | None] = []
+        self.parts: dict[str, Plugin] = {}
+        self._shown: list[Pixels | None] = []
         self.extended = False
-        self._structure: Any = None
-        self._scene: Any = None
+        self._structure: Structure | None = None
+        self._scene: Scene = None
 
-    def place(self, given: list[Any], pictures: dict[str, np.ndarray]) -> Any:
+    def place(self, given: Sequence[messages.Light], pictures: Mapping[str, Pixels]) -> Scene:
         for light in given:
             if isinstance(light, messages.Environment) and light.image and light.image.key not in pictures:
                 hint = "upload it before the scene that names it"
                 raise InputError(f"unknown picture '{light.image.key}'", "lights", hint)
         shown = [pictures[x.image.key] if isinstance(x, messages.Environment) and x.image else None for x in given]
-        structure = [light.type for light in given]
+        structure = tuple(light.type for light in given)
         # a key may be given to another picture: the arrays themselves are compared
         if structure != self._structure or any(a is not b for a, b in zip(shown, self._shown, strict=True)):
             self.parts = {f"light{n}": self.mi.load_dict(self._plugin(x, pictures)) for n, x in enumerate(given)}
@@ -264,7 +271,7 @@ class _Lamps:
         self.write(self._scene, given)
         return self._scene
 
-    def write(self, scene: Any, given: list[Any]) -> None:
+    def write(self, scene: Scene, given: Sequence[messages.Light]) -> None:
         """Put the lights' values into a scene that holds them; by way of the scene, which then moves its geometry."""
         parameters = self.mi.traverse(scene)
         for n, light in enumerate(given):
@@ -272,7 +279,7 @@ class _Lamps:
                 parameters[f"light{n}.{name}"] = value
         parameters.update()
 
-    def _plugin(self, light: Any, pictures: dict[str, np.ndarray]) -> dict[str, Any]:
+    def _plugin(self, light: messages.Light, pictures: Mapping[str, Pixels]) -> PluginDict:
         """The kind of light; values follow by `write`."""
         white = {"type": "rgb", "value": [1.0, 1.0, 1.0]}
         match light:
@@ -289,7 +296,7 @@ class _Lamps:
                 return textures.environment(self.mi, picture)
         return {"type": "constant", "radiance": white}
 
-    def _values(self, light: Any) -> dict[str, Any]:
+    def _values(self, light: messages.Light) -> dict[str, OfVariant]:
         """A light's parameters by Mitsuba's names."""
         mi = self.mi
         match light:
@@ -316,7 +323,7 @@ class _Lamps:
         return {"to_world": turn, "scale": float(light.scale)}
 
 
-def _looking(toward: np.ndarray) -> np.ndarray:
+def _looking(toward: NDArray[np.float64]) -> NDArray[np.float64]:
     """A rotation that takes +z to a direction."""
     side = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
     side /= np.linalg.norm(side)

@@ -25,7 +25,6 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Iterator
-from typing import Any
 from urllib.parse import parse_qs
 
 import uvicorn
@@ -37,6 +36,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
 
 from ..errors import GonioError, InputError, MachineError
 from ..render import engine
@@ -131,7 +131,7 @@ class Application:
             exception_handlers={404: _nothing_here, 405: _nothing_here},
         )
 
-    def _written(self, what: Stage, revision: int) -> dict[str, Any]:
+    def _written(self, what: Stage, revision: int) -> page.PageData:
         return page.page_data(what, f"/ws?token={self.door.token}", revision)
 
     def renew(self, what: Stage) -> None:
@@ -210,7 +210,7 @@ class _Guarded(H11Protocol):
     waiting: dict[_Guarded, asyncio.TimerHandle]  # for requests; these two are set by `Server`, one pair a server
     answering: dict[_Guarded, asyncio.TimerHandle]
 
-    def connection_made(self, transport: Any) -> None:
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         self._watch(self.waiting, MOST_CONNECTIONS, REQUEST_SECONDS)
 
@@ -251,9 +251,10 @@ class _Socket(WebSocketsSansIOProtocol):
 
     controls = 0
 
-    def connection_made(self, transport: Any) -> None:
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        transport.max_size = READ_BYTES  # asyncio's own is 256 KiB: a third of a second of empty frames
+        # asyncio's own is 256 KiB: a third of a second of empty frames
+        transport.max_size = READ_BYTES  # type: ignore[attr-defined]
 
     def connection_lost(self, exc: Exception | None) -> None:
         while not self.queue.empty():  # what a page had asked for that is gone
@@ -265,7 +266,7 @@ class _Socket(WebSocketsSansIOProtocol):
         if not self.handshake_initiated:  # uvicorn hands the whole request over: nothing more would come of it
             self.transport.abort()
 
-    def handle_cont(self, event: Any) -> None:
+    def handle_cont(self, event: Frame) -> None:
         if len(self.frames) < MOST_FRAGMENTS:
             super().handle_cont(event)
         else:
@@ -275,7 +276,7 @@ class _Socket(WebSocketsSansIOProtocol):
         super().handle_ping()
         self._count_control()
 
-    def handle_pong(self, event: Any) -> None:
+    def handle_pong(self, event: Frame) -> None:
         super().handle_pong(event)
         self._count_control()
 

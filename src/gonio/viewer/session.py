@@ -10,14 +10,13 @@ import os
 import threading
 import time
 from pathlib import Path
-from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from .. import __version__
+from .._version import __version__
 from ..errors import GonioError, InputError
 from . import messages, page
-from .reference import Reference
+from .reference import Pixels, Reference
 from .stage import Stage
 
 PICTURES = 2  # environments kept a session: the one that is shown, and the one that comes
@@ -45,7 +44,7 @@ class Session:
         self._due = 0.0  # when the next message may be read
         # the renderer's, under its lock
         self.scene: messages.Scene | None = None
-        self.pictures: dict[str, Any] = {}
+        self.pictures: dict[str, Pixels] = {}
         self.reference: Reference | None = None
         self.shown_samples = 0
         self.spent = 0.0  # seconds of the renderer's thread
@@ -107,7 +106,7 @@ class Session:
         self._due = max(self._due, now - BURST_SECONDS) + max(1 / RATE, took / SHARE)
         await asyncio.sleep(max(self._due - now, 0.0))
 
-    def _take(self, message: Any) -> None:
+    def _take(self, message: messages.Message) -> None:
         self.asked = self.asked or not isinstance(message, messages.Ack)
         match message:
             case messages.Scene():
@@ -200,7 +199,7 @@ class Renderer:
             self._start()
             self._lock.notify()
 
-    def keep_picture(self, session: Session, key: str, pixels: Any) -> None:
+    def keep_picture(self, session: Session, key: str, pixels: Pixels) -> None:
         with self._lock:
             session.pictures.pop(key, None)
             session.pictures[key] = pixels

@@ -8,18 +8,33 @@ Values of nested materials are named by a path: "base.alpha" is the alpha of the
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import NotRequired, TypeAlias, TypedDict
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, Parameter, model, notation, outside, tree
-from ..optics import fresnel, indices
+from ..ops import backend
 from .watch import Code
+
+Value: TypeAlias = "float | bool | str | Sequence[float]"  # of a parameter, as JSON has it
+Light: TypeAlias = "dict[str, object]"  # as docs/viewer.md writes it
+
+
+class Camera(TypedDict):
+    """As docs/viewer.md writes it; where the distance is left out, all balls are in sight."""
+
+    target: list[float]
+    azimuth: float
+    elevation: float
+    fov: float
+    distance: NotRequired[float]
+
 
 ROUGHNESS = (0.15, 0.35, 0.55, 0.75, 0.95)  # of the homework's balls; alpha is its square
 # the homework's masking and the correct one; the page toggles between them
@@ -27,8 +42,8 @@ HOMEWORK_MASKINGS = ("smith-correlated", "schlick-direct")
 LARGEST_ROW = 5
 
 # From the upper left, over the camera's shoulder; pi, so that a white Lambert ball reads 1 where it faces the light.
-SUN = {"type": "directional", "direction": [-0.4364358, 0.4364358, 0.7867958], "irradiance": [math.pi] * 3}
-CAMERA: dict[str, Any] = {"target": [0.0, 0.0, 0.0], "azimuth": 0.0, "elevation": 0.0, "fov": 30.0}
+SUN: Light = {"type": "directional", "direction": [-0.4364358, 0.4364358, 0.7867958], "irradiance": [math.pi] * 3}
+CAMERA: Camera = {"target": [0.0, 0.0, 0.0], "azimuth": 0.0, "elevation": 0.0, "fov": 30.0}
 SPACING = 2.4
 
 
@@ -37,7 +52,7 @@ class Ball:
     """One ball: its label, and the numeric parameters that differ from its material's, path -> value."""
 
     label: str
-    values: dict[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -71,12 +86,12 @@ class Stage:
     title: str
     materials: dict[str, Material]
     rows: tuple[Row, ...]
-    lights: tuple[dict[str, Any], ...] = (SUN,)
-    camera: dict[str, Any] = field(default_factory=dict)
+    lights: tuple[Light, ...] = (SUN,)
+    camera: Camera = field(default_factory=lambda: CAMERA)
     notes: tuple[str, ...] = ()
     code: Code[Stage] | None = None
 
-    def framed(self) -> dict[str, Any]:
+    def framed(self) -> Camera:
         """The camera, far enough away that all balls stand in a picture of 16 : 9 or wider, with some air.
 
         The page keeps the horizontal field of view in narrower pictures, so they hold all balls too.
@@ -85,28 +100,22 @@ class Stage:
         up = (len(self.rows) - 1) * SPACING / 2 + 1.25
         half = math.tan(math.radians(CAMERA["fov"]) / 2)
         distance = max(up / half, across / (half * 16 / 9), 4.0) + 0.3
-        return {**CAMERA, "distance": round(distance, 2), **self.camera}
+        return {**self.camera, "distance": self.camera.get("distance", round(distance, 2))}
 
 
 # --------------------------------------------------------------------------- parameters by path
 
 
-def walk(bsdf: BSDF) -> Iterator[tuple[str, Parameter, BSDF]]:
-    """Every parameter of a material and of those inside it: (path, declaration, the material that has it)."""
-    for leaf in tree.leaves(bsdf):
-        yield leaf.path, leaf.parameter, leaf.owner
-
-
-def replaced(bsdf: BSDF, values: dict[str, Any], where: str = "values") -> BSDF:
+def replaced(bsdf: BSDF, values: Mapping[str, Value], where: str = "values") -> BSDF:
     """The material with other values at some paths; InputError for a path or value that cannot be."""
-    known = {path: parameter for path, parameter, _ in walk(bsdf)}
+    known = {leaf.path: leaf.parameter for leaf in tree.leaves(bsdf)}
     for path in values:
         if path not in known:
             raise InputError(f"unknown parameter '{path}'", where, did_you_mean(path, list(known)))
-    return tree.replace(bsdf, {path: plain(known[path], value) for path, value in values.items()}, where)
+    return tree.replace(bsdf, {path: _plain(known[path], value) for path, value in values.items()}, where)
 
 
-def plain(parameter: Parameter, value: Any) -> Any:
+def _plain(parameter: Parameter, value: Value) -> Value:
     """A value from JSON as a constructor takes it: two equal widths are one, a list is a tuple."""
     if isinstance(value, list | tuple):
         if parameter.kind == "alpha" and len(value) == 2 and value[0] == value[1]:
@@ -118,31 +127,47 @@ def plain(parameter: Parameter, value: Any) -> Any:
 # --------------------------------------------------------------------------- presets
 
 
-def presets(bsdf: BSDF) -> list[dict[str, Any]]:
-    """Named indices for the first material inside that takes them, each with its linear F0 at normal incidence.
+class PresetData(TypedDict):
+    """A preset as the page has it: values by path, linear reflectance at normal incidence."""
 
-    F0 is exact (course sheet, eq. 11 and 12), in linear values: what people type from sRGB pictures is too dark.
+    name: str
+    set: dict[str, Value]
+    f0: NotRequired[list[float]]
+
+
+def presets(bsdf: BSDF) -> list[PresetData]:
+    """The presets of the first material inside that has some, each with its linear F0 at normal incidence.
+
+    F0 is exact, in linear values: what people type from sRGB pictures is too dark. Indices of no surface, whose F0 is
+    0, are left out; defaults that reflect everything, at every angle, come last.
     """
-    found: list[dict[str, Any]] = []
-    for path, parameter, owner in walk(bsdf):
-        if parameter.name != "eta" or not owner.presets():
-            continue
-        stem = path.removesuffix("eta")
-        if "k" in owner.parameters():
-            for metal in indices.METALS.values():
-                f0 = [fresnel.r0_conductor(*index) for index in zip(metal.eta, metal.k, strict=True)]
-                values = {f"{stem}eta": list(metal.eta), f"{stem}k": list(metal.k)}
-                found.append({"name": metal.name, "set": values, "f0": [round(x, 6) for x in f0]})
-            # index 0 with any k reflects everything, at every angle
-            white = {f"{stem}eta": [0.0] * 3, f"{stem}k": [1.0] * 3}
-            found.append({"name": "F = 1", "set": white, "f0": [1.0] * 3})
-        else:
-            for medium in indices.MEDIA.values():
-                if medium.eta > 1.0:
-                    f0 = [round(fresnel.r0_dielectric(medium.eta), 6)] * 3
-                    found.append({"name": medium.name, "set": {path: medium.eta}, "f0": f0})
-        return found
-    return found
+    path, owner = next(((path, inner) for path, inner in tree.walk(bsdf) if inner.presets()), ("", bsdf))
+    listed: list[PresetData] = []
+    defaults: dict[str, Value] = {}
+    for preset in owner.presets().values():
+        defaults |= {name: owner.parameters()[name].default for name in preset.values}
+        f0 = _f0(owner, preset.values)
+        if f0 is None or any(f0):
+            listed.append(_preset(preset.title, path, preset.values, f0))
+    if defaults and dataclasses.MISSING not in defaults.values():
+        f0 = _f0(owner, defaults)
+        if f0 == [1.0] * 3:
+            listed.append(_preset("F = 1", path, defaults, f0))
+    return listed
+
+
+def _preset(title: str, path: str, values: Mapping[str, Value], f0: list[float] | None) -> PresetData:
+    data: PresetData = {"name": title, "set": {tree.join(path, name): _listed(value) for name, value in values.items()}}
+    return data if f0 is None else {**data, "f0": f0}
+
+
+def _listed(value: Value) -> Value:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _f0(owner: BSDF, values: Mapping[str, Value]) -> list[float] | None:
+    f0 = tree.replace(owner, values).bind(backend.types("float64")).normal_reflectance()
+    return None if f0 is None else [round(float(x), 6) for x in np.broadcast_to(backend.to_numpy(f0, 1), (1, 3))[0]]
 
 
 # --------------------------------------------------------------------------- the homework
@@ -150,8 +175,7 @@ def presets(bsdf: BSDF) -> list[dict[str, Any]]:
 
 def homework(metal: str = "Ag") -> Stage:
     """Two rows of five balls under one light, roughness rising to the right: Kulla-Conty above, plain below."""
-    silver = indices.metal(metal)
-    base = model("conductor")(eta=silver.eta, k=silver.k, alpha=ROUGHNESS[0] ** 2)  # type: ignore[call-arg]
+    base = model("conductor").preset(metal, alpha=ROUGHNESS[0] ** 2)
     compensated = model("kulla-conty")(base=base)  # type: ignore[call-arg]
     materials = {
         "m0": Material("Kulla-Conty", compensated, {"base.masking": HOMEWORK_MASKINGS}),
@@ -245,18 +269,14 @@ def _title(bsdf: BSDF) -> str:
 
 def _masking(bsdf: BSDF) -> tuple[str, tuple[str, ...]]:
     """The first masking inside, and the choices worth a toggle: the model's own, then the homework's two."""
-    for path, parameter, _ in walk(bsdf):
-        if parameter.name == "masking" and parameter.kind == "choice":
-            own = tree.value_at(bsdf, path)
-            allowed = [own]
-            for name in HOMEWORK_MASKINGS:
-                if name not in allowed and _accepts(bsdf, {path: name}):
-                    allowed.append(name)
-            return path, tuple(allowed)
+    for path, parameter, own, _ in tree.leaves(bsdf):
+        if parameter.name == "masking" and parameter.choices:
+            others = (name for name in HOMEWORK_MASKINGS if name != own and _accepts(bsdf, {path: name}))
+            return path, (own, *others)
     return "", ()
 
 
-def _accepts(bsdf: BSDF, values: dict[str, Any]) -> bool:
+def _accepts(bsdf: BSDF, values: Mapping[str, Value]) -> bool:
     try:
         replaced(bsdf, values)
     except InputError:
@@ -266,14 +286,14 @@ def _accepts(bsdf: BSDF, values: dict[str, Any]) -> bool:
 
 def _series(bsdf: BSDF, fixed: set[str]) -> tuple[Ball, ...]:
     """Balls over the first width that is not fixed, else over the first such number, else one ball."""
-    free = [(path, p) for path, p, _ in walk(bsdf) if path.partition(".")[0] not in fixed and path not in fixed]
-    for path, parameter in free:
-        if parameter.kind == "alpha" and not isinstance(tree.value_at(bsdf, path), tuple):
+    free = [leaf for leaf in tree.leaves(bsdf) if fixed.isdisjoint((leaf.path, leaf.path.partition(".")[0]))]
+    for path, parameter, value, _ in free:
+        if parameter.kind == "alpha" and not isinstance(value, tuple):
             return tuple(_rough(path, r) for r in ROUGHNESS)
-    for path, parameter in free:
-        if parameter.kind == "float" and parameter.name != "seed":
-            return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, tree.value_at(bsdf, path)))
-    for path, parameter in free:
+    for path, parameter, value, _ in free:
+        if parameter.kind == "float":
+            return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, value))
+    for path, parameter, _, _ in free:
         if parameter.kind == "spectrum" and parameter.high <= 1.0:
             return tuple(Ball(f"{path} {_short(v)}", {path: [v] * 3}) for v in (0.1, 0.3, 0.5, 0.7, 0.9))
     return (Ball(_title(bsdf)),)

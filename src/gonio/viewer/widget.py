@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, MachineError
-from ..models import BSDF, tree
+from ..models import BSDF, notation, tree
 from . import page, stage
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     if not isinstance(height, Integral) or not 100 <= height <= 4000:
         raise InputError(f"height {height!r}", "go.view: height", "give a whole number of pixels, 100 to 4000")
     html = page.html(page.page_data(_stage(models)))
-    members: dict[str, Any] = {
+    members: dict[str, object] = {
         "_esm": _SCRIPT,
         "html": traitlets.Unicode(html).tag(sync=True),
         "height": traitlets.Int(int(height)).tag(sync=True),
@@ -63,7 +63,7 @@ def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     return type("GonioView", (anywidget.AnyWidget,), members)()
 
 
-def _stage(models: tuple[Any, ...]) -> stage.Stage:
+def _stage(models: tuple[object, ...]) -> stage.Stage:
     if not models:
         return stage.homework()
     bsdfs: list[BSDF] = []
@@ -89,14 +89,9 @@ def _stage(models: tuple[Any, ...]) -> stage.Stage:
 
 def _own(model: BSDF) -> set[str]:
     """The parameters that are not what they are by default: whoever made the material has fixed those."""
-    fixed = set()
-    for path, parameter, _ in stage.walk(model):
-        if parameter.required or not _equal(tree.value_at(model, path), parameter.default):
-            fixed.add(path)
-    return fixed
-
-
-def _equal(a: Any, b: Any) -> bool:
-    import numpy as np
-
-    return bool(np.array_equal(np.asarray(a), np.asarray(b)))
+    return {
+        tree.join(path, name)
+        for path, inner in tree.walk(model)
+        for name in notation.settings(inner)
+        if not inner.parameters()[name].inner
+    }
