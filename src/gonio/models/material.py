@@ -16,7 +16,6 @@ values, or symbols while recording. Callers hand over NumPy arrays, lists or Dr.
 
 from __future__ import annotations
 
-import functools
 import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -107,6 +106,7 @@ class BSDF(Material):
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
+    _declared: ClassVar[Mapping[str, Parameter]] = {}
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -120,6 +120,7 @@ class BSDF(Material):
         cls.derives = cls.derive is not Material.derive
         cls.has_terms = cls.terms is not BSDF.terms
         dataclass(frozen=True, eq=False, repr=False)(cls)
+        cls._declared = declared(cls)  # on the class, and gone with it when a user's file is loaded anew
 
     def __post_init__(self) -> None:
         for parameter in self.parameters().values():
@@ -128,8 +129,7 @@ class BSDF(Material):
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters by name."""
-        this: Any = cls  # mypy takes a class of ours for unhashable
-        return dict(_declared(this))
+        return dict(cls._declared)
 
     # ------------------------------------------------------------------ formulas
 
@@ -360,12 +360,6 @@ BSDF.family = Family(
     subclasses_of(BSDF),
     where="model",
 )
-
-
-@functools.cache
-def _declared(cls: type[BSDF]) -> dict[str, Parameter]:
-    """Asked at every binding, so found once a class."""
-    return declared(cls)
 
 
 def never(like: Any) -> Any:
