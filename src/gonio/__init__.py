@@ -27,7 +27,7 @@ _PLACES = {
     "errors": ("GonioError", "GonioWarning", "InputError", "MachineError"),
     "members": ("register",),
     "ops": ("Direction", "Mask", "Mode", "Pair", "Scalar", "Spectrum", "get_precision", "set_precision"),
-    "optics.ndf": ("NDF",),
+    "optics.ndf": ("NDF", "Stretched"),
     "optics.masking": ("Masking",),
     "optics.fresnel": ("Fresnel",),
     # what a material of one's own is written with
@@ -94,7 +94,7 @@ if TYPE_CHECKING:
     from .ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, get_precision, set_precision
     from .optics.fresnel import Fresnel
     from .optics.masking import Masking
-    from .optics.ndf import NDF
+    from .optics.ndf import NDF, Stretched
     from .render import render
     from .render.integrators import Integrator
     from .render.tables import bake
@@ -131,7 +131,8 @@ __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Colour", "Conductor", "Dielectric", "Direction",
     "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
     "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Parameter", "Phong",
-    "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake",
-    "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model", "models", "never", "number",
-    "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
+    "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width", "albedo",
+    "angle", "bake", "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model", "models",
+    "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided", "verify",
+    "view", "width",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Distributions of normals: normalization, Smith's terms against their defining integrals, sampling, and a new one."""
+"""Distributions of normals: normalization, Smith's terms against their defining integrals, and sampling."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import scipy.special
 from gonio import ops
 from gonio.errors import InputError
 from gonio.ops import backend
-from gonio.optics.ndf import NDF, distribution, distributions
+from gonio.optics.ndf import distribution, distributions
 
 from chi_square import SIGNIFICANCE, p_value
 from sphere import SEED, at, hemisphere, random_directions, relative
@@ -172,35 +172,3 @@ def test_smiths_lambda_is_symmetric_in_side_and_grows_toward_grazing() -> None:
         )
         np.testing.assert_allclose(lam, mirrored, rtol=1e-9, atol=1e-12)
         assert np.all(np.diff(lam) >= -1e-15) and lam[0] == pytest.approx(0, abs=1e-9)
-
-
-def test_a_new_distribution_is_one_class() -> None:
-    class Flat(NDF):
-        """D = 1 / pi: all normals alike."""
-
-        name = "flat"
-
-        def D(self, m: Any, alpha: Any) -> Any:
-            return ops.where(m.z > 0.0, ops.inv_pi + 0.0 * m.z, 0.0)
-
-        def Lambda(self, v: Any, alpha: Any) -> Any:
-            c = ops.abs(v.z)  # from int D max(0, v.m) dm = (1 + c) / 2
-            return (1.0 + c) / (2.0 * c) - 1.0
-
-        def sample(self, u1: Any, u2: Any, alpha: Any) -> Any:
-            from gonio.optics.warp import square_to_cosine_hemisphere
-
-            return square_to_cosine_hemisphere(u1, u2)
-
-    import gonio as go
-
-    NDF.family.add(Flat)
-    try:
-        material = go.Conductor(alpha=0.3, ndf="flat", masking="smith-separable-exact", fresnel="one")
-        wo, u = np.tile(at(40), (100_000, 1)), np.random.default_rng(SEED).random((100_000, 3))
-        value = material.eval(at(40), DIRECTIONS, precision="float64")[:, 0] @ WEIGHTS
-        estimate = material.sample(wo, u, precision="float64").weight[:, 0]
-        assert estimate.mean() == pytest.approx(value, abs=5 * estimate.std() / 300)
-        assert material.record("eval").entry.parameters
-    finally:
-        NDF.family.remove("flat")

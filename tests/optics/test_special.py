@@ -12,7 +12,7 @@ from gonio.errors import InputError
 from gonio.ops import backend
 from gonio.optics import frame, fresnel, indices, masking, warp
 from gonio.optics.ndf import distribution
-from gonio.optics.special import beta, erfinv
+from gonio.optics.special import beta, erfinv, gaussian_ramp
 
 from chi_square import SIGNIFICANCE, p_value
 from sphere import SEED, random_directions, relative
@@ -29,9 +29,18 @@ def _vector(rows: np.ndarray, precision: str = "float64") -> Any:
 def test_erfinv_is_scipys_within_its_stated_error() -> None:
     x = np.concatenate([np.linspace(-0.999, 0.999, 20_001), 1 - np.logspace(-6, -3, 200)])
     exact = scipy.special.erfinv(x)
-    assert relative(erfinv(_number(x, "float64")).numpy(), exact, 1e-9).max() < 5e-7
+    found = relative(erfinv(_number(x, "float64")).numpy(), exact, 1e-9)
+    assert found.max() < 1e-9 and found[np.abs(x) < 0.999].max() < 1e-12
     inner = np.abs(x) < 0.999
     assert relative(erfinv(_number(x, "float32")).numpy(), exact, 1e-9)[inner].max() < 2e-6
+
+
+@pytest.mark.parametrize("precision, bar", [("float64", 1e-14), ("float32", 4e-7)])
+def test_the_ramp_of_a_gaussian_is_its_formula_to_the_last_digits(precision: str, bar: float) -> None:
+    a = np.concatenate([[0.0], np.logspace(-8, 8, 4001)])
+    exact = 0.5 * a * (1.0 + scipy.special.erf(a)) + 0.5 * np.exp(-np.square(a)) / np.sqrt(np.pi)
+    found = gaussian_ramp(_number(a, precision)).numpy().astype(float)
+    assert relative(found, exact).max() < bar
 
 
 @pytest.mark.parametrize("precision, bar", [("float64", 1e-8), ("float32", 3e-6)])

@@ -14,21 +14,21 @@ class Masking:
 
     The first line of a member's docstring is its title in the manual.
 
-    smith  whether G follows from the distribution's slopes, as Smith's does; False: alpha alone shapes it. Tables of
-           what single scattering misses choose their axes by it
+    smith  whether G follows from the distribution's slopes, as Smith's does; False: it sets in as slowly as a rational
+           function of the cosine. Tables of what single scattering misses choose their axes by it
     """
 
     name: ClassVar[str] = ""
     family: ClassVar[Family[Masking]]
     smith: ClassVar[bool] = True
 
-    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
-        """G of two directions on the same side of the surface."""
+    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
+        """G of two directions on the same side of the surface, m the normal that mirrors one into the other."""
         raise NotImplementedError(f"{type(self).__name__} has no `reflected`")
 
-    def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
-        """G of two directions on opposite sides; here as in reflection."""
-        return self.reflected(ndf, wo, wi, alpha)
+    def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
+        """G of two directions on opposite sides, m the normal that refracts one into the other; here as `reflected`."""
+        return self.reflected(ndf, wo, wi, m, alpha)
 
     def onset(self, alpha: Scalar) -> Scalar:
         """The cosine about which masking sets in, at an isotropic width; Smith's is alpha."""
@@ -53,7 +53,7 @@ def masking_shadowing(
     transmits  wi lies on the other side of the surface than wo
     """
     chosen = term(kind)
-    g = (chosen.transmitted if transmits else chosen.reflected)(ndf, wo, wi, alpha)
+    g = (chosen.transmitted if transmits else chosen.reflected)(ndf, wo, wi, m, alpha)
     # v.m and v.n must agree in sign, or the facet is seen through the surface
     seen = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
     return where(seen, g, 0.0)

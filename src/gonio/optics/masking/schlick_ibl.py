@@ -20,7 +20,7 @@ class SchlickIBL(Masking):
     name = "schlick-ibl"
     smith = False
 
-    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
+    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """Gs(wo) Gs(wi); the width of an anisotropic surface is sqrt(alpha_x alpha_y)."""
         k = self.k(sqrt(alpha.x * alpha.y))
         return schlick_g1(wo, k) * schlick_g1(wi, k)

@@ -17,10 +17,10 @@ class SmithCorrelated(Masking):
 
     name = "smith-correlated"
 
-    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
+    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """1 / (1 + Lambda(wo) + Lambda(wi)) (Heitz2014, eq. 99)."""
         return 1.0 / (1.0 + ndf.Lambda(wo, alpha) + ndf.Lambda(wi, alpha))
 
-    def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
+    def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """B(1 + Lambda(wo), 1 + Lambda(wi)) (Heitz2016)."""
         return beta(1.0 + ndf.Lambda(wo, alpha), 1.0 + ndf.Lambda(wi, alpha))

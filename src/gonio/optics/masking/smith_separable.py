@@ -15,6 +15,6 @@ class SmithSeparable(Masking):
 
     name = "smith-separable"
 
-    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
+    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """G1(wo) G1(wi) (Walter2007, eq. 23)."""
         return ndf.G1_customary(wo, alpha) * ndf.G1_customary(wi, alpha)

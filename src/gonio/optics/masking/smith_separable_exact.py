@@ -12,6 +12,6 @@ class SmithSeparableExact(Masking):
 
     name = "smith-separable-exact"
 
-    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, alpha: Pair) -> Scalar:
+    def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """G1(wo) G1(wi) (Walter2007, eq. 23)."""
         return ndf.G1(wo, alpha) * ndf.G1(wi, alpha)

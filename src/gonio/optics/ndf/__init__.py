@@ -1,10 +1,10 @@
-"""Distributions of microfacet normals. A new one is one new file in this folder: discovery finds it."""
+"""Distributions of microfacet normals. One is a file in this folder: discovery finds it."""
 
 from __future__ import annotations
 
-from .base import NDF
+from .base import NDF, Stretched
 
-__all__ = ["NDF", "distribution", "distributions"]
+__all__ = ["NDF", "Stretched", "distribution", "distributions"]
 
 
 def distributions() -> dict[str, NDF]:
