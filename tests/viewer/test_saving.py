@@ -50,6 +50,7 @@ BROKEN = {  # what is changed, and what the page says: where, what, remedy
     "fails when it is run": ("class Ward", "sqr(beta)\nclass Ward", "ward.py:9", "name 'beta' is not defined", ""),
     "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:17", "TypeError: ", "mend"),
     "if on a value": ("        tan2", "        if h.z > 0: pass\n        tan2", "ward.py:19", "Python `if`", "where("),
+    "wrong kind": ("return where(above, ", "return above\n        (above, ", "ward.py:16", "eval returned a bool", ""),
     "unknown parameter": ("self.kd", "self.kdd", "ward.py:22", "no attribute 'kdd'", "mend"),
     "out of range": ("number(0.3", "number(3.0", "ward.py", "3 given", ""),
     "not there": ("from gonio import ops", "import beta", "ward.py:2", "No module named 'beta'", ""),

@@ -105,8 +105,12 @@ class Code(Generic[Made]):
         line = next((line for cause in reversed(causes) if (line := self._line(cause.__traceback__))), "")
         place = line or min(self._named).name
         if isinstance(error, GonioError):
-            named = not error.where or any(path.name in error.where for path in self.files)
-            return GonioError(error.what, place if named else f"{place}: {error.where}", error.hint)
+            named = next((path for path in self.files if str(path) in error.where), None)
+            if named and not line:
+                place = error.where.replace(str(named), named.name)
+            elif not named and error.where:
+                place = f"{place}: {error.where}"
+            return GonioError(error.what, place, error.hint)
         text = str(error).strip().partition("\n")[0]
         return GonioError(f"{type(error).__name__}: {text}", place, "mend it and save")
 
