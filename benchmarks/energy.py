@@ -228,7 +228,9 @@ def furnaces() -> None:
     for name, base in bases.items():
         within(f"measured base, {name}", go.albedo(go.KullaConty(base), STEEP).value, 0.999, 1.001)
     figure(
-        "reciprocity of Kulla-Conty, gold, largest relative breach", comparison.breach("kulla-conty bounce", 0), 1e-6
+        "reciprocity of Kulla-Conty, gold, largest relative breach",
+        comparison.breach(comparison.METHODS["kulla-conty bounce"], 0),
+        1e-6,
     )
 
 

@@ -61,7 +61,7 @@ def test_a_picture_goes_to_a_file_and_back(tmp_path: Path, scene: Path) -> None:
     np.testing.assert_array_equal(images.read(tmp_path / "a.exr").pixels, picture)
     assert go.compare(tmp_path / "a.exr", picture, tolerance=0).passed
     far = go.compare(picture, picture * 1.1, metric="rmse", tolerance=1e-9)
-    assert not far.passed and "<th>fails</th>" in far._repr_html_() and "&gt;" in far._repr_html_()
+    assert not far.passed and "<td>fails</td>" in far._repr_html_() and "&gt;" in far._repr_html_()
     with pytest.warns(GonioWarning, match="brighter than white"):
         go.render(scene, output=tmp_path / "a.png", exposure=9)
 
@@ -84,6 +84,15 @@ def test_a_trial_takes_the_command_lines_options(tmp_path: Path) -> None:
         go.verify("lambert", quick=True, deep=True)
     with pytest.raises(InputError, match="sweep of an object"):
         go.verify(go.Lambert(), sweep="albedo=0.1,0.5")
+
+
+def test_tables_and_albedos_are_shown_in_notebooks() -> None:
+    shown = go.bake("ggx", size=4, lut=["E"])._repr_html_()
+    assert "4 roughness x 4 mu" in shown and "smith-correlated" in shown
+    albedo = go.albedo(go.Lambert(0.3), mu=[0.2, 1.0])
+    assert albedo._repr_html_().count("<td>0.3  0.3  0.3</td>") == 2
+    value, error, method = albedo  # it still is a tuple
+    assert method == "closed-form" and np.all(value == 0.3) and np.all(error == 0)
 
 
 def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

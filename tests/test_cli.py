@@ -334,6 +334,60 @@ def test_convert_keeps_the_picture_and_its_settings(
     assert Path("a.png").read_bytes() == before
 
 
+def test_settings_are_shared_by_the_materials_that_have_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from gonio.cli.options import Material
+
+    made = Material(["alpha=.3"], "Au")
+    assert made.texts(["conductor", "lambert", "dielectric(eta=1.3,alpha=.1)"]) == [
+        "conductor(preset=Au,alpha=.3)",
+        "lambert",
+        "dielectric(preset=Au,alpha=.1,eta=1.3)",
+    ]
+    assert made.texts(["conductor(eta=.2,.9,1.1)"]) == ["conductor(eta=.2,.9,1.1,preset=Au,alpha=.3)"]
+    monkeypatch.chdir(tmp_path)
+    assert gonio("plot", "lambert", "conductor", "-p", "alpha=.3", "--kind", "albedo", "--angles", "30") == 0
+    assert (
+        capsys.readouterr().out == "lambert-conductor-albedo.png\n" and Path("lambert-conductor-albedo.png").is_file()
+    )
+    assert "did you mean 'alpha'" in failure(capsys, "plot", "lambert", "conductor", "-p", "alfa=.3")
+
+
+def test_a_new_material_works_and_its_test_passes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert gonio("new", "material", "crushed-velvet") == 0
+    assert capsys.readouterr().out.split() == ["crushed_velvet.py", "test_crushed_velvet.py"]
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q"], capture_output=True, text=True)
+    assert done.returncode == 0 and "2 passed" in done.stdout, done.stdout + done.stderr
+    assert gonio("explain", "crushed_velvet.py:CrushedVelvet") == 0
+    assert f"Source: {tmp_path.resolve() / 'crushed_velvet.py'}" in capsys.readouterr().out
+    before = (tmp_path / "crushed_velvet.py").read_text()
+    assert "is there already" in failure(capsys, "new", "material", "CrushedVelvet")
+    assert (tmp_path / "crushed_velvet.py").read_text() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["materal", "velvet"], "did you mean 'material'?"),
+        (["material", "lambert"], "Gonio has a material 'lambert'"),
+        (["material", "3"], "no name"),
+        (["material", "../velvet"], "no name"),
+        (["material", "import"], "no name"),
+        (["material", "velvet", "-o", "no/folder"], "does not exist"),
+    ],
+)
+def test_what_cannot_be_begun_is_one_clear_error(
+    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert message in failure(capsys, "new", *words)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_study_lays_out_every_combination(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     vary = ["--vary", "scene.shapes.0.material.p=4,16", "--vary", "scene.shapes.0.material.kd=[.1,.1,.1],[0.5,0,0],.9"]
     assert gonio("study", scene, *vary, "-o", "sheet.png", "--json") == 0

@@ -45,6 +45,30 @@ def test_a_model_with_parameters_is_baked(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["masking"] == "smith-separable"
 
 
+OWN = """
+import gonio as go
+
+class Half(go.KullaConty):
+    "Half of what is missing."
+
+class Worn(go.Conductor):
+    "A metal of one's own."
+"""
+
+
+def test_materials_of_ones_own_are_compared(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(OWN)
+    words = ["compensation", "mine.py:Half", "mine.py:Worn(preset=Cu)", "--walks", "1000"]
+    assert cli.run([*words, "--json", "-o", "figures"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["albedo"]["gold"]["half"] == found["albedo"]["gold"]["kulla-conty bounce"]
+    assert found["albedo"]["worn"]["plain"] == found["albedo"]["copper"]["plain"]
+    assert found["reciprocity"]["half"] < 1e-6 and (tmp_path / "figures/compensation.png").is_file()
+    assert cli.run(["compensation", "lambert"]) == 2
+    assert "neither a base to compensate" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "words",
     [

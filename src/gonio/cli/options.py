@@ -3,6 +3,7 @@ together, whose fields a verb gets as one parameter."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +13,6 @@ from typer import Argument, Option
 from . import completion
 
 if TYPE_CHECKING:
-    from ..models import BSDF
     from ..render.run import Request
 
 Model = Annotated[
@@ -38,22 +38,26 @@ class Material:
         Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets),
     ] = ""
 
+    def texts(self, models: Sequence[str]) -> list[str]:
+        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share what they have."""
+        from ..models import notation
+
+        shared = [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
+        if not shared:
+            return list(models)
+        if len(models) > 1:
+            found = notation.several(models, shared)
+            return [_text(name, named) for name, (_, named) in zip(models, found, strict=True)]
+        own = models[0].partition("(")[2].removesuffix(")")
+        return [_text(models[0], dict(map(notation.assignment, shared)), own)]
+
     def text(self, model: str) -> str:
-        """The material as one text, such as "conductor(preset=Au,alpha=.3)"."""
-        from ..models import notation
+        return self.texts([model])[0]
 
-        settings = [f"preset={self.preset}"] if self.preset else []
-        settings += ["=".join(notation.assignment(text)) for text in self.param or ()]
-        if not settings:
-            return model
-        before, inside = (model[:-1], not model.endswith("()")) if model.endswith(")") else (f"{model}(", False)
-        return f"{before}{',' if inside else ''}{','.join(settings)})"
 
-    def of(self, model: str) -> BSDF:
-        """The material. Raises InputError for what is unknown or out of range."""
-        from ..models import notation
-
-        return notation.named(self.text(model))[0]
+def _text(model: str, settings: Mapping[str, str], own: str = "") -> str:
+    given = ",".join(filter(None, [own, *map("=".join, settings.items())]))
+    return model.partition("(")[0] + (f"({given})" if given else "")
 
 
 @dataclass(frozen=True)

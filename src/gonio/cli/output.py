@@ -75,25 +75,26 @@ def listing(*headings: str) -> Table:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print with colours where the terminal has them. Brackets are text, never markup."""
+    """Print with colours and in the width that the terminal has; where there is none, nothing is cut short.
+
+    Brackets are text, never markup.
+    """
     from rich.console import Console
 
-    Console(markup=False, emoji=False).print(what)
+    Console(markup=False, emoji=False, width=None if sys.stdout.isatty() else 200).print(what)
 
 
 def print_tables(manifest: Mapping[str, Any], path: Path, as_json: bool) -> None:
+    """What a baked folder holds."""
     if as_json:
         print(json.dumps({"path": str(path), **manifest}))
         return
-    facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
-    facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
-    print(f"{path}: {', '.join(filter(None, facts))}")
-    table = listing("table", "shape", "max error", "rms", "between")
-    for name, shape in manifest["tables"].items():
-        error = manifest["error"].get(name, {})
-        figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
-        dims = [*manifest["dims"][name], ""]
-        table.add_row(name, " x ".join(f"{n} {axis}".strip() for n, axis in zip(shape, dims, strict=False)), *figures)
+    from ..energy.tables import baked
+
+    print(f"{path}: {baked.title(manifest)}")
+    table = listing(*baked.HEADINGS)
+    for row in baked.rows(manifest):
+        table.add_row(*row)
     print_rich(table)
     for axis, text in manifest["axes"].items():
         print(f"{axis:10} {text}")

@@ -47,6 +47,24 @@ def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple
     return outside.probe(material), values
 
 
+def several(texts: Sequence[str], assignments: Sequence[str]) -> list[tuple[type[BSDF], dict[str, str]]]:
+    """Of each text the class and what is set of it: its own settings, and of the shared ones those that it has.
+
+    assignments  "name=value" each, shared by all; InputError for one that no material has
+    """
+    shared = dict(map(assignment, assignments))
+    found, known = [], set()
+    for text in texts:
+        cls, own = taken_apart(text)
+        fits = {*cls.parameters(), *(["preset"] if cls.presets() else [])}
+        found.append((cls, {**{name: value for name, value in shared.items() if name in fits}, **own}))
+        known |= fits
+    for name in shared:
+        if name not in known:
+            raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, sorted(known)))
+    return found
+
+
 def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any]]:
     """As `named`, of a class; a value is text, or what JSON has for it."""
     known = cls.parameters()

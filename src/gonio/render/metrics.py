@@ -8,7 +8,6 @@ exposures at which the reference can be shown.
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import asdict, dataclass
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
+from .. import _html
 from ..errors import InputError, did_you_mean
 
 Floats = NDArray[np.floating]
@@ -87,8 +87,7 @@ class Comparison:
         return rows
 
     def _repr_html_(self) -> str:
-        rows = (f"<tr><th>{name}</th><td>{html.escape(text)}</td></tr>" for name, text in self.rows().items())
-        return f"<table>{''.join(rows)}</table>"
+        return _html.table(self.rows().items())
 
 
 def _pair(test: Floats, reference: Floats) -> tuple[Floats, Floats]:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import files
-from ..energy.compensation import comparison
 from ..energy.tables.baked import Baked, load
 from . import figures
 
@@ -119,7 +118,7 @@ def plot_comparison(found: dict[str, Any], folder: Path) -> None:
 
     with mpl.rc_context(figures.STYLE):
         figure = Figure(figsize=(13, 6.4), layout="constrained")
-        _compare(found, figure.subplots(2, len(comparison.MATERIALS)))
+        _compare(found, figure.subplots(2, len(found["albedo"])))
         picture = io.BytesIO()
         figure.savefig(picture, dpi=120, format="png", facecolor="white")
     files.write_all(folder, {"compensation.png": picture.getvalue(), "compensation.json": json.dumps(found).encode()})
@@ -129,9 +128,9 @@ def _compare(found: dict[str, Any], axes: Any) -> None:
     """A column for each material: albedo of every method above, its distance to the walk below."""
     roughness = found["roughness"]
     middle = len(found["mu"]) // 2
-    colours = {m: f"C{index}" for index, m in enumerate(comparison.METHODS)}
+    colours = {m: f"C{index}" for index, m in enumerate(found["cost"])}
     walk = {"color": "black", "marker": "o", "linestyle": "none", "fillstyle": "none"}
-    for column, name in enumerate(comparison.MATERIALS):
+    for column, name in enumerate(found["albedo"]):
         by_method = {m: np.asarray(v) for m, v in found["albedo"][name].items()}
         referee = by_method["random walk"]
         for method, value in by_method.items():

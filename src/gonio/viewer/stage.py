@@ -214,28 +214,14 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
 
 def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
-    wished = dict(map(notation.assignment, parameters))
-    bsdfs, given, known = [], [], set()
     for target in targets:
-        cls, own = _class(target)
-        fits = {*cls.parameters(), *(["preset"] if cls.presets() else [])}
-        settings = {**{name: value for name, value in wished.items() if name in fits}, **own}
-        bsdfs.append(outside.probe(notation.made(cls, settings)[0]))
-        given.append({*settings})
-        known |= fits
-    for name in wished:
-        if name not in known:
-            raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, sorted(known)))
-    return of_models(bsdfs, given)
-
-
-def _class(target: str) -> tuple[type[BSDF], dict[str, str]]:
-    """The class of a target, and the parameters that the target itself sets."""
-    head = target.partition("(")[0]
-    if ":" in head and not outside.names_code(head):
-        hint = "the page's shader code is written from Gonio's models only"
-        raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
-    return notation.taken_apart(target)
+        head = target.partition("(")[0]
+        if ":" in head and not outside.names_code(head):
+            hint = "the page's shader code is written from Gonio's models only"
+            raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
+    found = notation.several(targets, parameters)
+    bsdfs = [outside.probe(notation.made(cls, settings)[0]) for cls, settings in found]
+    return of_models(bsdfs, [{*settings} for _, settings in found])
 
 
 def of_models(bsdfs: Sequence[BSDF], given: Sequence[set[str]] | None = None) -> Stage:

@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-from typer import Option
+from typer import Argument, Option
 
+from .. import completion
 from ..options import Json
 from ..output import listing, print_rich
 from .base import MATERIALS, verb
@@ -15,6 +16,14 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=8)
 def compensation(
+    model: Annotated[
+        list[str] | None,
+        Argument(
+            metavar="[MODEL]...",
+            help="Materials to compare too: one with a base as a method, a rough surface as a base.",
+            autocompletion=completion.materials,
+        ),
+    ] = None,
     output: Annotated[Path | None, Option("-o", "--output", metavar="DIR", help="Write a picture and JSON.")] = None,
     walks: Annotated[int, Option(metavar="N", help="Random walks a point of the referee.")] = 200_000,
     as_json: Json = False,
@@ -22,17 +31,19 @@ def compensation(
     """Compare the ways to give back lost light: furnace, distance to the random walk, reciprocity, cost.
 
     \b
-    Example:
+    Examples:
       gonio compensation -o comparison
+      gonio compensation mine.py:Compensation
     """
     from ...energy.compensation import comparison
+    from ...models import notation
 
     if output is not None:
         from ... import files
         from ...viewer import energy_figures
 
         output = files.check_folder(output)
-    found = comparison.compare(walks=walks)
+    found = comparison.compare(walks=walks, own=[notation.named(text)[0] for text in model or ()])
     if output is not None:
         energy_figures.plot_comparison(found, output)
     if as_json:
@@ -41,7 +52,7 @@ def compensation(
     names = list(found["rms"])
     table = listing("method", *names, "loss", "recip.", "time")
     print("RMS distance of the albedo to the random walk; largest loss in a white furnace; breach of reciprocity; time")
-    for method in comparison.METHODS:
+    for method in found["cost"]:
         distances = [found["rms"][n].get(method) for n in names]
         rms = ["" if d is None else f"{d:.3f}" if d >= 1e-3 else f"{d:.0e}" for d in distances]
         broken = f"{found['reciprocity'][method]:.0e}" if method in found["reciprocity"] else ""

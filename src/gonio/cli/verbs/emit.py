@@ -46,7 +46,7 @@ def emit(
         files.check_file(output)
     if bundle is not None:
         files.check_folder(bundle)
-    shader = make_bundle(made.of(model), lang, functions)
+    shader = make_bundle(made.text(model), lang, functions)
     written = [str(path) for path in shader.write(bundle)] if bundle is not None else []
     if output is not None:
         files.write_whole(output, shader.text.encode())

@@ -47,7 +47,7 @@ def plot(
         output = output or Path(f"{Path(model[0]).resolve().stem}-tables.png")
         print(plots.plot(model[0], output=output).path)
         return
-    texts = [made.text(name) for name in model]
+    texts = made.texts(model)
     names = dict.fromkeys(text.partition("(")[0] for text in texts)
     output = output or Path(f"{'-'.join(names)}-{kind}.png")
     print(plots.plot(*texts, kind=kind, angles=views, output=output).path)

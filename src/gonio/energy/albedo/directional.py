@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ... import _html
 from ...errors import InputError, did_you_mean
 from ...models import BSDF, tree
 from ...models.microfacet import SMOOTH
@@ -34,6 +35,11 @@ class Albedo(NamedTuple):
     value: np.ndarray
     error: np.ndarray
     method: str
+
+    def _repr_html_(self) -> str:
+        rows = zip(self.value, self.error.max(axis=1), strict=True)
+        shown = (("  ".join(f"{v:.6g}" for v in value), f"{error:.1e}") for value, error in rows)
+        return _html.table(shown, ("albedo", "error"), self.method)
 
 
 def albedo(

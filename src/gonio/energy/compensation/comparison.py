@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
-from ...models import BSDF
+from ...models import BSDF, tree
 from ...models.conductor import Conductor
 from ...models.dielectric import Dielectric
 from ...ops import backend
@@ -19,37 +21,54 @@ from ..materials.kulla_conty import KullaConty
 from ..materials.random_walk import RandomWalk
 from ..materials.turquin import Turquin
 
-METHODS = {
-    "plain": "single scattering only",
-    "kulla-conty sheet": "Kulla-Conty, the homework's colour",
-    "kulla-conty bounce": "Kulla-Conty, second and later bounces",
-    "turquin": "Turquin 2019",
-    "fdez-aguera": "Fdez-Aguera 2019",
-    "random walk": "Heitz et al. 2016, the referee",
+Method = Callable[[BSDF], "BSDF | None"]  # the base under it, None where it does not take the base
+Base = Callable[[float], BSDF]  # of a width alpha
+
+
+def _for_metals(compensate: Callable[[BSDF], BSDF]) -> Method:
+    """A method that does not take glass, or is the same as another there: glass has one colour, and albedo 1."""
+    return lambda base: None if base.transmits else compensate(base)
+
+
+METHODS: dict[str, Method] = {
+    "plain": lambda base: base,
+    "kulla-conty sheet": _for_metals(lambda base: KullaConty(base, color="sheet")),  # the homework's colour
+    "kulla-conty bounce": lambda base: KullaConty(base, color="bounce"),  # second and later bounces
+    "turquin": _for_metals(Turquin),
+    "fdez-aguera": _for_metals(FdezAguera),
+    "random walk": RandomWalk,  # Heitz2016: the referee
 }
-MATERIALS = ("white", "gold", "copper", "glass")
+BASES: dict[str, Base] = {
+    "white": lambda alpha: Conductor(alpha=alpha, fresnel="one"),
+    "gold": lambda alpha: Conductor.preset("gold", alpha=alpha),
+    "copper": lambda alpha: Conductor.preset("copper", alpha=alpha),
+    "glass": lambda alpha: Dielectric(1.5, alpha),
+}
 
 
-def material(name: str, alpha: float) -> BSDF:
-    """A base of the comparison."""
-    if name == "white":
-        return Conductor(alpha=alpha, fresnel="one")
-    if name == "glass":
-        return Dielectric(1.5, alpha)
-    return Conductor.preset(name, alpha=alpha)
+def _with(own: Sequence[BSDF]) -> tuple[dict[str, Method], dict[str, Base]]:
+    """The methods and bases, and the user's own: what has a base is a method, a rough surface is a base."""
+    methods, bases = dict(METHODS), dict(BASES)
+    for material in own:
+        if "base" in tree.children(material):
+            methods[material.name] = functools.partial(_under, material)
+        elif material.microsurface is not None and "alpha" in material.parameters():
+            bases[material.name] = functools.partial(_of_width, material)
+        else:
+            what = f"{material.name} has neither a base to compensate, nor is it a rough surface to be compensated"
+            raise InputError(what, "compensation", "name a material with the parameter base, or with a microsurface")
+    return methods, bases
 
 
-def compensated(method: str, base: BSDF) -> BSDF | None:
-    """The base under a method, None where the method does not take it."""
-    if method == "plain":
-        return base
-    if method == "random walk":
-        return RandomWalk(base)
-    if base.transmits and method in ("turquin", "fdez-aguera", "kulla-conty sheet"):
-        return None  # one colour only: at albedo 1 both are the same
-    if method.startswith("kulla-conty"):
-        return KullaConty(base, color=method.split()[1])
-    return Turquin(base) if method == "turquin" else FdezAguera(base)
+def _under(method: BSDF, base: BSDF) -> BSDF | None:
+    try:
+        return tree.replace(method, {"base": base})
+    except InputError:  # it does not take this one
+        return None
+
+
+def _of_width(material: BSDF, alpha: float) -> BSDF:
+    return tree.replace(material, {"alpha": alpha})
 
 
 def compare(
@@ -58,8 +77,11 @@ def compare(
     walks: int = 200_000,
     pairs: int = 1 << 20,
     seed: int = 0,
+    own: Sequence[BSDF] = (),
 ) -> dict[str, Any]:
-    """Albedos of every material under every method over roughness x mu, and what follows from them.
+    """Albedos of every base under every method over roughness x mu, and what follows from them.
+
+    own  materials of the user's: one with a base is compared as a method, another as a base
 
     Returns a dict that JSON can hold: axes; `albedo` [material][method] (roughness, mu, 3); `rms` to the walk;
     `furnace`, the largest |1 - albedo| of what should be 1; `reciprocity`, the largest relative breach on gold;
@@ -68,15 +90,16 @@ def compare(
     if walks < 1000 or pairs < 1024:
         raise InputError(f"{walks} walks, {pairs} pairs", "compensation", "give 1000 walks and 1024 pairs or more")
     roughness, mu = np.asarray(roughness, float), np.asarray(mu, float)
-    found: dict[str, dict[str, np.ndarray]] = {name: {} for name in MATERIALS}
-    for name in MATERIALS:
-        for method in METHODS:
+    methods, bases = _with(own)
+    found: dict[str, dict[str, np.ndarray]] = {name: {} for name in bases}
+    for name, base_of in bases.items():
+        for method, under in methods.items():
             rows: list[Any] = []
             for r in roughness:
-                base = material(name, r * r)
+                base = base_of(r * r)
                 if method == "random walk":
                     rows.append([walk.albedo(base, float(m), walks, seed)[0] for m in mu])
-                elif (model := compensated(method, base)) is not None:
+                elif (model := under(base)) is not None:
                     rows.append(albedo(model, mu).value)
             if rows:
                 found[name][method] = np.array(rows)
@@ -97,21 +120,28 @@ def compare(
         "albedo": {n: {m: v.tolist() for m, v in by.items()} for n, by in found.items()},
         "rms": rms,
         "furnace": furnace,
-        "reciprocity": {m: breach(m, seed) for m in METHODS if m != "random walk"},
-        "cost": _costs(pairs),
+        "reciprocity": {m: breach(under, seed) for m, under in methods.items() if m != "random walk"},
+        "cost": _costs(methods, pairs),
     }
 
 
-def breach(method: str, seed: int) -> float:
+def breach(method: Method, seed: int) -> float:
     """Largest |f(o, i) - f(i, o)| over the larger of the two, gold of roughness .7, 2000 pairs."""
-    model = compensated(method, material("gold", 0.49))
+    model = _on_gold(method, 0.49)
     rng = np.random.default_rng(seed)
     o, i = (direction(rng.uniform(0.02, 1.0, 2000), rng.uniform(0, 2 * np.pi, 2000)) for _ in range(2))
-    forth, back = (model.f(*pair, precision="float64") for pair in ((o, i), (i, o)))  # type: ignore[union-attr]
+    forth, back = (model.f(*pair, precision="float64") for pair in ((o, i), (i, o)))
     return float((np.abs(forth - back) / np.maximum(forth, back)).max())
 
 
-def _costs(pairs: int) -> dict[str, float]:
+def _on_gold(method: Method, alpha: float) -> BSDF:
+    model = method(BASES["gold"](alpha))
+    if model is None:
+        raise InputError("a method that does not take gold cannot be compared", "compensation")
+    return model
+
+
+def _costs(methods: Mapping[str, Method], pairs: int) -> dict[str, float]:
     """Time of `eval` over that of the plain metal: gold of alpha .36, pairs above the surface, best of many turns."""
     dr = backend.drjit()
     kind = backend.types("float32")
@@ -121,13 +151,13 @@ def _costs(pairs: int) -> dict[str, float]:
         for _ in range(2)
     )
     dr.eval(o, i)
-    models = {m: compensated(m, material("gold", 0.36)) for m in METHODS}
-    times: dict[str, list[float]] = {m: [] for m in METHODS}
+    models = {m: _on_gold(method, 0.36) for m, method in methods.items()}
+    times: dict[str, list[float]] = {m: [] for m in methods}
     for turn in range(25):
         for method, model in models.items():
             dr.sync_thread()
             start = time.perf_counter()
-            dr.eval(model.eval(o, i))  # type: ignore[union-attr]
+            dr.eval(model.eval(o, i))
             dr.sync_thread()
             if turn:
                 times[method].append(time.perf_counter() - start)

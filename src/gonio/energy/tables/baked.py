@@ -7,12 +7,14 @@ import hashlib
 import io
 import json
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ... import _html
 from ...errors import InputError
 from ..cache import content_hash
 
@@ -23,6 +25,9 @@ class Baked:
 
     arrays: dict[str, np.ndarray]
     manifest: dict[str, Any]
+
+    def _repr_html_(self) -> str:
+        return _html.table(rows(self.manifest), HEADINGS, title(self.manifest))
 
     def npz(self) -> bytes:
         """tables.npz, the manifest and its hash inside it; the same bytes for the same content."""
@@ -35,6 +40,28 @@ class Baked:
                 np.save(part, array, allow_pickle=False)
                 file.writestr(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), part.getvalue())
         return stream.getvalue()
+
+
+HEADINGS = ("table", "shape", "max error", "rms", "between")
+
+
+def title(manifest: Mapping[str, Any]) -> str:
+    """What was baked and how, in a line."""
+    facts = [manifest["ndf"], manifest["masking"], manifest["method"], f"layout {manifest['layout']}"]
+    facts += [f"alpha_y / alpha_x = {manifest['aspect']:g}"] if "aspect" in manifest else []
+    return ", ".join(filter(None, facts))
+
+
+def rows(manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Of each table its name, its shape along named axes and its errors: `HEADINGS`."""
+    found = []
+    for name, shape in manifest["tables"].items():
+        error = manifest["error"].get(name, {})
+        figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
+        dims = [*manifest["dims"][name], ""]
+        along = " x ".join(f"{n} {axis}".strip() for n, axis in zip(shape, dims, strict=False))
+        found.append((name, along, *figures))
+    return found
 
 
 def _seal(text: str) -> str:
