@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import contextlib
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from . import llvm
 from ._version import __version__ as __version__
@@ -106,20 +106,22 @@ if TYPE_CHECKING:
     from .viewer.widget import view
 
 
-def __getattr__(name: str) -> Any:
-    if name.startswith("_"):
-        raise AttributeError(name)
-    if name in _CALLABLE or name == "ops":
-        return import_module("." + name, __name__)
-    if name in _FLAT:
-        return getattr(import_module("." + _FLAT[name], __name__), name)
-    wanted = _ALIASES.get(name, name)
-    if wanted.islower():  # a submodule on its way in, no material
+if not TYPE_CHECKING:  # or every misspelt name would be one that a checker believes in
+
+    def __getattr__(name: str) -> object:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if name in _CALLABLE or name == "ops":
+            return import_module("." + name, __name__)
+        if name in _FLAT:
+            return getattr(import_module("." + _FLAT[name], __name__), name)
+        wanted = _ALIASES.get(name, name)
+        if wanted.islower():  # a submodule on its way in, no material
+            raise AttributeError(f"module 'gonio' has no attribute '{name}'")
+        for cls in import_module(".models", __name__).models().values():
+            if cls.__name__ == wanted:
+                return cls
         raise AttributeError(f"module 'gonio' has no attribute '{name}'")
-    for cls in import_module(".models", __name__).models().values():
-        if cls.__name__ == wanted:
-            return cls
-    raise AttributeError(f"module 'gonio' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:

@@ -18,7 +18,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from .errors import GonioWarning, InputError, did_you_mean
 
@@ -140,7 +140,7 @@ def register(thing: Thing) -> Thing:
     return thing
 
 
-def family_of(thing: object) -> Family[Any]:
+def family_of(thing: object) -> Family[object]:
     """The family that a class, or an instance of one, belongs to: what its base class names as `family`."""
     family = getattr(thing, "family", None)
     if not isinstance(family, Family):
@@ -151,10 +151,10 @@ def family_of(thing: object) -> Family[Any]:
 
 def _source(member: object) -> tuple[str, str]:
     """File (or module) and name of a member: the same for a class that was loaded anew."""
-    thing: Any = member if isinstance(member, type) or callable(member) else type(member)
+    thing = member if isinstance(member, type) or callable(member) else type(member)
     module = sys.modules.get(thing.__module__)
     file = str(getattr(module, "__file__", None) or thing.__module__)
-    return str(Path(file).resolve()) if file.endswith(".py") else file, str(thing.__qualname__)
+    return str(Path(file).resolve()) if file.endswith(".py") else file, str(getattr(thing, "__qualname__", thing))
 
 
 def subclasses_of(base: type[Member]) -> Callable[[object], tuple[str, type[Member]] | None]:

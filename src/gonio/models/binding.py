@@ -9,18 +9,18 @@ Copies are made in this file and nowhere else.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from ..ops import backend
+from ..ops import Scalar, Vector, backend
 from . import tree
-from .parameters import Material, Parameter
+from .parameters import Material, Parameter, Value
 
 M = TypeVar("M", bound=Material)
 
 DERIVED = "derived"  # the part of a bound copy that holds what `derive` gave, in recordings and their names
 
 
-def bound_copy(material: M, values: Mapping[str, Any], derived: Any = None) -> M:
+def bound_copy(material: M, values: Mapping[str, object], derived: object = None) -> M:
     """A copy with these bound values: every numeric parameter's, and the inner materials'."""
     copy: M = object.__new__(type(material))
     state = vars(copy)
@@ -30,7 +30,7 @@ def bound_copy(material: M, values: Mapping[str, Any], derived: Any = None) -> M
     return copy
 
 
-def bind(material: M, convert: Callable[[Parameter, Any], Any]) -> M:
+def bind(material: M, convert: Callable[[Parameter, object], object]) -> M:
     """A bound copy, its numbers being what `convert(parameter, value)` makes of them, in inner materials too."""
     values = {}
     for name, parameter in material.parameters().items():
@@ -56,12 +56,12 @@ def bind_to(material: M, types: backend.Types) -> M:
     return with_derived(copy, kept[types.float])
 
 
-def with_derived(material: M, derived: Any) -> M:
+def with_derived(material: M, derived: object) -> M:
     """The bound copy holding what `derive` gave, or what a recording has in its place."""
     return bound_copy(material, {}, derived)
 
 
-def settled(material: Material) -> Any:
+def settled(material: Material) -> object:
     """What a bound copy derives, evaluated now: where no parameter varies from ray to ray and none is being
     differentiated, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
     if not material.derives:
@@ -74,14 +74,14 @@ def settled(material: Material) -> Any:
     return derived
 
 
-def values(material: Material) -> Iterator[Any]:
+def values(material: Material) -> Iterator[Scalar | Vector]:
     """The numeric values of a bound copy, inner materials' included."""
     for leaf in tree.leaves(material):
         if leaf.parameter.numeric and leaf.value is not None:
             yield leaf.value
 
 
-def shift(material: M, path: str, change: Callable[[Any], Any]) -> M:
+def shift(material: M, path: str, change: Callable[[Value], Value]) -> M:
     """The bound copy with one value changed."""
     name, _, rest = path.partition(".")
     value = getattr(material, name)

@@ -9,24 +9,29 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .. import ops
 from ..errors import InputError
 from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
 from . import binding, tree
 from .parameters import Material
-from .sample import Sample
+from .sample import Floats, Sample, SampleArrays
 
 MODES = ("radiance", "importance")
 UNIT = 1e-2  # how far from 1 a direction's length may be: rounding, and what people type by hand
 
-V3 = TypeVar("V3", bound="Vector3[Any]")
+V3 = TypeVar("V3", bound="Vector3[DrJit]")
 S = TypeVar("S")
-C = TypeVar("C", bound=Callable[..., Any])
+M = TypeVar("M", bound=Material)
+T = TypeVar("T", bound="tuple[object, ...]")
+T_co = TypeVar("T_co", bound="tuple[object, ...]", covariant=True)
+
+Given: TypeAlias = Any  # directions as callers have them: arrays, lists, Dr.Jit vectors
+DrJit: TypeAlias = Any  # what only a value's own type could tell, and Dr.Jit's types do not
 
 
 class EvalMethod(Protocol):
@@ -37,9 +42,7 @@ class EvalMethod(Protocol):
     @overload
     def __call__(self, wo: V3, wi: V3, mode: Mode = ..., precision: Precision | None = ...) -> V3: ...
     @overload
-    def __call__(
-        self, wo: ArrayLike, wi: ArrayLike, mode: Mode = ..., precision: Precision | None = ...
-    ) -> NDArray[np.floating[Any]]: ...
+    def __call__(self, wo: ArrayLike, wi: ArrayLike, mode: Mode = ..., precision: Precision | None = ...) -> Floats: ...
 
 
 class PdfMethod(Protocol):
@@ -48,35 +51,42 @@ class PdfMethod(Protocol):
     @overload
     def __call__(self, wo: Vector3[S], wi: Vector3[S], *, precision: Precision | None = ...) -> S: ...
     @overload
-    def __call__(
-        self, wo: ArrayLike, wi: ArrayLike, *, precision: Precision | None = ...
-    ) -> NDArray[np.floating[Any]]: ...
+    def __call__(self, wo: ArrayLike, wi: ArrayLike, *, precision: Precision | None = ...) -> Floats: ...
 
 
 class SampleMethod(Protocol):
     """`sample` as callers see it."""
 
     @overload
-    def __call__(self, wo: Direction, u: Direction, mode: Mode = ...) -> Sample[Direction, Spectrum, Scalar]: ...
+    def __call__(self, wo: Direction, u: Direction, mode: Mode = ...) -> Sample: ...
     @overload
-    def __call__(self, wo: V3, u: V3, mode: Mode = ..., precision: Precision | None = ...) -> Sample[V3, V3, Any]: ...
+    def __call__(
+        self, wo: V3, u: Vector3[S], mode: Mode = ..., precision: Precision | None = ...
+    ) -> Sample[V3, V3, S, DrJit]: ...
     @overload
     def __call__(
         self, wo: ArrayLike, u: ArrayLike, mode: Mode = ..., precision: Precision | None = ...
-    ) -> Sample[NDArray[np.floating[Any]], NDArray[np.floating[Any]], NDArray[np.floating[Any]]]: ...
+    ) -> SampleArrays: ...
+
+
+class TermsMethod(Protocol[T_co]):
+    """`terms` as callers see it: a NamedTuple, whose fields from outside are arrays, (N,) or (N, 3)."""
+
+    @overload
+    def __call__(self, wo: Direction, wi: Direction, *, precision: None = ...) -> T_co: ...
+    @overload
+    def __call__(self, wo: ArrayLike, wi: ArrayLike, *, precision: Precision | None = ...) -> DrJit: ...
 
 
 @overload
-def method(formula: Callable[[Any, Direction, Direction, Mode], Spectrum], /) -> _Eval: ...
+def method(formula: Callable[[M, Direction, Direction, Mode], Spectrum], /) -> _Eval: ...
 @overload
-def method(formula: Callable[[Any, Direction, Direction], Scalar], /) -> _Pdf: ...
+def method(formula: Callable[[M, Direction, Direction], Scalar], /) -> _Pdf: ...
 @overload
-def method(
-    formula: Callable[[Any, Direction, Direction, Mode], Sample[Direction, Spectrum, Scalar]], /
-) -> _Sampler: ...
+def method(formula: Callable[[M, Direction, Direction, Mode], Sample], /) -> _Sampler: ...
 @overload
-def method(formula: C, /) -> C: ...
-def method(formula: Any, /) -> Any:
+def method(formula: Callable[[M, Direction, Direction], T], /) -> _Terms[T]: ...
+def method(formula: Callable[..., object], /) -> object:
     """Mark `eval`, `pdf`, `sample` or `terms` of a material, so that editors know what callers get; it takes NumPy
     arrays, lists and Dr.Jit vectors. Methods of these names are wrapped anyway where the mark is left out."""
     if hasattr(formula, "__wrapped__"):
@@ -85,7 +95,9 @@ def method(formula: Any, /) -> Any:
     takes_mode = "mode" in inspect.signature(formula).parameters
 
     @functools.wraps(formula)
-    def enter(self: Material, wo: Any, other: Any, mode: Mode = "radiance", precision: Precision | None = None) -> Any:
+    def enter(
+        self: Material, wo: Given, other: Given, mode: Mode = "radiance", precision: Precision | None = None
+    ) -> object:
         args = (mode,) if takes_mode else ()
         if self.is_bound:
             return inner(self, wo, other, *args)
@@ -101,18 +113,27 @@ def method(formula: Any, /) -> Any:
 if TYPE_CHECKING:
 
     class _Eval:
-        def __get__(self, owner: Any, cls: Any = None) -> EvalMethod: ...
+        def __get__(self, owner: object, cls: type | None = None) -> EvalMethod: ...
 
     class _Pdf:
-        def __get__(self, owner: Any, cls: Any = None) -> PdfMethod: ...
+        def __get__(self, owner: object, cls: type | None = None) -> PdfMethod: ...
 
     class _Sampler:
-        def __get__(self, owner: Any, cls: Any = None) -> SampleMethod: ...
+        def __get__(self, owner: object, cls: type | None = None) -> SampleMethod: ...
+
+    class _Terms(Generic[T_co]):
+        def __get__(self, owner: object, cls: type | None = None) -> TermsMethod[T_co]: ...
 
 
 def _on_numpy(
-    material: Material, name: str, inner: Callable[..., Any], wo: Any, other: Any, args: tuple[Any, ...], precision: Any
-) -> Any:
+    material: Material,
+    name: str,
+    inner: Callable[..., object],
+    wo: Given,
+    other: Given,
+    args: tuple[Mode, ...],
+    precision: Precision | None,
+) -> object:
     types = backend.types(precision)
     first, second, count = _rows(wo, other, name)
     _check_rows(material, count)
@@ -121,16 +142,15 @@ def _on_numpy(
     bound = binding.bind_to(material, types)
     result = inner(bound, backend.vector_of(first, 3, types), backend.vector_of(second, 3, types), *args)
 
-    def out(value: Any) -> NDArray[Any]:
+    def out(value: object) -> np.ndarray:
         return backend.to_numpy(value, count) if count else backend.to_numpy(value, 1)[:0]
 
     if isinstance(result, tuple):
-        parts: Any = type(result)
-        return parts(*[out(value) for value in result])
+        return type(result)(*map(out, result))  # a NamedTuple
     return out(result)
 
 
-def _rows(wo: Any, other: Any, name: str) -> tuple[NDArray[Any], NDArray[Any], int]:
+def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, int]:
     """Two arguments as arrays of shape (N, 3) or (3,), and N."""
     arrays = []
     for label, value in (("wo", wo), ("u" if name == "sample" else "wi", other)):
@@ -155,7 +175,7 @@ def _rows(wo: Any, other: Any, name: str) -> tuple[NDArray[Any], NDArray[Any], i
     return arrays[0], arrays[1], sizes[0]
 
 
-def _check_unit(array: NDArray[Any], where: str) -> None:
+def _check_unit(array: np.ndarray, where: str) -> None:
     length = np.sqrt(np.einsum("...i,...i->...", array, array))
     off = np.abs(length - 1.0) > UNIT
     if np.any(off):

@@ -68,7 +68,7 @@ class Conductor(microfacet._Microfacet):
         return where(lit, 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha), 0.0)
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
         alpha, smooth = microfacet.widths(self.alpha)
         turned = frame.rotate(wo, self.rotation)

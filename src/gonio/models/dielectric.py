@@ -173,7 +173,7 @@ class Dielectric(microfacet._Microfacet):
         return self._density(facet, eta) * where(facet.reflects, share, 1.0 - share)
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
         turned = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()

@@ -20,19 +20,27 @@ import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, dataclass_transform
+from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, dataclass_transform, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .. import ops
 from ..errors import InputError, did_you_mean
 from ..members import Family, subclasses_of
-from ..ops import Direction, Mode, Pair, Precision, Scalar, Spectrum, backend, graph
+from ..ops import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, backend, graph
 from ..optics import warp
 from . import binding, recording, tree
-from .calling import method
-from .parameters import Material, Parameter, angle, bsdf, choice, declared, flag, number, pair_of, spectrum, width
+from .calling import V3, Given, method
+from .parameters import (
+    Floats,
+    Material,
+    Parameter,
+    Value,
+    bsdf,
+    declared,
+    pair_of,
+)
 from .sample import Sample
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
@@ -64,7 +72,7 @@ class Preset(NamedTuple):
     """
 
     title: str
-    values: Mapping[str, Any]
+    values: Mapping[str, Value]
     source: str = ""
 
 
@@ -88,9 +96,7 @@ class Microsurface(NamedTuple):
     transmits: bool
 
 
-@dataclass_transform(
-    frozen_default=True, eq_default=False, field_specifiers=(number, spectrum, width, angle, choice, flag, bsdf)
-)
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(bsdf,))
 class BSDF(Material):
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
 
@@ -108,7 +114,7 @@ class BSDF(Material):
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
     _declared: ClassVar[Mapping[str, Parameter]] = {}
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         if not cls.__name__.startswith("_"):
             letters = ("-" + c.lower() if c.isupper() else c for c in cls.__name__)
@@ -150,7 +156,7 @@ class BSDF(Material):
         return ops.where(same_side, ops.abs(wi.z) * ops.inv_pi, 0.0)
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """Choose wi for wo.
 
         u  three numbers in [0, 1) a ray, (N, 3): the first picks the lobe, the others the direction
@@ -164,14 +170,15 @@ class BSDF(Material):
         return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
 
     @method
-    def terms(self, wo: Direction, wi: Direction) -> Any:
+    def terms(self, wo: Direction, wi: Direction) -> tuple[Value, ...]:
         """What `eval` is made of, to be looked at one by one: a NamedTuple, of a microfacet lobe D, G and F."""
         raise InputError(f"{type(self).__name__} has no terms", "terms", "`has_terms` tells")
 
-    def tint(self, wo: Direction) -> Any:
+    def tint(self, wo: Direction) -> Spectrum:
         """A colour for denoisers to tell materials apart by: near the albedo seen from wo, without noise."""
         shares = [name for name, p in self.parameters().items() if p.white == 1.0]
-        return getattr(self, shares[0]) if shares else 1.0
+        white: Value = 1.0
+        return getattr(self, shares[0]) if shares else white
 
     # ------------------------------------------------------------------ facts
 
@@ -238,7 +245,7 @@ class BSDF(Material):
         return {}
 
     @classmethod
-    def preset(cls, name: str, **parameters: Any) -> Self:
+    def preset(cls, name: str, **parameters: Value) -> Self:
         """A material by a preset's name: Conductor.preset("Au", alpha=0.2). InputError where it is unknown."""
         known = cls.presets()
         by_name = {key.lower(): key for key in known} | {p.title.lower(): key for key, p in known.items()}
@@ -268,7 +275,7 @@ class BSDF(Material):
 
         What a furnace finds missing from it is lost by its shape alone. Bound copies give bound copies.
         """
-        values: dict[str, Any] = {}
+        values: dict[str, object] = {}
         for name, parameter in self.parameters().items():
             value = getattr(self, name)
             if parameter.inner:
@@ -284,7 +291,7 @@ class BSDF(Material):
     # ------------------------------------------------------------------ bound copies and recordings
 
     @property
-    def derived(self) -> Any:
+    def derived(self) -> Value:
         """What `derive` gives: found once for all rays on a bound copy that holds it, else here for each."""
         return self.derive() if self._derived is None else self._derived
 
@@ -296,19 +303,25 @@ class BSDF(Material):
         """A method as a typed graph; parameters are "self.alpha", ..., then the method's own."""
         return recording.record(self, method, mode)
 
-    def __parts__(self) -> dict[str, Any]:
+    def __parts__(self) -> dict[str, object]:
         """What a recording follows: the parameters, and what is derived where this copy holds it."""
         parts = {name: getattr(self, name) for name in self.parameters()}
         return parts if self._derived is None else {**parts, binding.DERIVED: self._derived}
 
-    def __with_parts__(self, parts: Mapping[str, Any]) -> Self:
+    def __with_parts__(self, parts: Mapping[str, object]) -> Self:
         """A copy with these parts."""
         values = dict(parts)
         return binding.bound_copy(self, values, values.pop(binding.DERIVED, None))
 
     # ------------------------------------------------------------------ from outside
 
-    def f(self, wo: Any, wi: Any, mode: Mode = "radiance", precision: Precision | None = None) -> Any:
+    @overload
+    def f(self, wo: Direction, wi: Direction, mode: Mode = ...) -> Spectrum: ...
+    @overload
+    def f(self, wo: V3, wi: V3, mode: Mode = ..., precision: Precision | None = ...) -> V3: ...
+    @overload
+    def f(self, wo: ArrayLike, wi: ArrayLike, mode: Mode = ..., precision: Precision | None = ...) -> Floats: ...
+    def f(self, wo: Given, wi: Given, mode: Mode = "radiance", precision: Precision | None = None) -> object:
         """The BSDF itself, eval / |cos theta_i|, 1/sr; 0 at cos theta_i = 0. Shapes as in `eval`."""
         value = self.eval(wo, wi, mode=mode, precision=precision)
         if backend.is_drjit(wi):
@@ -342,7 +355,7 @@ class BSDF(Material):
             return id(self)
         return hash((type(self), *(_hashable(getattr(self, name)) for name in self.parameters())))
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return tree.rebuild_from, (type(self), {name: getattr(self, name) for name in self.parameters()})
 
 
@@ -362,16 +375,16 @@ BSDF.family = Family(
 )
 
 
-def never(like: Any) -> Any:
+def never(like: Scalar) -> Mask:
     """False for every ray."""
     return like != like
 
 
-def _alike(x: Any, y: Any) -> bool:
+def _alike(x: object, y: object) -> bool:
     return x is y or bool(np.array_equal(np.asarray(x, float), np.asarray(y, float)))
 
 
-def _same(a: Any, b: Any) -> bool:
+def _same(a: Value, b: Value) -> bool:
     if isinstance(a, BSDF) or isinstance(b, BSDF):
         return bool(a == b)
     if backend.is_drjit(a) or backend.is_drjit(b):
@@ -382,7 +395,7 @@ def _same(a: Any, b: Any) -> bool:
         return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
 
 
-def _hashable(value: Any) -> Any:
+def _hashable(value: Value) -> object:
     if isinstance(value, tuple | list):
         return tuple(map(_hashable, value))
     if backend.is_drjit(value):
@@ -390,7 +403,7 @@ def _hashable(value: Any) -> Any:
     return value.tobytes() if isinstance(value, np.ndarray) else value
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     if isinstance(value, tuple | list | np.ndarray):
         values = [_short(v) for v in list(value)[:6]]
         return ", ".join(values) + (", ..." if len(value) > 6 else "")

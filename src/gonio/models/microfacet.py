@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,37 +38,37 @@ class Terms(NamedTuple):
     F: Spectrum
 
 
-def alpha_width() -> Any:
+def alpha_width() -> Width:
     """Declare the width."""
     return width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
 
 
-def rotation_angle() -> Any:
+def rotation_angle() -> Angle:
     """Declare the turn of the two widths."""
     return angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
 
 
-def ndf_choice() -> Any:
+def ndf_choice() -> str:
     """Declare the distribution of normals."""
     return choice("ggx", "distribution of microfacet normals", lambda: NDF.family.titles())
 
 
-def masking_choice() -> Any:
+def masking_choice() -> str:
     """Declare the masking term."""
     return choice("smith-correlated", "masking and shadowing", lambda: masking.Masking.family.titles())
 
 
-def fresnel_choice() -> Any:
+def fresnel_choice() -> str:
     """Declare the Fresnel reflectance."""
     return choice("exact", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
 
 
-def sampling_choice() -> Any:
+def sampling_choice() -> str:
     """Declare which normals are sampled."""
     return choice("visible", "which normals are sampled", SAMPLINGS)
 
 
-def albedo_factor(doc: str) -> Any:
+def albedo_factor(doc: str) -> Colour:
     """Declare the factor on everything that leaves."""
     return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
 
@@ -107,7 +107,7 @@ class _Microfacet(BSDF):
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
         wo = np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
         drawn = self.sample(wo, np.full((len(mu), 3), 0.5), precision="float64")
-        return np.asarray(drawn.weight) * (mu > 0.0)[:, None]
+        return np.asarray(drawn.weight, np.float64) * (mu > 0.0)[:, None]
 
 
 def widths(alpha: Pair) -> tuple[Pair, Mask]:
@@ -116,7 +116,7 @@ def widths(alpha: Pair) -> tuple[Pair, Mask]:
     return vec2(maximum(alpha.x, SMOOTH), maximum(alpha.y, SMOOTH)), smooth
 
 
-def delta_of(alpha: Any) -> Delta:
+def delta_of(alpha: object) -> Delta:
     """Whether widths, as the user gave them, make a delta lobe: alpha = 0 is a mirror."""
     pair = (alpha,) if backend.is_drjit(alpha) else pair_of(alpha)
     if any(backend.is_drjit(width) for width in pair):

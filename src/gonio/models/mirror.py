@@ -29,7 +29,7 @@ class Mirror(BSDF):
         return 0.0 * wo.z
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """wo mirrored at the normal."""
         above = wo.z > 0.0
         one = where(above, 1.0 + 0.0 * wo.z, 0.0)

@@ -30,7 +30,7 @@ class Mix(BSDF):
         return self.a.pdf(wo, wi) * (1.0 - self.weight) + self.b.pdf(wo, wi) * self.weight
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks a material and is stretched to serve it again; a density sample is weighed against both."""
         w = self.weight
         pick_b = u.x < w

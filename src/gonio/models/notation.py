@@ -15,14 +15,13 @@ import inspect
 import json
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
 from . import model, outside
 from .material import BSDF
-from .parameters import Parameter
+from .parameters import Parameter, Value
 
 _CALL = re.compile(r"\s*([\w-]+|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
 
@@ -35,7 +34,7 @@ def assignment(text: str, option: str = "--param") -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple[BSDF, dict[str, Any]]:
+def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple[BSDF, dict[str, object]]:
     """A material as the command line names it, and what was set: values by parameter, "preset" among them.
 
     assignments  "name=value" each
@@ -65,11 +64,11 @@ def several(texts: Sequence[str], assignments: Sequence[str]) -> list[tuple[type
     return found
 
 
-def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any]]:
+def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, object]]:
     """As `named`, of a class; a value is text, or what JSON has for it."""
     known = cls.parameters()
-    values: dict[str, Any] = {}
-    preset = "" if "preset" in known else given.get("preset", "")
+    values: dict[str, object] = {}
+    preset = "" if "preset" in known else str(given.get("preset", ""))
     if preset and not cls.presets():
         raise InputError(f"{cls.name} has no presets", "--preset", "give its parameters by --param")
     for name, value in given.items():
@@ -96,7 +95,7 @@ def made(cls: type[BSDF], given: Mapping[str, Any]) -> tuple[BSDF, dict[str, Any
         raise InputError(f"{cls.__name__} cannot be made: {type(error).__name__}: {error}", "TARGET") from None
 
 
-def typed(parameter: Parameter, value: Any) -> Any:
+def typed(parameter: Parameter, value: Value) -> object:
     """A parameter's value from text, or from what JSON has for it."""
     where = f"--param {parameter.name}"
     if parameter.inner:
@@ -117,7 +116,7 @@ def typed(parameter: Parameter, value: Any) -> Any:
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
 
-def written(value: Any) -> str:
+def written(value: Value) -> str:
     """A value as `typed` takes it, a material with the parameters that are not the default."""
     if isinstance(value, BSDF):
         inner = ",".join(f"{name}={written(v)}" for name, v in settings(value).items())
@@ -131,7 +130,7 @@ def written(value: Any) -> str:
     return str(value)
 
 
-def settings(material: BSDF) -> dict[str, Any]:
+def settings(material: BSDF) -> dict[str, Value]:
     """The parameters that are not the default, by name."""
     found = {}
     for name, parameter in material.parameters().items():
@@ -141,14 +140,14 @@ def settings(material: BSDF) -> dict[str, Any]:
     return found
 
 
-def _same(a: Any, b: Any) -> bool:
+def _same(a: object, b: object) -> bool:
     try:
         return bool(np.all(np.asarray(a) == np.asarray(b)))
     except (TypeError, ValueError):
         return False
 
 
-def _inner(value: Any, where: str) -> BSDF:
+def _inner(value: Value, where: str) -> BSDF:
     if isinstance(value, str) and not value.lstrip().startswith("{"):
         return made(*taken_apart(value.strip().strip('"'), where))[0]
     try:
@@ -193,6 +192,6 @@ def _parts(text: str) -> list[str]:
     return [part for part in [*parts, text[start:]] if part.strip()]
 
 
-def _no_material(value: Any, where: str) -> InputError:
+def _no_material(value: object, where: str) -> InputError:
     hint = 'such as lambert, \'conductor(alpha=.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
     return InputError(f"'{value}' is no material", where, hint)

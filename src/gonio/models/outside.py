@@ -15,7 +15,6 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -94,7 +93,7 @@ def adopt(cls: type, where: str = "") -> type[BSDF]:
         inner = cls()
     except Exception as error:
         raise InputError(f"{cls.__name__}() fails: {type(error).__name__}: {error}", where, "give defaults") from None
-    kept: dict[str, Any] = {}
+    kept: dict[str, object] = {}
     for name in ("eval", "pdf", "sample"):
         if callable(getattr(cls, name, None)):
             kept[name] = _forward(inner, name)
@@ -105,13 +104,13 @@ def adopt(cls: type, where: str = "") -> type[BSDF]:
     return type(cls.__name__, (BSDF,), namespace)
 
 
-def _forward(inner: object, name: str) -> Callable[..., Any]:
+def _forward(inner: object, name: str) -> Callable[..., object]:
     formula = getattr(inner, name)
     takes_mode = "mode" in inspect.signature(formula).parameters
     if name == "pdf":
         return lambda self, wo, wi: formula(wo, wi)
 
-    def forwarded(self: object, wo: Any, other: Any, mode: str = "radiance") -> Any:
+    def forwarded(self: object, wo: object, other: object, mode: str = "radiance") -> object:
         return formula(wo, other, mode) if takes_mode else formula(wo, other)
 
     return forwarded
@@ -264,7 +263,7 @@ def _wrong_sample(material: BSDF, value: object, path: Path) -> InputError:
     return InputError(what, _place(type(material), "sample", path), "return go.Sample(wi, weight, pdf, delta, eta)")
 
 
-def _called(material: BSDF, formula: str, path: Path, call: Callable[[], Any]) -> Any:
+def _called(material: BSDF, formula: str, path: Path, call: Callable[[], object]) -> object:
     try:
         return call()
     except (KeyboardInterrupt, GonioError):
@@ -283,7 +282,7 @@ def _remedy(text: str) -> str:
     return "mend the formula: it must run on Dr.Jit values, in the words of gonio.ops"
 
 
-def _check_shape(what: str, value: Any, shape: tuple[int, ...], path: Path, cls: type[BSDF]) -> None:
+def _check_shape(what: str, value: object, shape: tuple[int, ...], path: Path, cls: type[BSDF]) -> None:
     formula = what.split(":")[0]
     if not isinstance(value, np.ndarray) or value.shape != shape:
         given = f"shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

@@ -16,7 +16,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Never, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,28 +28,30 @@ CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have th
 
 # --------------------------------------------------------------------------- what checkers and editors see
 
-Floats: TypeAlias = "NDArray[np.floating[Any]]"
+# What a parameter holds: what the user gave; in a bound copy a Dr.Jit value or a symbol, which share no type.
+Value: TypeAlias = Any
+Floats: TypeAlias = "NDArray[np.floating]"
 PlainNumber: TypeAlias = "float | list[float] | Floats | Scalar"
 PlainColour: TypeAlias = "float | tuple[float, float, float] | list[float] | Floats | Spectrum | Scalar"
 PlainWidth: TypeAlias = "float | tuple[PlainNumber, PlainNumber] | list[float] | Floats | Pair | Scalar"
 
 if TYPE_CHECKING:
-
+    # `owner: Never`: the constructor takes what `__set__` does, and nobody can set it afterwards
     class Number:
         def __get__(self, owner: object, cls: type | None = None) -> Scalar: ...
-        def __set__(self, owner: object, value: PlainNumber) -> None: ...
+        def __set__(self, owner: Never, value: PlainNumber) -> None: ...
 
     class Colour:
         def __get__(self, owner: object, cls: type | None = None) -> Spectrum: ...
-        def __set__(self, owner: object, value: PlainColour) -> None: ...
+        def __set__(self, owner: Never, value: PlainColour) -> None: ...
 
     class Width:
         def __get__(self, owner: object, cls: type | None = None) -> Pair: ...
-        def __set__(self, owner: object, value: PlainWidth) -> None: ...
+        def __set__(self, owner: Never, value: PlainWidth) -> None: ...
 
     class Angle:
         def __get__(self, owner: object, cls: type | None = None) -> Pair | None: ...
-        def __set__(self, owner: object, value: PlainNumber | None) -> None: ...
+        def __set__(self, owner: Never, value: PlainNumber | None) -> None: ...
 
 else:
     Number = Colour = Width = Angle = "a declared parameter"
@@ -64,15 +66,15 @@ class Material:
     derives: ClassVar[bool] = False  # whether `derive` is written
 
     _bound: ClassVar[bool] = False
-    _plain: ClassVar[Any] = None
-    _derived: ClassVar[Any] = None
+    _plain: Self | None = None
+    _derived: object = None
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:
         """The declared parameters by name."""
         raise NotImplementedError
 
-    def derive(self) -> Any:
+    def derive(self) -> object:
         """What follows from the parameters alone and is expensive to compute for every ray: a NamedTuple, or None."""
         return None
 
@@ -100,13 +102,13 @@ class Parameter:
     inner: ClassVar[bool] = False  # whether it holds a material
 
     name: str
-    default: Any
+    default: Value
     doc: str
     low: float = -math.inf
     high: float = math.inf
     unit: str = ""
     soft_high: bool = False
-    white: Any = None
+    white: Value = None
 
     @property
     def required(self) -> bool:
@@ -122,18 +124,18 @@ class Parameter:
         """name -> what it means, of a choice."""
         return {}
 
-    def check(self, value: Any, where: str) -> None:
+    def check(self, value: object, where: str) -> None:
         """Raise InputError, or warn, where `value` cannot stand for this parameter."""
 
-    def bind(self, value: Any, types: backend.Types) -> Any:
+    def bind(self, value: object, types: backend.Types) -> Value:
         """The value as Dr.Jit values of these types; what shapes the code stays as it is."""
         return value
 
-    def symbol(self, value: Any) -> Any:
+    def symbol(self, value: object) -> Value:
         """The symbol that stands for the value in a recording; what shapes the code stays as it is."""
         return value
 
-    def rows(self, value: Any) -> int:
+    def rows(self, value: object) -> int:
         """How many rays the value has entries for, 1 where it is the same for all."""
         return 1
 
@@ -151,7 +153,7 @@ class _Numeric(Parameter):
         high = "" if self.high == math.inf else f"<= {self.high:g}"
         return " and ".join(x for x in (low, high) if x) or "any number"
 
-    def check(self, value: Any, where: str) -> None:
+    def check(self, value: object, where: str) -> None:
         if backend.is_drjit(value) or isinstance(value, graph.Node) or value is None:
             return
         try:
@@ -179,14 +181,15 @@ class _Numeric(Parameter):
             text = f"{array.max():g} is over {self.high:g}: the material gives back more light than it receives"
             warnings.warn(f"{where}: {text}", GonioWarning, stacklevel=5)
 
-    def bind(self, value: Any, types: backend.Types) -> Any:
+    def bind(self, value: object, types: backend.Types) -> Value:
         return backend.float_of(value, types)
 
-    def symbol(self, value: Any) -> Any:
+    def symbol(self, value: object) -> Value:
         return graph.symbol(self.symbol_type)
 
-    def rows(self, value: Any) -> int:
-        return 1 if backend.is_drjit(value) or np.ndim(value) <= self.dimensions else len(value)
+    def rows(self, value: object) -> int:
+        array = np.empty(()) if backend.is_drjit(value) else np.asarray(value)
+        return 1 if array.ndim <= self.dimensions else len(array)
 
 
 class NumberParameter(_Numeric):
@@ -207,7 +210,7 @@ class ColourParameter(_Numeric):
         """Whether it says how much of the light is kept: its declared range ends at 1."""
         return self.high == 1.0
 
-    def bind(self, value: Any, types: backend.Types) -> Any:
+    def bind(self, value: object, types: backend.Types) -> Value:
         if backend.is_drjit(value):
             return value if backend.drjit().is_vector_v(value) else types.vec3(value, value, value)
         array = np.asarray(value, dtype=np.float64)
@@ -220,18 +223,18 @@ class WidthParameter(_Numeric):
     kind = "alpha"
     symbol_type = "vec2"
 
-    def check(self, value: Any, where: str) -> None:
+    def check(self, value: object, where: str) -> None:
         for one in pair_of(value, where):
             super().check(one, where)
 
-    def bind(self, value: Any, types: backend.Types) -> Any:
+    def bind(self, value: object, types: backend.Types) -> Value:
         if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
             return value
         x, y = pair_of(value)
         x, y = backend.float_of(x, types), backend.float_of(y, types) if y is not x else None
         return types.vec2(x, x if y is None else y)
 
-    def rows(self, value: Any) -> int:
+    def rows(self, value: object) -> int:
         return max(_Numeric.rows(self, one) for one in pair_of(value))
 
 
@@ -242,11 +245,11 @@ class AngleParameter(_Numeric):
     symbol_type = "vec2"
 
     @staticmethod
-    def none(value: Any) -> bool:
+    def none(value: object) -> bool:
         """Whether a value is no turn, known before anything runs."""
         return value is None or (isinstance(value, int | float) and value == 0)
 
-    def bind(self, value: Any, types: backend.Types) -> Any:
+    def bind(self, value: object, types: backend.Types) -> Value:
         if self.none(value):
             return None
         if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
@@ -254,7 +257,7 @@ class AngleParameter(_Numeric):
         s, c = sincos(backend.float_of(value, types))
         return types.vec2(c, s)
 
-    def symbol(self, value: Any) -> Any:
+    def symbol(self, value: object) -> Value:
         return None if self.none(value) else super().symbol(value)
 
 
@@ -273,7 +276,7 @@ class ChoiceParameter(Parameter):
     def range(self) -> str:
         return " | ".join(self.choices)
 
-    def check(self, value: Any, where: str) -> None:
+    def check(self, value: object, where: str) -> None:
         known = self.choices
         if not isinstance(value, str) or value not in known:
             raise InputError(f"unknown {self.name} '{value}'", where, did_you_mean(str(value), list(known)))
@@ -284,7 +287,7 @@ class FlagParameter(Parameter):
 
     kind = "flag"
 
-    def check(self, value: Any, where: str) -> None:
+    def check(self, value: object, where: str) -> None:
         if not isinstance(value, bool | np.bool_):
             raise InputError(f"{value!r} given, True or False expected", where)
 
@@ -295,12 +298,12 @@ class MaterialParameter(Parameter):
     kind = "bsdf"
     inner = True
 
-    def check(self, value: Any, where: str) -> None:
+    def check(self, value: object, where: str) -> None:
         if not isinstance(value, Material):
             raise InputError(f"{type(value).__name__} given, a material expected", where)
 
 
-def pair_of(value: Any, where: str = "") -> tuple[Any, Any]:
+def pair_of(value: object, where: str = "") -> tuple[Value, Value]:
     """The two widths of a width as a user gives it: itself twice, or the tuple's."""
     if not isinstance(value, tuple | list):
         return value, value
@@ -312,26 +315,34 @@ def pair_of(value: Any, where: str = "") -> tuple[Any, Any]:
 # --------------------------------------------------------------------------- how a material declares them
 
 
-def _declare(kind: type[Parameter], default: Any, doc: str, **more: Any) -> Any:
+def _declare(kind: type[Parameter], default: object, doc: str, **more: object) -> Value:
+    """A field that knows its declaration; without a default it must be given."""
+    if default is None:
+        return dataclasses.field(metadata={"kind": kind, "doc": doc, **more})
     return dataclasses.field(default=default, metadata={"kind": kind, "doc": doc, **more})
 
 
 def number(
-    default: Any = dataclasses.MISSING, doc: str = "", *, low: float = -math.inf, high: float = math.inf, unit: str = ""
-) -> Any:
+    default: PlainNumber | None = None,
+    doc: str = "",
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    unit: str = "",
+) -> Number:
     """Declare a number with its closed range and unit."""
     return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit)
 
 
 def spectrum(
-    default: Any = dataclasses.MISSING,
+    default: PlainColour | None = None,
     doc: str = "",
     *,
     low: float = -math.inf,
     high: float = math.inf,
     unit: str = "",
     soft_high: bool = False,
-) -> Any:
+) -> Colour:
     """Declare a colour: a number (grey), three values, or an array (N, channels).
 
     A colour whose range ends at 1 is a share of the light: it is 1 in the material's white twin.
@@ -340,7 +351,7 @@ def spectrum(
     return _declare(ColourParameter, default, doc, low=low, high=high, unit=unit, soft_high=soft_high, white=white)
 
 
-def width(default: Any = dataclasses.MISSING, doc: str = "", *, low: float = 0.0, high: float = 1.0) -> Any:
+def width(default: PlainWidth | None = None, doc: str = "", *, low: float = 0.0, high: float = 1.0) -> Width:
     """Declare a microfacet width alpha, or a tuple of two (along x, along y); bound: a vector of two.
 
     low  0 where the model knows what a mirror is; a model that divides by alpha says from where on it holds
@@ -348,14 +359,14 @@ def width(default: Any = dataclasses.MISSING, doc: str = "", *, low: float = 0.0
     return _declare(WidthParameter, default, doc, low=low, high=high)
 
 
-def angle(default: Any = 0.0, doc: str = "") -> Any:
+def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
     """Declare an angle in radians; bound: the vector (cos, sin), or None where it is the plain number 0."""
     return _declare(AngleParameter, default, doc, unit="rad")
 
 
 def choice(
     default: str, doc: str, choices: Mapping[str, str] | Callable[[], Mapping[str, str]], *, white: str | None = None
-) -> Any:
+) -> str:
     """Declare a choice between names; it shapes the code, so it is known before anything runs.
 
     choices  name -> what it means, or a function that returns them (members may be registered later)
@@ -364,12 +375,12 @@ def choice(
     return _declare(ChoiceParameter, default, doc, members=choices, white=white)
 
 
-def flag(default: bool, doc: str) -> Any:
+def flag(default: bool, doc: str) -> bool:
     """Declare a switch that shapes the code."""
     return _declare(FlagParameter, default, doc)
 
 
-def bsdf(doc: str, default: Any = dataclasses.MISSING) -> Any:
+def bsdf(doc: str, default: Material | None = None) -> Value:
     """Declare a material inside a material."""
     return _declare(MaterialParameter, default, doc)
 

@@ -97,7 +97,7 @@ class _Empirical(BSDF):
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks a lobe; a direction below the surface is a failed sample."""
         diffuse = square_to_cosine_hemisphere(u.y, u.z)
         specular = self._highlight_sample(wo, u.y, u.z)

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeAlias
 
-D = TypeVar("D")
-C = TypeVar("C")
-N = TypeVar("N")
+import numpy as np
+from numpy.typing import NDArray
+
+from ..ops import Direction, Mask, Scalar, Spectrum
+
+if TYPE_CHECKING:  # Python's own has defaults since 3.13
+    from typing_extensions import TypeVar
+
+    D = TypeVar("D", default=Direction)
+    C = TypeVar("C", default=Spectrum)
+    N = TypeVar("N", default=Scalar)
+    B = TypeVar("B", default=Mask)
+else:
+    from typing import TypeVar
+
+    D, C, N, B = map(TypeVar, "DCNB")
 
 
-class Sample(NamedTuple, Generic[D, C, N]):
-    """A direction and what it carries.
+class Sample(NamedTuple, Generic[D, C, N, B]):
+    """A direction and what it carries; inside a material plain `Sample`, for callers of what they hand in.
 
     wi      direction chosen, unit
     weight  eval / pdf; of a delta lobe, its reflectance over its probability; 0 where sampling failed
@@ -24,5 +37,9 @@ class Sample(NamedTuple, Generic[D, C, N]):
     wi: D
     weight: C
     pdf: N
-    delta: Any
+    delta: B
     eta: N
+
+
+Floats: TypeAlias = "NDArray[np.floating]"
+SampleArrays: TypeAlias = "Sample[Floats, Floats, Floats, NDArray[np.bool_]]"  # what callers with NumPy arrays get

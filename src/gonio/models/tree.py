@@ -9,10 +9,10 @@ Works on materials as they were made and on bound ones alike.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from ..errors import InputError, did_you_mean
-from .parameters import Material, Parameter
+from .parameters import Material, Parameter, Value
 
 M = TypeVar("M", bound=Material)
 
@@ -28,7 +28,7 @@ class Leaf(NamedTuple, Generic[M]):
 
     path: str
     parameter: Parameter
-    value: Any
+    value: Value
     owner: M
 
 
@@ -59,18 +59,18 @@ def join(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
-def value_at(material: Material, path: str) -> Any:
+def value_at(material: Material, path: str) -> Value:
     """What stands at a path; InputError where there is nothing."""
-    value: Any = material
+    value: Value = material
     for name in path.split("."):
         value = getattr(value, _known(value, name, path))
     return value
 
 
-def replace(material: M, values: Mapping[str, Any], where: str = "replace") -> M:
+def replace(material: M, values: Mapping[str, object], where: str = "replace") -> M:
     """The material with other values, or other inner materials, at some paths; InputError for what cannot be."""
-    own: dict[str, Any] = {}
-    below: dict[str, dict[str, Any]] = {}
+    own: dict[str, Value] = {}
+    below: dict[str, dict[str, object]] = {}
     for path, value in values.items():
         name, _, rest = path.partition(".")
         _known(material, name, where)
@@ -83,12 +83,12 @@ def replace(material: M, values: Mapping[str, Any], where: str = "replace") -> M
     return rebuild(material, own)
 
 
-def rebuild(material: M, values: Mapping[str, Any]) -> M:
+def rebuild(material: M, values: Mapping[str, object]) -> M:
     """The material made anew, and so checked, with other values of its own parameters."""
     return type(material)(**{**{name: getattr(material, name) for name in material.parameters()}, **values})
 
 
-def map_leaves(material: M, change: Callable[[Parameter, Any], Any]) -> M:
+def map_leaves(material: M, change: Callable[[Parameter, object], object]) -> M:
     """The material made anew with what `change(parameter, value)` makes of every leaf."""
     values = {
         name: map_leaves(getattr(material, name), change) if p.inner else change(p, getattr(material, name))
@@ -97,14 +97,14 @@ def map_leaves(material: M, change: Callable[[Parameter, Any], Any]) -> M:
     return rebuild(material, values)
 
 
-def _known(material: Any, name: str, where: str) -> str:
-    known = material.parameters() if hasattr(material, "parameters") else {}
+def _known(material: Material, name: str, where: str) -> str:
+    known = material.parameters() if isinstance(material, Material) else {}
     if name not in known:
         what = f"{type(material).__name__} has no parameter '{name}'"
         raise InputError(what, where, did_you_mean(name, list(known)) if known else "")
     return name
 
 
-def rebuild_from(cls: type[M], values: Mapping[str, Any]) -> M:
+def rebuild_from(cls: type[M], values: Mapping[str, object]) -> M:
     """A material of a class and its values: how a pickled one comes back."""
     return cls(**values)

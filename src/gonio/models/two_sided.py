@@ -38,7 +38,7 @@ class TwoSided(BSDF):
         return self.base.pdf(_turned(wo, wo), _turned(wi, wo))
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """The base's sample, turned back."""
         s = self.base.sample(_turned(wo, wo), u, mode)
         return Sample(_turned(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)

@@ -8,18 +8,19 @@ from __future__ import annotations
 import sys
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeGuard, get_args
 
 import numpy as np
 
 from .. import llvm
 from ..errors import InputError
+from .types import Precision
 
 # A Dr.Jit array. Dr.Jit's stubs describe one device and precision, our code is written for all.
 Array: TypeAlias = Any
 
-PRECISIONS = ("float32", "float64")
-_precision = "float32"
+PRECISIONS = get_args(Precision)
+_precision: Precision = "float32"
 
 
 class Types(NamedTuple):
@@ -33,7 +34,7 @@ class Types(NamedTuple):
     module: ModuleType
 
 
-def set_precision(precision: str) -> None:
+def set_precision(precision: Precision) -> None:
     """Set the precision of evaluations on NumPy arrays: "float32" (default) or "float64", the oracle."""
     global _precision
     if precision not in PRECISIONS:
@@ -41,7 +42,7 @@ def set_precision(precision: str) -> None:
     _precision = precision
 
 
-def get_precision() -> str:
+def get_precision() -> Precision:
     return _precision
 
 
@@ -70,7 +71,7 @@ def _types(backend: str, double: bool) -> Types:
     )
 
 
-def types(precision: str | None = None) -> Types:
+def types(precision: Precision | None = None) -> Types:
     """The types for a precision; the one that is set where `precision` is None. CPU: small arrays live there."""
     precision = precision or _precision
     if precision not in PRECISIONS:
@@ -78,20 +79,20 @@ def types(precision: str | None = None) -> Types:
     return _types("llvm", precision == "float64")
 
 
-def types_like(kind: Any) -> Types:
+def types_like(kind: type) -> Types:
     """The types that go with a Dr.Jit array type: same device, same precision."""
     dr = drjit()
     backend = "cuda" if dr.backend_v(kind) == dr.JitBackend.CUDA else "llvm"
     return _types(backend, dr.itemsize_v(kind) == 8 and not dr.is_mask_v(kind))
 
 
-def is_drjit(value: Any) -> bool:
+def is_drjit(value: object) -> TypeGuard[Array]:
     """Whether a value is a Dr.Jit array (asked without loading Dr.Jit)."""
     dr = sys.modules.get("drjit")
     return dr is not None and dr.is_array_v(value)
 
 
-def float_of(value: Any, kind: Types) -> Any:
+def float_of(value: object, kind: Types) -> Array:
     """A number or an array of shape (N,) as a Dr.Jit float.
 
     A number becomes an evaluated array of one entry, never a literal: a literal would be baked into the kernel,
@@ -108,7 +109,7 @@ def float_of(value: Any, kind: Types) -> Any:
     return kind.float(aligned(array, np.float64 if kind.float.__name__.endswith("64") else np.float32))
 
 
-def aligned(array: np.ndarray, dtype: Any) -> np.ndarray:
+def aligned(array: np.ndarray, dtype: type[np.floating]) -> np.ndarray:
     """A copy at an address that is a multiple of 64.
 
     Dr.Jit takes NumPy's memory as it lies and writes its alignment into the kernel: arrays that NumPy puts now here,
@@ -122,7 +123,7 @@ def aligned(array: np.ndarray, dtype: Any) -> np.ndarray:
     return aligned
 
 
-def vector_of(value: Any, size: int, kind: Types) -> Any:
+def vector_of(value: object, size: int, kind: Types) -> Array:
     """Rows of shape (N, size) or one of shape (size,) as a Dr.Jit vector of `size` components."""
     if is_drjit(value):
         return value
@@ -131,7 +132,7 @@ def vector_of(value: Any, size: int, kind: Types) -> Any:
     return vector(*[float_of(array[..., i], kind) for i in range(size)])
 
 
-def to_numpy(value: Any, count: int) -> np.ndarray:
+def to_numpy(value: Array, count: int) -> np.ndarray:
     """A Dr.Jit float as (count,), a vector as (count, size); what is uniform is repeated `count` times."""
     dr = drjit()
     if not dr.is_array_v(value):

@@ -103,7 +103,7 @@ class ForeignBSDF:
 
         failed = dr.all(weight == 0.0)
         found = Sample(bs.wo, weight, dr.select(failed, 0.0, bs.pdf), delta & ~failed, bs.eta)
-        return found if count is None else Sample(*[backend.to_numpy(value, count) for value in found])
+        return found if count is None else type(found)._make(backend.to_numpy(value, count) for value in found)
 
     def _context(self, mode: str) -> Any:
         modes = self._mi.TransportMode

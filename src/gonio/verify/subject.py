@@ -20,7 +20,8 @@ import numpy as np
 
 from ..errors import GonioError, InputError
 from ..models import BSDF, Breach, Parameter, Sample, notation, tree
-from ..ops import backend
+from ..models.sample import SampleArrays
+from ..ops import Precision, backend
 from . import directions
 
 
@@ -68,12 +69,12 @@ class Subject:
         return bool(getattr(self.model, "stochastic", False))
 
     @property
-    def precisions(self) -> tuple[str, ...]:
+    def precisions(self) -> tuple[Precision, ...]:
         """The precisions it can be evaluated in, the most precise last."""
         return tuple(getattr(self.model, "precisions", backend.PRECISIONS))
 
     @property
-    def best(self) -> str:
+    def best(self) -> Precision:
         return self.precisions[-1]
 
     @property
@@ -126,17 +127,21 @@ class Subject:
 
     # ------------------------------------------------------------------ the protocol
 
-    def eval(self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: str | None = None) -> np.ndarray:
+    def eval(
+        self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: Precision | None = None
+    ) -> np.ndarray:
         """f |cos theta_i| of rows (N, 3): (N, channels) in float64."""
         value = self._call("eval", wo, wi, mode=mode, precision=precision or self.best)
         return self._shaped("eval", value, len(wo), 2)
 
-    def pdf(self, wo: np.ndarray, wi: np.ndarray, precision: str | None = None) -> np.ndarray:
+    def pdf(self, wo: np.ndarray, wi: np.ndarray, precision: Precision | None = None) -> np.ndarray:
         """Density, (N,) in float64."""
         value = self._call("pdf", wo, wi, precision=precision or self.best)
         return self._shaped("pdf", value, len(wo), 1)
 
-    def sample(self, wo: np.ndarray, u: np.ndarray, mode: str = "radiance", precision: str | None = None) -> Sample:
+    def sample(
+        self, wo: np.ndarray, u: np.ndarray, mode: str = "radiance", precision: Precision | None = None
+    ) -> SampleArrays:
         """Directions, weights, densities and flags of rows (N, 3), in float64 and bool."""
         s = self._call("sample", wo, u, mode=mode, precision=precision or self.best)
         if not isinstance(s, tuple) or len(s) != 5:
@@ -150,13 +155,15 @@ class Subject:
             self._shaped("sample: eta", s[4], n, 1),
         )
 
-    def f(self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: str | None = None) -> np.ndarray:
+    def f(
+        self, wo: np.ndarray, wi: np.ndarray, mode: str = "radiance", precision: Precision | None = None
+    ) -> np.ndarray:
         """The BSDF without the cosine, 1/sr; 0 where cos theta_i = 0."""
         value = self.eval(wo, wi, mode, precision)
         cos = np.abs(wi[:, 2:])
         return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0.0)
 
-    def bound(self, precision: str = "float32") -> Any:
+    def bound(self, precision: Precision = "float32") -> Any:
         """The model for wavefronts of Dr.Jit arrays of that precision; a new value compiles nothing."""
         if isinstance(self.model, BSDF):
             return self.model.bind(backend.types(precision))

@@ -32,8 +32,8 @@ METHODS = ("auto", "closed-form", "quadrature", "sampling")
 class Albedo(NamedTuple):
     """value (N, channels); error, an estimate of its size (N, channels); method, how it was found."""
 
-    value: np.ndarray
-    error: np.ndarray
+    value: NDArray[np.float64]
+    error: NDArray[np.float64]
     method: str
 
     def _repr_html_(self) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import ops
 from ...errors import InputError, did_you_mean
-from ...ops import backend
+from ...ops import Precision, backend
 from ...optics import frame, masking, warp
 from ...optics.ndf import distribution
 from .quadrature import known_masking
@@ -55,7 +55,7 @@ def estimate(
     spp: int = 1024,
     points: str = "hammersley",
     seed: int = 0,
-    precision: str = "float32",
+    precision: Precision = "float32",
     alpha_y: Any = None,
     phi: Any = 0.0,
 ) -> Estimate:

@@ -113,7 +113,7 @@ class _Compensated(BSDF):
         return self.base.pdf(wo, wi) * (1.0 - share) + self._lobe_pdf(wo, wi) * share
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the base or the lobe, and is stretched to serve again."""
         share = self._share(wo)
         broad = u.x < share

@@ -90,7 +90,7 @@ class Turquin(BSDF):
         return self.base.pdf(wo, wi)
 
     @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample[Direction, Spectrum, Scalar]:
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """The base's, with the weight times the factor."""
         s = self.base.sample(wo, u, mode)
         return Sample(s.wi, s.weight * self._factor(wo), s.pdf, s.delta, s.eta)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import _html
 from ...errors import InputError
@@ -23,7 +24,7 @@ from ..cache import content_hash
 class Baked:
     """Arrays by name, the axes among them, and the manifest that describes them."""
 
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, NDArray[np.float64]]
     manifest: dict[str, Any]
 
     def _repr_html_(self) -> str:

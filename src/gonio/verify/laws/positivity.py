@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...models import BSDF, binding
-from ...ops import backend
+from ...ops import Precision, backend
 from .. import directions
 from ..effort import Effort
 from ..subject import Fault, Subject, guarded
@@ -123,7 +123,7 @@ def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.n
 
 
 def _values(
-    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: str
+    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """What is looked at: its name, the values (n, channels), the directions they belong to, and their rows."""
     rows = np.arange(len(wo))

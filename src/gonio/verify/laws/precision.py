@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ... import ops
 from ..effort import Effort
 from ..figures import RoundingErrors
 from ..subject import Subject
@@ -34,7 +35,7 @@ class Precision(Law):
         curve = np.zeros(len(wo))
         for what in ("eval", "pdf"):
 
-            def values(a: np.ndarray, b: np.ndarray, p: str = "float64", what: str = what) -> np.ndarray:
+            def values(a: np.ndarray, b: np.ndarray, p: ops.Precision = "float64", what: str = what) -> np.ndarray:
                 return subject.eval(a, b, precision=p) if what == "eval" else subject.pdf(a, b, p)[:, None]
 
             quick, exact = values(wo, wi, "float32"), values(wo, wi)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...ops import Precision
 from .. import directions, statistics
 from ..effort import Effort
 from ..subject import Subject
@@ -50,7 +51,7 @@ class Weight(Law):
         return finding
 
     def _at(
-        self, subject: Subject, wo: np.ndarray, u: np.ndarray, precision: str, problems: list[str]
+        self, subject: Subject, wo: np.ndarray, u: np.ndarray, precision: Precision, problems: list[str]
     ) -> tuple[float, int, np.ndarray]:
         modes = ("radiance", "importance") if subject.transmits else ("radiance",)
         worst, where, wi = 0.0, 0, wo[0]
@@ -100,7 +101,7 @@ class Weight(Law):
         return worst, where, wi
 
 
-def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: str) -> np.ndarray:
+def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precision) -> np.ndarray:
     """Whether a turn of a few roundings makes the value or the pdf vanish, or appear."""
     rng = np.random.default_rng(8)
     lit = [subject.pdf(wo, wi, precision) > 0.0]
@@ -118,7 +119,7 @@ def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndar
     return directions.single(wo), directions.numbers(rng, count)
 
 
-def _conventions(s: object, problems: list[str], precision: str) -> None:
+def _conventions(s: object, problems: list[str], precision: Precision) -> None:
     """Failed samples weigh nothing; the others have unit directions and finite weights; probabilities are at most 1."""
     pdf, weight, wi, delta = s.pdf, s.weight, s.wi, s.delta  # type: ignore[attr-defined]
     good = pdf > 0.0
