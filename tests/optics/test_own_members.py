@@ -163,12 +163,11 @@ def test_kulla_conty_closes_its_furnace(strangers: Any, chosen: dict[str, str]) 
 def test_a_fresnel_kind_by_its_curve_alone_has_all_that_others_ask(strangers: Any) -> None:
     kind, cos = fresnel.kind("games"), np.linspace(0.0, 1.0, 2001)
     c, eta = KIND.float(cos), KIND.float(1.5)
-    exact, schlick = (fresnel.kind(name) for name in ("exact", "schlick"))
+    schlick = fresnel.kind("schlick")
     cos_t = fresnel.cos_transmitted(c, eta)
     assert np.abs((kind.dielectric(c, cos_t, eta) - schlick.dielectric(c, cos_t, eta)).numpy()).max() < 5e-3
     inside = kind.dielectric(c, fresnel.cos_transmitted(c, 1.0 / eta), 1.0 / eta).numpy()
     assert np.all(inside[cos < np.sqrt(1 - 1 / 1.5**2)] == 1.0), "total reflection"
-    assert kind.dielectric_normal(eta).numpy() == pytest.approx(exact.dielectric_normal(eta).numpy(), abs=1e-2)
     # 2 int F mu dmu by a sum, against the rule of ten nodes
     f = kind.conductor(c, KIND.float(0.2), KIND.float(3.0)).numpy()
     mean = np.trapezoid(2.0 * f * cos, cos)

@@ -21,7 +21,7 @@ NODES = 10
 
 
 class Fresnel:
-    """Reflectance of unpolarized light at a smooth interface: at an angle, at normal incidence, and on average.
+    """Reflectance of unpolarized light at a smooth interface, at an angle and on average.
 
     The first line of a member's docstring is its title in the manual.
 
@@ -46,15 +46,6 @@ class Fresnel:
         From the denser side the curve's angle is the transmitted one: it is 1 at the critical angle.
         """
         return where(cos_t > 0.0, self.curve(where(eta < 1.0, cos_t, cos_i), r0_dielectric(eta)), 1.0)
-
-    def conductor_normal(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """Reflectance of a metal at normal incidence."""
-        return self.conductor(1.0, eta, k)
-
-    def dielectric_normal(self, eta: Scalar) -> Scalar:
-        """Reflectance of a dielectric at normal incidence."""
-        one = 1.0 + 0.0 * eta
-        return self.dielectric(one, one, eta)
 
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
         """F_avg = 2 int F mu dmu of a metal: Gauss's rule in sqrt(mu), error 2e-7."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...ops import Scalar, Spectrum, abs, fma, function, maximum, rsqrt, sqr, sqrt, where
-from .base import Fresnel, r0_conductor, r0_dielectric
+from .base import Fresnel
 
 
 class Exact(Fresnel):
@@ -18,14 +18,6 @@ class Exact(Fresnel):
     def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
         """Mean of R_s and R_p at a real index."""
         return dielectric(cos_i, cos_t, eta)
-
-    def conductor_normal(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """|n - 1|^2 / |n + 1|^2."""
-        return r0_conductor(eta, k)
-
-    def dielectric_normal(self, eta: Scalar) -> Scalar:
-        """((eta - 1) / (eta + 1))^2."""
-        return r0_dielectric(eta)
 
 
 @function

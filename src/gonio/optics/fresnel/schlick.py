@@ -15,14 +15,6 @@ class Schlick(Fresnel):
         """R0 + (1 - R0) (1 - cos)^5."""
         return schlick(cos_i, r0)
 
-    def conductor_normal(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """R0."""
-        return r0_conductor(eta, k)
-
-    def dielectric_normal(self, eta: Scalar) -> Scalar:
-        """R0."""
-        return r0_dielectric(eta)
-
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
         """The curve's integral."""
         return schlick_average(r0_conductor(eta, k))

@@ -70,12 +70,8 @@ class NDF:
         """A visible normal whose reflection is less likely to fall below the surface; else `sample_visible`."""
         return self.sample_visible(v, u1, u2, alpha)
 
-    def pdf_bounded(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """Density of `sample_bounded`."""
-        return abs(dot(v, m)) * self.bounded_per_cosine(v, m, alpha)
-
     def bounded_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
-        """`pdf_bounded` over |v.m|."""
+        """Density of `sample_bounded` over |v.m|."""
         return self.visible_per_cosine(v, m, alpha)
 
 
