@@ -40,6 +40,7 @@ _PLACES = {
     "verify.laws": ("Law",),
     "render.tables": ("bake",),
     "viewer.error_map": ("compare",),
+    "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
     "viewer.contact_sheet": ("study",),
     "viewer.widget": ("view",),
@@ -102,6 +103,7 @@ if TYPE_CHECKING:
     from .verify.laws import Law
     from .viewer.contact_sheet import study
     from .viewer.error_map import compare
+    from .viewer.panels import Panel
     from .viewer.plots import plot
     from .viewer.widget import view
 
@@ -132,9 +134,9 @@ def __dir__() -> list[str]:
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Colour", "Conductor", "Dielectric", "Direction",
     "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
-    "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Parameter", "Phong",
-    "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width", "albedo",
-    "angle", "bake", "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model", "models",
-    "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided", "verify",
-    "view", "width",
+    "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
+    "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
+    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model",
+    "models", "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided",
+    "verify", "view", "width",
 ]  # fmt: skip

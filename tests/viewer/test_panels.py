@@ -15,16 +15,15 @@ import gonio as go
 import pytest
 from gonio.errors import InputError
 from gonio.viewer import page, server, stage
-from gonio.viewer.panels import Panel
 from live_server import get, wait_for
 
 import browser
 
 PYTHON = '''"""A panel that shows one number: the albedo seen from the middle of the picked ball."""
-from gonio.viewer.panels import Panel
+import gonio as go
 
 
-class Straight(Panel):
+class Straight(go.Panel):
     name = "straight"
 '''
 
@@ -68,15 +67,14 @@ def package(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def registered(package: Path) -> Iterator[type[Panel]]:
+def registered(package: Path) -> Iterator[type[go.Panel]]:
     """The class of the same file, registered by a program."""
     spec = importlib.util.spec_from_file_location("straight_panel", package / "straight_panel.py")
     assert spec and spec.loader
     module = sys.modules["straight_panel"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    Panel.family.add(module.Straight)
-    yield module.Straight
-    Panel.family.remove("straight")
+    yield go.register(module.Straight)
+    go.Panel.family.remove("straight")
     del sys.modules["straight_panel"]
 
 
@@ -109,7 +107,7 @@ def test_an_installed_package_brings_a_panel_into_an_exported_page(package: Path
     assert messages == []
 
 
-def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: type[Panel]) -> None:
+def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: type[go.Panel]) -> None:
     what = stage.of_models([go.Lambert(albedo=0.25)], [{"albedo"}])
     one = server.Server(server.Application(what, server.Door("127.0.0.1")), "127.0.0.1", 0, quiet=True)
     thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
@@ -142,7 +140,7 @@ def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: 
     ],
 )
 def test_a_panel_that_fails_is_told_and_the_page_lives(
-    registered: type[Panel], package: Path, tmp_path: Path, script: str, said: str
+    registered: type[go.Panel], package: Path, tmp_path: Path, script: str, said: str
 ) -> None:
     (package / "straight.js").write_text(script)
     file = page.export(stage.of_models([go.Lambert()]), tmp_path / "page.html")
@@ -154,7 +152,7 @@ def test_a_panel_that_fails_is_told_and_the_page_lives(
         assert tab.evaluate("gonio.frames") > 0
 
 
-def test_a_panel_without_its_script_is_a_clear_error(registered: type[Panel], package: Path) -> None:
+def test_a_panel_without_its_script_is_a_clear_error(registered: type[go.Panel], package: Path) -> None:
     (package / "straight.js").unlink()
     with pytest.raises(InputError, match=r"straight\.js.*cannot be read: No such file"):
         page.html(page.page_data(stage.of_models([go.Lambert()])))

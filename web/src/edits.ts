@@ -83,7 +83,17 @@ export function applyPreset(app: PageApp, slot: number, preset: Preset): void {
   app.store.update("slots", (state) => {
     const write = (index: number, chosen: Preset) => {
       const row = state.slots[index] as State["slots"][number];
-      row.values = { ...row.values, ...chosen.set };
+      const choices = { ...row.choices };
+      for (const [path, value] of Object.entries(chosen.set)) {
+        if (typeof value === "string" || typeof value === "boolean") choices[path] = value;
+        else if (perBall(row, path))
+          for (const ball of row.balls) {
+            ball.set = { ...ball.set, [path]: value };
+            ball.label = labelOf(ball.set);
+          }
+        else row.values = { ...row.values, [path]: value };
+      }
+      if (app.data.socket || app.shaders.find(row.material, choices)) row.choices = choices;
     };
     write(slot, preset);
     for (const other of others(app, slot)) {
@@ -93,14 +103,19 @@ export function applyPreset(app: PageApp, slot: number, preset: Preset): void {
   });
 }
 
-/** The preset whose values the row has now. */
+/** The preset whose values the row, or the selected ball of it, has now. */
 export function currentPreset(app: PageApp, slot: number, material: Material): string {
-  const values = app.valuesOf(slot, 0);
-  const close = (a: unknown, b: unknown) => {
-    const [x, y] = [[a].flat() as number[], [b].flat() as number[]];
-    return x.every((v, i) => Math.abs(v - (y[i] ?? (y[0] as number))) <= 1e-6 * Math.max(1, Math.abs(v)));
+  const values = app.valuesOf(slot, app.state.selection.slot === slot ? app.state.selection.ball : 0);
+  const same = (path: string, value: Value): boolean => {
+    if (typeof value === "string" || typeof value === "boolean") return currentChoice(app, slot, path) === value;
+    const [x, y] = [[value].flat(), [values[path]].flat() as number[]];
+    // A number stands for all where the other side has several.
+    return (x.length > y.length ? x : y).every((_, i) => {
+      const [a, b] = [x[i] ?? x[0], y[i] ?? y[0]] as [number, number];
+      return Math.abs(a - b) <= 1e-6 * Math.max(1, Math.abs(a));
+    });
   };
-  return material.presets.find((preset) => Object.entries(preset.set).every(([path, value]) => close(value, values[path])))?.name ?? "";
+  return material.presets.find((preset) => Object.entries(preset.set).every(([path, value]) => same(path, value)))?.name ?? "";
 }
 
 // ------------------------------------------------------------------ choices

@@ -279,8 +279,9 @@ def _series(bsdf: BSDF, fixed: set[str]) -> tuple[Ball, ...]:
     for path, parameter, value, _ in free:
         if parameter.kind == "float":
             return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, value))
-    for path, parameter, _, _ in free:
-        if parameter.kind == "spectrum" and parameter.high <= 1.0:
+    for path, parameter, _, owner in free:
+        named = any(parameter.name in preset.values for preset in owner.presets().values())  # colours to choose from
+        if parameter.kind == "spectrum" and parameter.high <= 1.0 and not named:
             return tuple(Ball(f"{path} {_short(v)}", {path: [v] * 3}) for v in (0.1, 0.3, 0.5, 0.7, 0.9))
     return (Ball(_title(bsdf)),)
 

@@ -24,6 +24,7 @@ from ..errors import GonioError
 from ..models import outside
 
 POLL_SECONDS = 0.03
+STOP_SECONDS = 5.0
 MISSING_POLLS = 10  # some editors delete a file and write it again: that long is no error
 
 Made = TypeVar("Made")
@@ -157,10 +158,10 @@ class Watch(Generic[Made]):
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread, after the run that it is in."""
+        """End the thread, after the run that it is in; a file that runs on and on is left behind."""
         self._ended.set()
         if self._thread.is_alive():
-            self._thread.join()
+            self._thread.join(STOP_SECONDS)
 
     def _work(self) -> None:
         before, quiet = self._code.stamps, 0

@@ -14,7 +14,7 @@ from ...members import Family, subclasses_of
 class Panel:
     """A tab of the page's dock, written outside of the page.
 
-        class Grazing(Panel):
+        class Grazing(go.Panel):
             name = "grazing"         # its code is grazing.js, in the folder of the file with this class
 
     The code calls `gonio.addPanel({id, title, mount(host, app), ...})`; web/src/panel.ts says what it may hold and what
