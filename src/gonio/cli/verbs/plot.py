@@ -48,6 +48,7 @@ def plot(
         print(plots.plot(model[0], output=output).path)
         return
     texts = made.texts(model)
-    names = dict.fromkeys(text.partition("(")[0] for text in texts)
+    # of FILE.py:CLASS the class
+    names = dict.fromkeys(text.partition("(")[0].rpartition(".py:")[2].lower() for text in texts)
     output = output or Path(f"{'-'.join(names)}-{kind}.png")
     print(plots.plot(*texts, kind=kind, angles=views, output=output).path)

@@ -1,0 +1,72 @@
+"""The tutorial's blocks and commands do what the page says; they run in the order in which they stand there."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shlex
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PAGE = Path(__file__).parents[2] / "docs/your-own-material.md"
+BLOCK = re.compile(r"^```(\w+) ?([\w.]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+EXIT = re.compile(r"exit code (\d)")
+
+
+def _with_methods(file: str, methods: str) -> str:
+    """The file, its one class having these members, in the place of those of the same name or at its end."""
+    members = {_name(node): node for node in ast.parse(textwrap.dedent(methods)).body}
+    lines = file.splitlines()
+    (cls,) = (node for node in ast.parse(file).body if isinstance(node, ast.ClassDef))
+    for node in reversed(cls.body):
+        if _name(node) in members:
+            del lines[min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))]) - 1 : node.end_lineno]
+    return "\n".join(lines) + "\n\n" + methods
+
+
+def _name(node: ast.stmt) -> str:
+    return str(node.targets[0].id) if isinstance(node, ast.Assign) else str(getattr(node, "name", ""))  # type: ignore[attr-defined]
+
+
+def _commands(console: str) -> Iterator[tuple[str, list[str]]]:
+    """Each command with the lines that stand below it."""
+    for part in re.split(r"^\$ ", console, flags=re.MULTILINE)[1:]:
+        command, *shown = part.strip().splitlines()
+        yield command, shown
+
+
+def _run(command: str, shown: list[str], folder: Path) -> None:
+    program, *arguments = shlex.split(command)
+    start = {"gonio": ["-m", "gonio.cli"], "python": []}[program]
+    environment = {**os.environ, "COLUMNS": "200", "GONIO_CACHE": str(folder / "cache")}
+    done = subprocess.run(
+        [sys.executable, *start, *arguments], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    output = done.stdout + done.stderr
+    expected = next((int(found[1]) for line in shown if (found := EXIT.fullmatch(line))), 0)
+    assert done.returncode == expected, f"{command}\n{output}"
+    for line in shown:
+        if not EXIT.fullmatch(line):
+            assert "".join(line.split()) in "".join(output.split()), f"{command}: no '{line}' in\n{output}"
+
+
+def test_the_tutorial_does_what_it_says(tmp_path: Path) -> None:
+    commands = 0
+    for language, name, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+        if language == "console":
+            for command, shown in _commands(text):
+                _run(command, shown, tmp_path)
+                commands += 1
+        elif name == "Ward":
+            file = tmp_path / "ward.py"
+            file.write_text(_with_methods(file.read_text(encoding="utf-8"), text), encoding="utf-8")
+        else:
+            (tmp_path / name).write_text(text, encoding="utf-8")
+    assert commands > 15
+    assert pytest.main(["-q", "-p", "no:cacheprovider", str(tmp_path / "test_ward.py")]) == 0
