@@ -297,6 +297,7 @@ assert_type(Cosine, type[Cosine])
 assert_type(Cosine.family.get("ggx"), go.NDF)
 laws: dict[str, go.Law] = go.Law.family.all()
 integrators: dict[str, type[go.Integrator]] = go.Integrator.family.all()
+panels: dict[str, type[go.Panel]] = go.Panel.family.all()
 
 # ---------------------------------------------------------------------- errors and settings
 
