@@ -20,7 +20,9 @@ Model = Annotated[
     Argument(metavar="MODEL", help="A material's name; see `gonio models`.", autocompletion=completion.materials),
 ]
 Parameters = Annotated[list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")]
-SceneFile = Annotated[Path, Argument(metavar="SCENE", help="A scene's folder or .json; or a Mitsuba .xml.")]
+SceneFile = Annotated[
+    Path, Argument(metavar="SCENE", help="A scene's folder or .json; a Mitsuba .xml; or a material, shown on a ball.")
+]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
 Code = Annotated[bool, Option("--allow-code", help="Let the scene run Python files that it names as materials.")]
@@ -78,16 +80,30 @@ class Rendering:
     allow_code: Code = False
 
     def request(self, scene: Path, output: Path | None = None, timeout: float | None = None) -> Request:
-        """The request to render a scene. Raises InputError for a size or an exposure that is none."""
+        """The request to render a scene, or a material that is named in its place, on a ball. Raises InputError for a
+        size or an exposure that is none."""
         from ..render import exposures, run
 
+        material = _material_in_place_of(scene)
         return run.Request(
-            scene,
+            Path(material.name) if material else scene,
             output,
             timeout=timeout,
             **vars(self)
             | {
                 "size": None if self.size is None else run.parse_size(self.size),
                 "exposure": exposures.parse(self.exposure),
+                "material": material,
             },
         )
+
+
+def _material_in_place_of(scene: Path) -> BSDF | None:
+    """The material of "ward.py:Ward" or "conductor(preset=Au)", where no file has that name."""
+    from ..models import models, notation, outside
+
+    text = str(scene)
+    head = text.partition("(")[0]
+    if scene.exists() or not (outside.names_code(head) or head.replace("_", "-") in models()):
+        return None
+    return notation.named(text)[0]

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 from .._callable import make_callable
 
 if TYPE_CHECKING:
+    from ..models import BSDF
     from .exposures import RGB, Exposure
 
 
 def render(
-    scene: str | Path,
+    scene: str | Path | BSDF,
     *,
     output: str | Path | None = None,
     spp: int | None = None,
@@ -31,11 +32,12 @@ def render(
     allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
 ) -> RGB:
-    """Render a scene file; the picture, (height, width, 3) float32, linear radiance, row 0 on top.
+    """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
         picture = go.render("examples/phong", spp=64, overrides={"shapes.1.material.p": 16})
 
-    scene          the lab's folder or .json, or a Mitsuba .xml; what is None below is as it says
+    scene          the lab's folder or .json, a Mitsuba .xml, or a material, which is shown on a ball; what is None
+                   below is as the scene says
     output         file to write, .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
@@ -50,16 +52,17 @@ def render(
     exposure       of a .png: stops, or "auto" for one chosen by the picture's luminance
     allow_outside  let the scene read files outside its folder
     allow_code     let the scene name materials in Python files, "ward.py:Ward", which then run
-    overrides      values by their path in the scene, as `gonio study` varies them
+    overrides      values by their path in the scene, as `gonio study` varies them; materials too
     Warns (GonioWarning) of odd scenes and of a .png that clips. Raises InputError, MachineError.
     """
     import warnings
 
     from ..errors import GonioWarning
+    from ..models import BSDF
     from . import images, run
 
     request = run.Request(
-        Path(scene),
+        Path(scene.name) if isinstance(scene, BSDF) else Path(scene),
         output=None if output is None else Path(output),
         spp=spp,
         size=size,
@@ -75,6 +78,7 @@ def render(
         allow_outside=allow_outside,
         allow_code=allow_code,
         overrides=overrides or {},
+        material=scene if isinstance(scene, BSDF) else None,
     )
     prepared = run.prepare(request)
     width, height = prepared.size

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
+from ..models import BSDF
 from . import denoise, exposures, images
 
 # Per pixel: 9 sums in float64, twice (before and after a pass), lane order, picture as float64 and float32, the
@@ -20,7 +21,7 @@ BYTES_PER_PIXEL = 250
 class Request:
     """What to render and how; None means: as the scene says."""
 
-    scene: Path
+    scene: Path  # of a material alone, its name
     output: Path | None = None
     spp: int | None = None
     size: tuple[int, int] | None = None
@@ -36,6 +37,7 @@ class Request:
     allow_outside: bool = False
     allow_code: bool = False
     overrides: Mapping[str, object] = field(default_factory=dict)
+    material: BSDF | None = None  # to be shown on a ball, in place of a scene
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""

@@ -58,10 +58,10 @@ class Result:
 def prepare(request: Request) -> Prepared:
     """Read the scene, start Mitsuba, make the render; raises InputError or MachineError."""
     request.check()
-    if not request.scene.exists():
+    if request.material is None and not request.scene.exists():
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, threads=request.threads)
-    if request.scene.suffix.lower() == ".xml" and request.scene.is_file():
+    if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
         return _prepare_mitsuba(request, mi)
     return _prepare_lab(request, mi)
 
@@ -80,12 +80,15 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     overrides: dict[str, object] = dict(request.overrides)
     if request.size is not None:
         overrides["/camera/film/size"] = [*request.size]
-    description = scene.read(
-        request.scene,
-        allow_outside=request.allow_outside,
-        allow_code=request.allow_code,
-        overrides=overrides,
-    )
+    if request.material is not None:
+        description = scene.of_material(request.material, overrides)
+    else:
+        description = scene.read(
+            request.scene,
+            allow_outside=request.allow_outside,
+            allow_code=request.allow_code,
+            overrides=overrides,
+        )
     of_scene = integrators.Settings(
         integrator=description.integrator.type,
         max_depth=description.integrator.max_depth or integrators.Settings.max_depth,

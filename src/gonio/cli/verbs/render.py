@@ -28,7 +28,7 @@ def render(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Render a scene to a picture.
+    """Render a scene, or a material on a ball, to a picture.
 
     Without -o the picture gets the name that the scene gives it, in the current folder.
     Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once.
@@ -38,6 +38,7 @@ def render(
       gonio render examples/phong
       gonio render examples/phong -o phong.exr --spp 256 --size 640x480
       gonio render examples/phong -o phong.png --exposure auto
+      gonio render ward.py:Ward -o ward.png
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
     from ...render import run

@@ -7,8 +7,9 @@ mitsuba_scene = scene.build(description, engine.load())
 
 from __future__ import annotations
 
+from .ball import of_material
 from .build import build
 from .reader import read
 from .schema import SceneDescription, json_schema
 
-__all__ = ["SceneDescription", "build", "json_schema", "read"]
+__all__ = ["SceneDescription", "build", "json_schema", "of_material", "read"]

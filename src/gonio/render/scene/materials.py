@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, Union
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     Discriminator,
@@ -302,10 +303,27 @@ def part_of(name: str) -> type[MaterialPart] | None:
     return None if model is None else _own_part(name, model)
 
 
+def described(material: BSDF) -> MaterialPart:
+    """A material that a program holds, as a scene has it."""
+    cls: Any = type(material)
+    name = f"gonio-{material.name}"
+    part = BY_TYPE[name] if name in BY_TYPE and BY_TYPE[name].model is cls else _own_part(material.name, cls)
+    fields: dict[str, Any] = {"type": name if part.model.__module__.startswith("gonio.") else material.name}
+    for key, parameter in part.declared.items():
+        value = getattr(material, parameter.name)
+        if parameter.inner:
+            fields[key] = described(value)
+        elif value is not None:
+            fields[key] = np.asarray(value).tolist() if parameter.numeric else value
+    return part.model_validate(fields)
+
+
 def _tag(value: object) -> str | None:
-    name = value.get("type") if isinstance(value, dict) else getattr(value, "type", None)
+    if not isinstance(value, dict):
+        return value.type if isinstance(value, MaterialPart) and type(value) is BY_TYPE.get(value.type) else OWN
+    name = value.get("type")
     if not isinstance(name, str):
-        return OWN if not isinstance(value, dict) or name is not None else None
+        return None if name is None else OWN
     own = name not in BY_TYPE and (outside.names_code(name) or part_of(name) is not None)
     return OWN if own else name
 

@@ -12,8 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...errors import InputError, did_you_mean
+from ...models import BSDF
 from ..types import Json
-from .materials import part_of
+from .materials import described, part_of
 
 
 def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
@@ -26,6 +27,8 @@ def _plain(value: object, path: str) -> Json:
     """The value as a scene file would hold it: tuples and arrays are lists."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item, path) for key, item in value.items()}
+    if isinstance(value, BSDF):
+        return described(value)  # type: ignore[return-value]  # validation lets it through as it is
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
