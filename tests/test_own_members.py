@@ -144,6 +144,9 @@ def scene(material: dict) -> dict:
         "bake ward.py:OwnWard --size 4 -o tables",
         "bake facets.py:Flat --size 4 --lut E -o tables",
         "explain ward.py:OwnWard",
+        "render ward.py:OwnWard --spp 1 --size 16x16 -o w.exr",
+        "render mix(a=ward.py:OwnWard,b=mirror) --spp 1 --size 16x16 -o m.exr",
+        "compensation ward.py:OwnWard --walks 1000",
         "view ward.py:OwnWard --export w.html",
         "view kulla-conty(base=conductor(ndf=facets.py:Flat)) --export k.html",
         "emit conductor(preset=Au,masking=facets.py:Open,fresnel=facets.py:Steep)",
@@ -187,6 +190,16 @@ def test_what_is_registered_is_known_by_name_everywhere(here: Path) -> None:
     assert go.plot("own-ward", kind="slice") is not None
     compensated = go.KullaConty(go.OwnWard(kd=0.2))
     assert np.all(compensated.eval([[0, 0.6, 0.8]], [[0.0, 0.0, 1.0]]) > 0)
+
+
+def test_a_program_renders_materials_and_sets_them_in_scenes(here: Path) -> None:
+    (here / "scene.json").write_text(json.dumps(scene({"type": "matte"})))
+    grey = go.render(here / "scene.json")
+    same = go.render(here / "scene.json", overrides={"shapes.0.material": go.Lambert(0.5)})
+    np.testing.assert_array_equal(same, grey)
+    gold = go.KullaConty(go.Conductor.preset("Au", alpha=(0.1, 0.4)))
+    assert not np.array_equal(go.render(here / "scene.json", overrides={"shapes.*.material": gold}), grey)
+    assert go.render(gold, size=(16, 16), spp=1).shape == (16, 16, 3)
 
 
 def test_a_name_of_gonios_own_is_not_taken(here: Path) -> None:

@@ -65,8 +65,8 @@ def test_materials_of_ones_own_are_compared(tmp_path, monkeypatch, capsys):
     assert found["albedo"]["gold"]["half"] == found["albedo"]["gold"]["kulla-conty bounce"]
     assert found["albedo"]["worn"]["plain"] == found["albedo"]["copper"]["plain"]
     assert found["reciprocity"]["half"] < 1e-6 and (tmp_path / "figures/compensation.png").is_file()
-    assert cli.run(["compensation", "lambert"]) == 2
-    assert "neither a base to compensate" in capsys.readouterr().err
+    assert cli.run(["compensation", "mirror"]) == 2
+    assert "Mirror has a perfectly specular part" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gonio as go
 import numpy as np
+import pytest
+from gonio.models import binding
 from gonio.ops import backend
 
 from sphere import random_directions
@@ -20,3 +22,24 @@ def test_a_changed_width_compiles_no_kernel() -> None:
             compiled.append(sum(not k["cache_hit"] for k in dr.kernel_history([dr.KernelType.JIT])))
             assert np.isfinite(value).all()
     assert sum(compiled[1:]) == 0, compiled
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        go.KullaConty(go.Conductor.preset("Au", alpha=0.3)),
+        go.KullaConty(go.Conductor.preset("Au", alpha=(0.1, 0.3))),
+        go.KullaConty(go.Dielectric(1.5, 0.3)),
+        go.Turquin(go.Conductor.preset("Au", alpha=0.3)),
+        go.FdezAguera(go.Conductor.preset("Au", alpha=0.3)),
+    ],
+    ids=["metal", "two widths", "glass", "turquin", "fdez-aguera"],
+)
+def test_what_parameters_derive_is_computed_once_and_is_no_part_of_a_kernel(material: go.BSDF) -> None:
+    dr = backend.drjit()
+    types = backend.types("float32")
+    arrays = list(binding._arrays(material.bind(types).derived))
+    assert arrays and all(
+        part.state == dr.VarState.Evaluated for a in arrays for part in (a if dr.is_vector_v(a) else [a])
+    )
+    assert material.bind(types).derived is material.bind(types).derived

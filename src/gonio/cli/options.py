@@ -13,6 +13,7 @@ from typer import Argument, Option
 from . import completion
 
 if TYPE_CHECKING:
+    from ..models import BSDF
     from ..render.run import Request
 
 Model = Annotated[

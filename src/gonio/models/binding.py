@@ -70,8 +70,17 @@ def settled(material: Material) -> object:
     if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) != 1 or dr.grad_enabled(v) for v in values(material)):
         return None
     derived = material.derive()
-    dr.make_opaque(derived)
+    dr.make_opaque(*_arrays(derived))  # one by one: given a tuple with names in it, Dr.Jit evaluates nothing
     return derived
+
+
+def _arrays(value: object) -> Iterator[Any]:
+    """The Dr.Jit values in a structure of tuples."""
+    if backend.is_drjit(value):
+        yield value
+    elif isinstance(value, tuple):
+        for part in value:
+            yield from _arrays(part)
 
 
 def values(material: Material) -> Iterator[Scalar | Vector]:

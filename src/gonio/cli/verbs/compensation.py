@@ -20,7 +20,7 @@ def compensation(
         list[str] | None,
         Argument(
             metavar="[MODEL]...",
-            help="Materials to compare too: one with a base as a method, a rough surface as a base.",
+            help="Materials to compare too: one with a base as a method, any other as a base.",
             autocompletion=completion.materials,
         ),
     ] = None,
@@ -35,6 +35,8 @@ def compensation(
       gonio compensation -o comparison
       gonio compensation mine.py:Compensation
     """
+    import numpy as np
+
     from ...energy.compensation import comparison
     from ...models import notation
 
@@ -59,3 +61,6 @@ def compensation(
         furnace = f"{found['furnace']['white'].get(method, 0.0):.0e}"
         table.add_row(method, *rms, furnace, broken, f"{found['cost'][method]:.2f}")
     print_rich(table)
+    for name in (n for n in names if not found["rms"][n]):
+        means = (f"{method} {np.mean(values):.4f}" for method, values in found["albedo"][name].items())
+        print(f"{name}: albedo, the mean over roughness and angle: {', '.join(means)}")

@@ -47,28 +47,32 @@ BASES: dict[str, Base] = {
 
 
 def _with(own: Sequence[BSDF]) -> tuple[dict[str, Method], dict[str, Base]]:
-    """The methods and bases, and the user's own: what has a base is a method, a rough surface is a base."""
+    """The methods and bases, and the user's own: what has a base is a method, anything else is a base."""
     methods, bases = dict(METHODS), dict(BASES)
     for material in own:
         if "base" in tree.children(material):
             methods[material.name] = functools.partial(_under, material)
-        elif material.microsurface is not None and "alpha" in material.parameters():
-            bases[material.name] = functools.partial(_of_width, material)
         else:
-            what = f"{material.name} has neither a base to compensate, nor is it a rough surface to be compensated"
-            raise InputError(what, "compensation", "name a material with the parameter base, or with a microsurface")
+            KullaConty(material)  # raises where it cannot be compensated at all
+            bases[material.name] = functools.partial(_of_width, material)
     return methods, bases
 
 
 def _under(method: BSDF, base: BSDF) -> BSDF | None:
-    try:
-        return tree.replace(method, {"base": base})
-    except InputError:  # it does not take this one
-        return None
+    return tree.replace(method, {"base": base})
 
 
 def _of_width(material: BSDF, alpha: float) -> BSDF:
-    return tree.replace(material, {"alpha": alpha})
+    """The material at a width; as it stands where it has none."""
+    return tree.replace(material, {"alpha": alpha}) if "alpha" in material.parameters() else material
+
+
+def _taken(method: Method, base: BSDF) -> BSDF | None:
+    """The base under a method, None where the method does not take it."""
+    try:
+        return method(base)
+    except InputError:
+        return None
 
 
 def compare(
@@ -81,7 +85,8 @@ def compare(
 ) -> dict[str, Any]:
     """Albedos of every base under every method over roughness x mu, and what follows from them.
 
-    own  materials of the user's: one with a base is compared as a method, another as a base
+    own  materials of the user's: one with a base is compared as a method, another as a base; without microfacets it
+         has no random walk to be compared with
 
     Returns a dict that JSON can hold: axes; `albedo` [material][method] (roughness, mu, 3); `rms` to the walk;
     `furnace`, the largest |1 - albedo| of what should be 1; `reciprocity`, the largest relative breach on gold;
@@ -97,9 +102,10 @@ def compare(
             rows: list[Any] = []
             for r in roughness:
                 base = base_of(r * r)
-                if method == "random walk":
+                model = _taken(under, base)
+                if model is not None and method == "random walk":
                     rows.append([walk.albedo(base, float(m), walks, seed)[0] for m in mu])
-                elif (model := under(base)) is not None:
+                elif model is not None:
                     rows.append(albedo(model, mu).value)
             if rows:
                 found[name][method] = np.array(rows)
@@ -107,7 +113,7 @@ def compare(
         name: {
             method: float(np.sqrt(np.mean((values - by_method["random walk"]) ** 2)))
             for method, values in by_method.items()
-            if method != "random walk"
+            if method != "random walk" and "random walk" in by_method
         }
         for name, by_method in found.items()
     }
