@@ -74,7 +74,7 @@ def settled(material: Material) -> object:
     return derived
 
 
-def _arrays(value: object) -> Iterator[Any]:
+def _arrays(value: object) -> Iterator[object]:
     """The Dr.Jit values in a structure of tuples."""
     if backend.is_drjit(value):
         yield value
