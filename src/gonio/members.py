@@ -50,6 +50,7 @@ class Family(Generic[Member]):
         self._folders, self._member = folders, member
         self._found: dict[str, Member] | None = None
         self._added: dict[str, Member] = {}
+        self._watchers: dict[Callable[[str, Member], None], None] = {}
 
     def all(self) -> dict[str, Member]:
         """Every member by name, in alphabetical order."""
@@ -87,7 +88,13 @@ class Family(Generic[Member]):
             what = f"the {self.kind} '{name}' is there already, in {_source(standing)[0]}"
             raise InputError(what, where, "give yours another name")
         self._added[name] = member
+        for watcher in self._watchers:
+            watcher(name, member)
         return name
+
+    def watch(self, watcher: Callable[[str, Member], None]) -> None:
+        """Call `watcher(name, member)` for every member that is added from now on; the same one only once."""
+        self._watchers[watcher] = None
 
     def remove(self, name: str) -> None:
         """Take back what `add` added."""

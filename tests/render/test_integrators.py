@@ -343,10 +343,11 @@ def test_ambient_light_changes_nothing_where_no_material_takes_it() -> None:
     assert np.array_equal(picture(scene, 4), picture(scene, 4, ambient=(1.0, 1.0, 1.0)))
 
 
-def test_a_spectral_scene_has_the_colours_of_mitsubas() -> None:
+@pytest.mark.parametrize("lamp", ["area", "two areas"])
+def test_a_spectral_scene_has_the_colours_of_mitsubas(lamp: str) -> None:
     try:
         mi.set_variant("llvm_ad_spectral")
-        scene = mi.load_dict(scene_dict(size=8))
+        scene = mi.load_dict(scene_dict(size=8, lamp=LAMPS[lamp]))
         theirs = np.array(mi.render(scene, integrator=mi.load_dict({"type": "path", "max_depth": 3}), spp=4096))
         ours = picture(scene, 4096, max_depth=3)
     finally:

@@ -130,5 +130,5 @@ def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_p
     picture = images.read(tmp_path / "sky.exr")
     assert np.all(picture.pixels == 1.0) and picture.metadata["integrator"] == "occlusion"
     choices = json.loads(gonio("schema").stdout)["$defs"]["Integrator"]["properties"]["type"]["oneOf"]
-    title = "The share of the sky that a surface sees, weighted by the cosine."
+    title = "The share of the sky that a surface sees, weighted by the cosine"
     assert {"const": "occlusion", "description": title} in choices

@@ -1,7 +1,8 @@
 """Refractive indices by name, each with its source.
 
 Metals: n and k at 650, 550 and 450 nm, standing for red, green and blue. Three wavelengths are not a spectrum: the
-colour is close to, not equal to, that of the full spectrum under daylight.
+colour is close to, not equal to, that of the full spectrum under daylight. Those of silver, gold and copper are the fit
+of Brendel and Bormann's model in Rakic1998.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ class Medium(NamedTuple):
 
 _PALIK = "Palik1998"
 METALS = {
-    "Ag": Metal("silver", (0.15943, 0.14512, 0.13547), (3.9291, 3.1900, 2.3808), "Johnson1972"),
+    "Ag": Metal("silver", (0.15943, 0.14512, 0.13547), (3.9291, 3.1900, 2.3808), "Rakic1998"),
     "Al": Metal("aluminium", (1.6574, 0.88037, 0.52123), (9.2239, 6.2695, 4.8370), "McPeak2015"),
-    "Au": Metal("gold", (0.18299, 0.42108, 1.3734), (3.4242, 2.3459, 1.7704), "Johnson1972"),
+    "Au": Metal("gold", (0.18299, 0.42108, 1.3734), (3.4242, 2.3459, 1.7704), "Rakic1998"),
     "Cr": Metal("chromium", (3.1071, 3.1812, 2.3230), (3.3314, 3.3291, 3.1350), "Johnson1974"),
-    "Cu": Metal("copper", (0.27105, 0.67693, 1.3164), (3.6092, 2.6248, 2.2921), "Johnson1972"),
+    "Cu": Metal("copper", (0.27105, 0.67693, 1.3164), (3.6092, 2.6248, 2.2921), "Rakic1998"),
     "Fe": Metal("iron", (2.9114, 2.9497, 2.5845), (3.0893, 2.9318, 2.7670), "Johnson1974"),
     "Hg": Metal("mercury", (2.0733, 1.5523, 1.0606), (5.3383, 4.6510, 3.8628), "Inagaki1981"),
     "Ni": Metal("nickel", (2.0140, 1.7724, 1.6288), (3.8079, 3.2526, 2.6540), _PALIK),

@@ -1,140 +1,66 @@
-"""Any of Mitsuba's BSDFs, built in or of a user's plugin, under Gonio's protocol.
+"""Mitsuba's BSDFs by name, by dictionary, or from files, as materials.
 
     rough = foreign.load({"type": "roughplastic", "alpha": 0.2})
     rough.eval(wo, wi)
+    rougher = tree.replace(rough, {"alpha": 0.4})
 
-Mitsuba's `wi` is Gonio's `wo`, and the other way round; its BSDFs see a surface interaction whose shading frame is the
-local frame, at uv = (0.5, 0.5). Values are float32: the wheel has no 64-bit variant.
+Numbers and albedos among a plugin's properties are the material's parameters.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from types import ModuleType
+from typing import ClassVar
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import Breach, Parameter, Sample
-from ..models.parameters import ColourParameter, NumberParameter
-from ..ops import backend
+from ..models import number, spectrum
 from . import adapter, engine
+from .native import Native
+from .types import MitsubaBSDF, OfVariant, PluginDict
 
 # Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are read from the plugin as they are
 ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")
 
 
-class ForeignBSDF:
-    """A Mitsuba BSDF that answers as a Gonio material does: NumPy rows or Dr.Jit vectors in, the same kind out."""
+class _Described(Native):
+    """A BSDF that is built from a dictionary, and built anew where a parameter changes."""
 
-    precisions: ClassVar[tuple[str, ...]] = ("float32",)
-    stochastic = False
-    lossless = None
+    description: ClassVar[PluginDict] = {}
 
-    def __init__(self, description: dict[str, Any] | None, bsdf: Any) -> None:
-        import mitsuba as mi
-
-        self.description, self.bsdf, self._mi = description, bsdf, mi
-        flags, kinds = int(bsdf.flags()), mi.BSDFFlags
-        self.transmits = bool(flags & (int(kinds.Transmission) | int(kinds.Null)))
-        self.isotropic = not flags & int(kinds.Anisotropic)
-        smooth, ideal = bool(flags & int(kinds.Smooth)), bool(flags & (int(kinds.Delta) | int(kinds.Null)))
-        self.delta = "maybe" if smooth and ideal else "always" if ideal else "never"
-
-    def parameters(self) -> dict[str, Parameter]:
-        """Numbers and albedos among the plugin's properties, as Gonio declares them; those that `replace` can set."""
-        if self.description is None:
-            return {}
-        found: dict[str, Parameter] = {}
-        for name, value in self.description.items():
-            if isinstance(value, int | float) and not isinstance(value, bool):
-                kind = ColourParameter if name in ALBEDOS else NumberParameter
-                # widths of 0 are refused or are another plugin
-                low, high = (0.0, 1.0) if name in ALBEDOS or name.startswith("alpha") else (-np.inf, np.inf)
-                found[name] = kind(name, value, "a property of the plugin", low, high)
-        for name in _declared(self.bsdf, self._mi):
-            if name not in found and name in ALBEDOS:
-                found[name] = ColourParameter(name, 0.5, "a property of the plugin", 0.0, 1.0)
-        return found
-
-    def replace(self, **values: Any) -> ForeignBSDF:
-        """The plugin built anew with other properties."""
-        if self.description is None:
-            raise InputError("a BSDF that was read from a file cannot be changed", "mitsuba")
-        changed = dict(self.description)
-        for name, value in values.items():
-            if name in ALBEDOS:
-                color = [float(c) for c in np.broadcast_to(np.asarray(value, float), 3)]
-                changed[name] = {"type": "rgb", "value": color}
-            else:
-                changed[name] = value
-        return load(changed)
-
-    def white(self) -> ForeignBSDF:
-        """The plugin with every albedo 1; itself where it has none."""
-        albedos = [name for name in self.parameters() if name in ALBEDOS]
-        return self.replace(**dict.fromkeys(albedos, 1.0)) if albedos else self
-
-    def breaches(self) -> dict[str, Breach]:
-        return {}
-
-    # ------------------------------------------------------------------ the protocol
-
-    def eval(self, wo: Any, wi: Any, mode: str = "radiance", precision: str | None = None) -> Any:
-        """f |cos theta_i|; rows (N, 3) give (N, channels)."""
-        a, b, count = self._both(wo, wi)
-        value = self.bsdf.eval(self._context(mode), self._at(a), self._mi.Vector3f(b), True)
-        return value if count is None else backend.to_numpy(value, count)
-
-    def pdf(self, wo: Any, wi: Any, precision: str | None = None) -> Any:
-        """Density of `sample`."""
-        a, b, count = self._both(wo, wi)
-        value = self.bsdf.pdf(self._context("radiance"), self._at(a), self._mi.Vector3f(b), True)
-        return value if count is None else backend.to_numpy(value, count)
-
-    def sample(self, wo: Any, u: Any, mode: str = "radiance", precision: str | None = None) -> Sample:
-        """A direction; null interactions, which go straight on, count as delta lobes."""
-        a, b, count = self._both(wo, u)
-        mi = self._mi
-        bs, weight = self.bsdf.sample(self._context(mode), self._at(a), b[0], mi.Point2f(b[1], b[2]), True)
-        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta) | mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
-        # Mitsuba tells of a failed sample by its weight, 0, and leaves any pdf: so reads its own chi-square test
-        import drjit as dr
-
-        failed = dr.all(weight == 0.0)
-        found = Sample(bs.wo, weight, dr.select(failed, 0.0, bs.pdf), delta & ~failed, bs.eta)
-        return found if count is None else type(found)._make(backend.to_numpy(value, count) for value in found)
-
-    def _context(self, mode: str) -> Any:
-        modes = self._mi.TransportMode
-        return self._mi.BSDFContext(modes.Radiance if mode == "radiance" else modes.Importance)
-
-    def _at(self, wo: Any) -> Any:
-        import drjit as dr
-
-        mi = self._mi
-        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wo))
-        si.wi = mi.Vector3f(wo)
-        si.t = 1.0
-        si.n = mi.Normal3f(0.0, 0.0, 1.0)
-        si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
-        si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
-        si.uv = mi.Point2f(0.5, 0.5)
-        # a BSDF that knows it is lit on a visible surface (`null`, `mask`) asks whether there is one
-        si.prim_index = mi.UInt32(0)
-        return si
-
-    def _both(self, a: Any, b: Any) -> tuple[Any, Any, int | None]:
-        if backend.is_drjit(a):
-            return a, b, None
-        kind = backend.types("float32")
-        rows = [np.asarray(v, float) for v in (a, b)]
-        count = max(len(v) if v.ndim == 2 else 1 for v in rows)
-        return backend.vector_of(rows[0], 3, kind), backend.vector_of(rows[1], 3, kind), count
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        changed = {}
+        for name, parameter in self.parameters().items():
+            value = np.asarray(getattr(self, name), float)
+            if value.ndim > (name in ALBEDOS):
+                raise InputError(f"{len(value)} rows given, one value expected", name, "a plugin holds no arrays")
+            if not np.array_equal(value, np.asarray(parameter.default)):
+                rgb = {"type": "rgb", "value": np.broadcast_to(value, 3).tolist()}
+                changed[name] = rgb if name in ALBEDOS else float(value)
+        object.__setattr__(self, "bsdf", _built({**self.description, **changed}))
 
 
-def load(description: dict[str, Any]) -> ForeignBSDF:
+def load(description: PluginDict) -> Native:
     """The BSDF of a dictionary as `mi.load_dict` takes it; InputError where Mitsuba refuses it."""
+    kind = str(description.get("type", ""))
+    fields: dict[str, OfVariant] = {}
+    for name, value in {**_colours(_built(description)), **description}.items():
+        if isinstance(value, int | float | tuple) and not isinstance(value, bool):
+            if name in ALBEDOS:
+                fields[name] = spectrum(value, "a property of the plugin", low=0.0, high=1.0)
+            else:  # widths of 0 are refused or are another plugin
+                low, high = (0.0, 1.0) if name.startswith("alpha") else (-np.inf, np.inf)
+                fields[name] = number(value, "a property of the plugin", low=low, high=high)
+    space = {**fields, "description": description, "__annotations__": dict.fromkeys(fields, "object")}
+    return type(f"Mitsuba{kind.title()}", (_Described,), space)()
+
+
+def _built(description: PluginDict) -> MitsubaBSDF:
+    """The plugin itself."""
     mi = _mitsuba()
     kind = str(description.get("type", ""))
     try:
@@ -143,10 +69,23 @@ def load(description: dict[str, Any]) -> ForeignBSDF:
         raise _refused(error, kind) from None
     if not isinstance(bsdf, mi.BSDF):
         raise InputError(f"'{kind}' is a {type(bsdf).__name__}, a BSDF expected", f"mitsuba:{kind}")
-    return ForeignBSDF(description, bsdf)
+    return bsdf
 
 
-def load_file(path: Path) -> ForeignBSDF:
+def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
+    """The albedos that a plugin holds as one number or colour each."""
+    import mitsuba as mi
+
+    held = mi.traverse(bsdf)
+    found = {}
+    for name in ALBEDOS:
+        if f"{name}.value" in held:
+            values = np.asarray(held[f"{name}.value"], float).ravel()
+            found[name] = float(values[0]) if values.size == 1 else tuple(map(float, values))
+    return found
+
+
+def load_file(path: Path) -> Native:
     """The BSDF of a Mitsuba XML file: its root, or the first in a scene."""
     mi = _mitsuba()
     try:
@@ -154,11 +93,11 @@ def load_file(path: Path) -> ForeignBSDF:
     except Exception as error:
         raise _refused(error, path.name) from None
     if isinstance(found, mi.BSDF):
-        return ForeignBSDF(None, found)
+        return Native(found)
     if isinstance(found, mi.Scene):
         for shape in found.shapes():
             if shape.bsdf() is not None:
-                return ForeignBSDF(None, shape.bsdf())
+                return Native(shape.bsdf())
     raise InputError("no BSDF in this file", str(path), "give a file whose root is <bsdf>, or a scene with one")
 
 
@@ -169,7 +108,7 @@ def plugins() -> list[str]:
 
 # Mitsuba does not tell a plugin's kind without building it; what each needs to be built is written down here
 _DIFFUSE = {"type": "diffuse"}
-_NESTS: dict[str, dict[str, Any]] = {
+_NESTS: dict[str, PluginDict] = {
     "blendbsdf": {"weight": 0.5, "a": _DIFFUSE, "b": {"type": "roughconductor"}},
     "bumpmap": {"bsdf": _DIFFUSE},
     "circular": {},
@@ -196,9 +135,9 @@ _NESTS: dict[str, dict[str, Any]] = {
 }
 
 
-def plugin(name: str, properties: dict[str, Any]) -> ForeignBSDF:
+def plugin(name: str, properties: Mapping[str, object]) -> Native:
     """A plugin by name with the properties given; BSDFs of BSDFs get plain ones inside."""
-    more: dict[str, Any] = {}
+    more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
         ramp = np.linspace(0.0, 0.2, 16, dtype=np.float32)
         heights = _mitsuba().Bitmap(np.ascontiguousarray(np.broadcast_to(ramp, (16, 16))[..., None]))
@@ -206,14 +145,7 @@ def plugin(name: str, properties: dict[str, Any]) -> ForeignBSDF:
     return load({"type": name, **_NESTS.get(name, {}), **more, **properties})
 
 
-def _declared(bsdf: Any, mi: Any) -> list[str]:
-    try:
-        return [str(key).split(".")[0] for key in mi.traverse(bsdf).keys()]  # noqa: SIM118
-    except Exception:
-        return []
-
-
-def _mitsuba() -> Any:
+def _mitsuba() -> ModuleType:
     mi = engine.load()
     if not mi.variant().startswith("llvm_"):
         raise InputError(f"variant {mi.variant()} is set, an LLVM one expected", "mitsuba", "verify in another process")

@@ -311,7 +311,7 @@ class Lights:
             spread = mi.Point3f(*(fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
             it.p = mi.Point3f(box.min) + spread * mi.Vector3f(box.extents())
         if mi.is_spectral:
-            it.wavelengths = mi.Wavelength(550)
+            it.wavelengths = type(it.wavelengths)(550)
         sample = mi.Point2f(fraction(mi.Float(index) * 0.7548777), fraction(mi.Float(index) * 0.5698403))
         flux = []
         for emitter in self.emitters:

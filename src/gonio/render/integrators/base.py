@@ -98,11 +98,6 @@ class Integrator:
         self.width = dr.opaque(mi.UInt32, int(size[0]))
         self.inverse_size = (dr.opaque(mi.Float, 1 / size[0]), dr.opaque(mi.Float, 1 / size[1]))
 
-    @classmethod
-    def title(cls) -> str:
-        """What it shows, in a line."""
-        return (cls.__doc__ or cls.__name__).strip().splitlines()[0]
-
     # ------------------------------------------------------------------ what a subclass writes, one of these two
 
     def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Colour:

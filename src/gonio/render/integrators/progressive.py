@@ -39,6 +39,10 @@ class Render:
 
     def __init__(self, scene: Scene, settings: Settings, sensor: Sensor | None = None, aovs: bool = False):
         self.mi = mi = engine.load()
+        if mi.is_polarized:
+            raise InputError(
+                f"variant {mi.variant()} is polarized", "Render", "take one that is not, or Mitsuba's own path"
+            )
         self.scene, self.settings, self.aovs = scene, settings, aovs
         if sensor is None and not scene.sensors():
             raise InputError("the scene has no camera", "scene.sensors()", "add a sensor, or pass one")

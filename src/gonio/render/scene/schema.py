@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from ...errors import InputError, did_you_mean
+from ...members import Family
 from ..images import SUFFIXES
 from ..request import check_film
 from ..types import Json
@@ -162,19 +163,19 @@ class Camera(Part):
         return self
 
 
-def integrators() -> dict[str, type[program.Integrator]]:
-    """The integrators by name, those of other packages too."""
+def integrators() -> Family[type[program.Integrator]]:
+    """The integrators, those of other packages too."""
     from ..integrators import Integrator
 
-    return Integrator.family.all()
+    return Integrator.family
 
 
 def _list_integrators(schema: dict[str, Any]) -> None:
     """The names in the JSON Schema, each with what it shows, and which of them need a depth."""
-    known = integrators()
-    names = [{"const": name, "description": member.title()} for name, member in known.items()]
+    family = integrators()
+    names = [{"const": name, "description": title} for name, title in family.titles().items()]
     schema["properties"]["type"] = {"oneOf": names, "title": "Type"}
-    deep = {"properties": {"type": {"enum": [name for name, member in known.items() if member.takes_depth]}}}
+    deep = {"properties": {"type": {"enum": [name for name, member in family.all().items() if member.takes_depth]}}}
     schema |= {"if": deep, "then": {"required": ["maxDepth"]}, "else": {"properties": {"maxDepth": False}}}
 
 
@@ -189,7 +190,7 @@ class Integrator(Part):
 
     @model_validator(mode="after")
     def _known_type(self) -> Integrator:
-        known = integrators()
+        known = integrators().all()
         if self.type not in known:
             raise invalid(f"unknown type '{self.type}'", did_you_mean(self.type, list(known)), "type")
         if known[self.type].takes_depth and self.max_depth is None:

@@ -27,7 +27,7 @@ class Gradients(Law):
     meaning = "Fitting and inverse rendering walk the wrong way, or stop where nothing is solved."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        if not isinstance(subject.model, BSDF):
+        if "float64" not in subject.precisions:
             raise DoesNotApply("differences need 64 bits, which this renderer's variant does not have")
         if subject.stochastic:
             raise DoesNotApply("the model is stochastic: single values are random")
