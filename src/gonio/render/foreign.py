@@ -49,12 +49,12 @@ def load(description: PluginDict) -> Native:
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
     for name, value in {**_colours(_built(description)), **description}.items():
-        if isinstance(value, int | float | tuple) and not isinstance(value, bool):
-            if name in ALBEDOS:
-                fields[name] = spectrum(value, "a property of the plugin", low=0.0, high=1.0)
-            else:  # widths of 0 are refused or are another plugin
-                low, high = (0.0, 1.0) if name.startswith("alpha") else (-np.inf, np.inf)
-                fields[name] = number(value, "a property of the plugin", low=low, high=high)
+        if name in ALBEDOS and isinstance(value, int | float | tuple):
+            fields[name] = spectrum(value, "a property of the plugin", low=0.0, high=1.0)
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            # widths of 0 are refused or are another plugin
+            low, high = (0.0, 1.0) if name.startswith("alpha") else (-np.inf, np.inf)
+            fields[name] = number(value, "a property of the plugin", low=low, high=high)
     space = {**fields, "description": description, "__annotations__": dict.fromkeys(fields, "object")}
     return type(f"Mitsuba{kind.title()}", (_Described,), space)()
 

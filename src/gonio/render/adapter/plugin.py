@@ -10,7 +10,7 @@ from types import ModuleType
 
 import drjit as dr
 
-from ...models import BSDF, Sample
+from ...models import BSDF
 from ...models.material import Delta
 from ...ops import Mode
 from ..types import (
@@ -125,9 +125,7 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         def _sample(
             self, model: BSDF, ctx: BSDFContext, si: SurfaceInteraction, sample1: Float, sample2: Point, active: Mask
         ) -> tuple[BSDFSample, Radiance]:
-            s: Sample[Vector, Radiance, Float] = model.sample(
-                si.wi, mi.Point3f(sample1, sample2.x, sample2.y), mode_of(ctx)
-            )
+            s = model.sample(si.wi, mi.Point3f(sample1, sample2.x, sample2.y), mode_of(ctx))
             bs = dr.zeros(mi.BSDFSample3f)
             bs.wo = mi.Vector3f(s.wi)
             active = enabled(ctx, si.wi, bs.wo, active) & (s.pdf > 0.0)
