@@ -352,6 +352,7 @@ def test_settings_are_shared_by_the_materials_that_have_them(
         capsys.readouterr().out == "lambert-conductor-albedo.png\n" and Path("lambert-conductor-albedo.png").is_file()
     )
     assert "did you mean 'alpha'" in failure(capsys, "plot", "lambert", "conductor", "-p", "alfa=.3")
+    assert "give ward.py:CLASS" in failure(capsys, "plot", "ward.py")
 
 
 def test_a_new_material_works_and_its_test_passes(

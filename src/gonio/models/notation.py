@@ -193,5 +193,7 @@ def _parts(text: str) -> list[str]:
 
 
 def _no_material(value: object, where: str) -> InputError:
+    if str(value).endswith(".py"):
+        return InputError(f"'{value}' names a file, but no class in it", where, f"give {value}:CLASS")
     hint = 'such as lambert, \'conductor(alpha=.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
     return InputError(f"'{value}' is no material", where, hint)

@@ -57,14 +57,18 @@ def stops(exposure: Exposure, *pictures: RGB) -> float:
     return _in_tenths(max(_without_clipping(pixels[lit]), grey - 2))
 
 
-def clipping(exposure: float, *pictures: RGB) -> str:
-    """What to tell of pictures that are too bright for a screen; "" where no more than 1 % of the pixels are."""
+def clipping(exposure: float, *pictures: RGB, automatic: bool = False) -> str:
+    """What to tell of pictures that are too bright for a screen; "" where no more than 1 % of the pixels are.
+
+    automatic  whether the exposure was chosen by `stops`
+    """
     pixels = _pixels(*pictures)
     share = float(np.mean(pixels.max(axis=1) * 2.0**exposure > WHITE)) if len(pixels) else 0.0
     if share <= MOST_CLIPPED:
         return ""
     better = _in_tenths(_without_clipping(pixels))
-    return f"{share:.0%} of the pixels are brighter than white and clipped; try --exposure {better:g}, or auto"
+    told = f"{share:.0%} of the pixels are brighter than white and clipped; try --exposure {better:g}"
+    return told if automatic else f"{told}, or auto"
 
 
 def _pixels(*pictures: RGB) -> RGB:

@@ -97,7 +97,7 @@ def show(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposu
         return Shown(None, "" if exposure == 0 else kept)
     chosen = exposures.stops(exposure, pixels)
     write(path, pixels, {**(metadata or {}), "exposure": chosen}, chosen)
-    return Shown(chosen, exposures.clipping(chosen, pixels))
+    return Shown(chosen, exposures.clipping(chosen, pixels, automatic=exposure == "auto"))
 
 
 def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure = 0.0) -> Shown:

@@ -179,7 +179,8 @@ def render_sheet(
             pictures.append(run.finished(prepared.render, request.denoise))
     report(len(cells), len(cells), "drawing")
     exposure = exposures.stops(request.exposure, *pictures)
-    warnings |= dict.fromkeys(filter(None, [exposures.clipping(exposure, *pictures)]))
+    clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
+    warnings |= dict.fromkeys(filter(None, [clipped]))
     heading = title or _scene_name(request.scene)
     subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {prepared.settings['integrator']}"  # noqa: RUF001
     drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
