@@ -238,17 +238,16 @@ def page_figures(what: stage.Stage) -> Iterator[Figure]:
 
 
 # A material of the user's own: Ward's gloss, whose factor of 4 each save changes.
-WARD = """from gonio import ops
-from gonio.models import BSDF
-from gonio.models.base import Value, number, spectrum
+WARD = """import gonio as go
+from gonio import ops
 from gonio.ops import inv_pi, safe_div, sqr, where
 from gonio.optics.frame import half_vector
 
 
-class Ward(BSDF):
-    kd: Value = spectrum(0.3, "diffuse albedo", high=1.0)
-    ks: Value = spectrum(0.3, "specular albedo", high=1.0)
-    slope: Value = number(0.3, "root mean square slope", low=0.01, high=1.0)
+class Ward(go.BSDF):
+    kd: go.Colour = go.spectrum(0.3, "diffuse albedo", high=1.0)
+    ks: go.Colour = go.spectrum(0.3, "specular albedo", high=1.0)
+    slope: go.Number = go.number(0.3, "root mean square slope", low=0.01, high=1.0)
 
     def eval(self, wo, wi, mode="radiance"):
         h = half_vector(wo, wi)

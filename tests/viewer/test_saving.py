@@ -22,18 +22,17 @@ import browser
 
 WARD = '''"""Ward's gloss."""
 from gonio import ops
-from gonio.models import BSDF
-from gonio.models.base import Value, number, spectrum
+import gonio as go
 from gonio.ops import inv_pi, safe_div, sqr, where
 from gonio.optics.frame import half_vector
 
 
-class Ward(BSDF):
+class Ward(go.BSDF):
     """Ward's isotropic gloss (Ward1992)."""
 
-    kd: Value = spectrum(0.3, "diffuse albedo", high=1.0)
-    ks: Value = spectrum(0.3, "specular albedo", high=1.0)
-    slope: Value = number(0.3, "root mean square slope", low=0.01, high=1.0)
+    kd: go.Colour = go.spectrum(0.3, "diffuse albedo", high=1.0)
+    ks: go.Colour = go.spectrum(0.3, "specular albedo", high=1.0)
+    slope: go.Number = go.number(0.3, "root mean square slope", low=0.01, high=1.0)
 
     def eval(self, wo, wi, mode="radiance"):
         h = half_vector(wo, wi)
@@ -45,13 +44,13 @@ class Ward(BSDF):
 '''
 
 BROKEN = {  # what is changed, and what the page says: where, what, remedy
-    "no Python": ("(wi.z > 0.0)\n", "(wi.z > 0.0\n", "ward.py:18", "was never closed", "mend"),
+    "no Python": ("(wi.z > 0.0)\n", "(wi.z > 0.0\n", "ward.py:17", "was never closed", "mend"),
     "no such class": ("class Ward", "class Wart", "ward.py", "no class 'Ward'", "did you mean 'Wart'?"),
-    "fails when it is run": ("class Ward", "sqr(beta)\nclass Ward", "ward.py:9", "name 'beta' is not defined", ""),
-    "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:17", "TypeError: ", "mend"),
-    "if on a value": ("        tan2", "        if h.z > 0: pass\n        tan2", "ward.py:19", "Python `if`", "where("),
-    "wrong kind": ("return where(above, ", "return above\n        (above, ", "ward.py:16", "eval returned a bool", ""),
-    "unknown parameter": ("self.kd", "self.kdd", "ward.py:22", "no attribute 'kdd'", "mend"),
+    "fails when it is run": ("class Ward", "sqr(beta)\nclass Ward", "ward.py:8", "name 'beta' is not defined", ""),
+    "fails in eval": ("half_vector(wo, wi)", "half_vector(wo)", "ward.py:16", "TypeError: ", "mend"),
+    "if on a value": ("        tan2", "        if h.z > 0: pass\n        tan2", "ward.py:18", "Python `if`", "where("),
+    "wrong kind": ("return where(above, ", "return above\n        (above, ", "ward.py:15", "eval returned a bool", ""),
+    "unknown parameter": ("self.kd", "self.kdd", "ward.py:21", "no attribute 'kdd'", "mend"),
     "out of range": ("number(0.3", "number(3.0", "ward.py", "3 given", ""),
     "not there": ("from gonio import ops", "import beta", "ward.py:2", "No module named 'beta'", ""),
 }  # fmt: skip
@@ -189,7 +188,7 @@ def test_a_page_that_comes_later_learns_what_is_wrong(file: Path) -> None:
         file.write_text(WARD.replace("(wi.z > 0.0)\n", "(wi.z > 0.0\n"))
         wait_for(lambda: one.application.fault)
         with speak(one) as client:
-            assert read(client.recv(20))[0]["where"] == "ward.py:18"
+            assert read(client.recv(20))[0]["where"] == "ward.py:17"
         file.write_text(WARD)
         wait_for(lambda: one.application.renderer.revision == 1)
         with speak(one) as client:  # it came with the first stage, and is told of the newer one
@@ -253,7 +252,7 @@ def test_saving_redraws_and_an_error_stands_over_the_last_good_picture(file: Pat
         file.write_text(changed.replace("        tan2", "        if h.z > 0.5: pass\n        tan2"))
         until("!document.querySelector('.fault').hidden")
         told = tab.locator(".fault").inner_text()
-        assert "ward.py:19" in told and "Python `if`" in told and "where(mask, a, b)" in told
+        assert "ward.py:18" in told and "Python `if`" in told and "where(mask, a, b)" in told
         assert tab.evaluate(brightness) == pytest.approx(before / 2, rel=1e-3)
         assert tab.evaluate("gonio.data.revision") == 1
 
