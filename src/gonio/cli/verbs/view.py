@@ -37,13 +37,15 @@ def view(
 ) -> None:
     """Show materials live on shading balls, in a browser, beside a path-traced reference.
 
-    With --export the page is one file that needs no server and no network.
+    FILE.py:CLASS is watched: save the file, and the page shows the new picture, or what is wrong with it. With --export
+    the page is one file that needs no server and no network.
 
     \b
     Examples:
       gonio view
       gonio view conductor lambert --param alpha=.3
       gonio view "conductor(preset=Au)" "conductor(preset=Cu)"
+      gonio view ward.py:Ward
       gonio view examples/shading-balls
       gonio view --export page.html
     """
