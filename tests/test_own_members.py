@@ -69,7 +69,7 @@ class Open(go.Masking):
 
     name = "own-open"
 
-    def reflected(self, ndf, wo, wi, alpha):
+    def reflected(self, ndf, wo, wi, m, alpha):
         return ndf.G1(wo, alpha) * ndf.G1(wi, alpha)
 
 
