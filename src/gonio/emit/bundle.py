@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .._version import __version__
 from ..errors import InputError
 from ..models import BSDF, notation, tree
 from ..ops import graph
+from ..ops.types import Value
 from . import program as programs
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment
@@ -27,6 +28,8 @@ from .routine import RoutineWriter
 from .simplify import SIZES, Record, stem_of
 from .syntax import literal
 from .textures import axes, pixels, reader, width
+
+Json: TypeAlias = Any  # a value that a JSON file may hold
 
 # how papers write a parameter
 SYMBOLS = {
@@ -49,7 +52,7 @@ class Bundle:
     """
 
     text: str
-    manifest: dict[str, Any]
+    manifest: dict[str, Json]
     tables: dict[str, np.ndarray]
 
     def write(self, folder: Path | str) -> list[Path]:
@@ -167,7 +170,7 @@ def _arguments(made: Program, method: str, language: Language) -> list[str]:
     return first + ["derived"] * (made.derived is not None) + ["wo", "u" if method == "sample" else "wi"]
 
 
-def _choices(model: BSDF) -> list[tuple[str, Any]]:
+def _choices(model: BSDF) -> list[tuple[str, Value]]:
     """(path, value) of what shapes the code: materials by their class, choices and flags."""
     return [
         *((path, type(inner).__name__) for path, inner in tree.walk(model) if path),
@@ -201,7 +204,7 @@ def _struct(record: Record, names: Names) -> list[str]:
 # ---------------------------------------------------------------------- manifest
 
 
-def _manifest(made: Program, names: Names, numbers: dict[str, Any]) -> dict[str, Any]:
+def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str, Json]:
     language = names.language
     model = made.model
     cls = type(model)
@@ -284,7 +287,7 @@ def _term_doc(name: str) -> str:
     return TERMS.get(name, "")
 
 
-def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Any]]:
+def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
     for path, parameter, value, _ in tree.leaves(model):
         yield {
             "path": path,
@@ -301,14 +304,14 @@ def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, bool | str) or value is None:
         return value
     array = np.asarray(value, dtype=float)
     return float(array) if array.ndim == 0 else array.tolist()
 
 
-def _numbers(model: BSDF) -> Iterator[tuple[str, Any]]:
+def _numbers(model: BSDF) -> Iterator[tuple[str, Value]]:
     """(path, value as its field holds it) of each numeric parameter."""
     for path, parameter, value, owner in tree.leaves(model):
         if parameter.numeric and value is not None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from .languages import Language
 from .program import Program
-from .simplify import Record, Routine, Value, check_single, stem_of
+from .simplify import Kind, Record, Routine, Value, check_single, stem_of
 from .source import module_constant
 from .syntax import literal
 
@@ -74,7 +73,7 @@ class Names:
         """Whether a name stands for one function of the source, in different types."""
         return all(self.routines[r] != name or r.source == routine.source for r in self.routines)
 
-    def note(self, record: Any) -> str:
+    def note(self, record: Kind) -> str:
         """The name of a type in the language; structs are noted, to be declared."""
         if isinstance(record, Routine):
             record = record.record

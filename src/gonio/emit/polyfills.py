@@ -8,39 +8,39 @@ place, and what is lost there no later line gives back.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from .. import ops
-from ..ops import abs, floor, graph, maximum, sqr, where
+from ..ops import Mask, Scalar, Spectrum, abs, floor, graph, maximum, sqr, where
+from ..ops.types import Value
 
 # pi / 2 as the sum of a float32 and a rest, so that whole quarters can be taken away without rounding
 QUARTER_TURN = 1.5707964
 QUARTER_REST = -4.371139e-8
 
 
-def _channels(c: Any) -> tuple[Any, Any, Any]:
+def _channels(c: Spectrum) -> Value:
     r, g, b = (graph.emit("component", "float", c, static=i) for i in range(3))
     return r, g, b
 
 
-def mean(c: Any) -> Any:
+def mean(c: Spectrum) -> Scalar:
     """Mean over the channels."""
     r, g, b = _channels(c)
     return (r + g + b) * (1.0 / 3.0)
 
 
-def max_component(c: Any) -> Any:
+def max_component(c: Spectrum) -> Scalar:
     """Largest channel."""
     r, g, b = _channels(c)
     return maximum(maximum(r, g), b)
 
 
-def copysign(size: Any, other: Any) -> Any:
+def copysign(size: Scalar, other: Scalar) -> Scalar:
     """|size| with the sign of the other."""
     return where(other < 0.0, -abs(size), abs(size))
 
 
-def isfinite(x: Any) -> Any:
+def isfinite(x: Scalar) -> Mask:
     """Whether x is neither infinite nor NaN."""
     return abs(x) <= 3.4028234e38
 
@@ -51,7 +51,7 @@ _ERF_CENTRE = (1.1283791, -0.37612626, 0.11283585, -0.026853811, 0.0051883273, -
 _ERF_TAIL = (0.00017747548, 1.1277497, 0.63705957, 0.104037508, -0.022277163, 0.0030556284, -0.00019718401)
 
 
-def erf(x: Any) -> Any:
+def erf(x: Scalar) -> Scalar:
     """Error function: a polynomial near 0, 1 - exp of one beyond; error under 1e-7."""
     size = ops.minimum(abs(x), 4.0)
     centre = size < 1.0
@@ -59,14 +59,14 @@ def erf(x: Any) -> Any:
     return where(centre | (x > 0.0), value, -value)
 
 
-def _horner(x: Any, coefficients: tuple[float, ...]) -> Any:
-    total: Any = coefficients[-1]
+def _horner(x: Scalar, coefficients: tuple[float, ...]) -> Scalar:
+    total: Value = coefficients[-1]
     for c in reversed(coefficients[:-1]):
         total = total * x + c
     return total
 
 
-def sine_quarters(x: Any, quarters: Any) -> Any:
+def sine_quarters(x: Scalar, quarters: float) -> Scalar:
     """sin(x + quarters pi / 2): Taylor's series within an eighth of a turn, error 1e-7; a GPU's own errs by 5e-4."""
     count = floor(x * (2.0 / ops.pi) + 0.5)  # whole quarter turns
     r = (x - count * QUARTER_TURN) - count * QUARTER_REST
@@ -80,17 +80,17 @@ def sine_quarters(x: Any, quarters: Any) -> Any:
     return where(quadrant >= 2.0, -value, value)
 
 
-def exponent(x: Any) -> Any:
+def exponent(x: Scalar) -> Value:
     """e of x = m 2^e, 1 <= m < 2, for x > 0: out of the bits."""
     return graph.emit("exponent", "float", x)
 
 
-def scaled(x: Any, e: Any) -> Any:
+def scaled(x: Scalar, e: Scalar) -> Value:
     """x 2^e for a whole e in [-126, 127]."""
     return graph.emit("scaled", "float", x, e)
 
 
-def log(x: Any) -> Any:
+def log(x: Scalar) -> Scalar:
     """Natural logarithm of a normal float32 > 0, error 1e-7 of the value also near 1, where a GPU's has 5e-7 at best.
 
     x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)).
@@ -112,12 +112,12 @@ LOG_2_REST = -0.00021219444
 _SINE_QUARTERS = ops.function(sine_quarters)
 
 
-def sin(x: Any) -> Any:
+def sin(x: Scalar) -> Scalar:
     """Sine of an angle in radians."""
     return _SINE_QUARTERS(x, 0.0)
 
 
-def cos(x: Any) -> Any:
+def cos(x: Scalar) -> Scalar:
     """Cosine of an angle in radians."""
     return _SINE_QUARTERS(x, 1.0)
 

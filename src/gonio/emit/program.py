@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from .. import ops
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, binding, recording, tree
-from ..ops import graph
+from ..ops import Direction, graph
 from ..ops.table import Table
 from .polyfills import POLYFILLS
 from .simplify import Record, Routine, Value, routines, shape
@@ -64,7 +63,7 @@ class Program:
 
     # ------------------------------------------------------------------ structs
 
-    def struct_of(self, value: Any) -> Struct | None:
+    def struct_of(self, value: object) -> Struct | None:
         """The struct of a model's parameters."""
         if not isinstance(value, BSDF):
             return None
@@ -76,7 +75,7 @@ class Program:
             self._parameters[key] = Struct(name, list(fields), doc, dict(parameter_docs(value)))
         return self._parameters[key]
 
-    def derived_of(self, value: Any) -> Struct | None:
+    def derived_of(self, value: object) -> Struct | None:
         """The struct of what is derived from a model's parameters; also of the dict itself."""
         key = tuple(derived_list(value))
         return self._derived.get(key)
@@ -119,7 +118,7 @@ class Program:
         self.routines = self._reachable(self.routines)  # without what served only fields that nobody uses
 
     @property
-    def _settled(self) -> Any:
+    def _settled(self) -> object:
         """An argument that has the derived values of the whole model."""
         for method, routine in self.entries.items():
             if method != "derive":
@@ -165,8 +164,8 @@ class Program:
         return list(found.values())
 
 
-def _record(bound: Any, functions: tuple[str, ...]) -> graph.Graph:
-    def every(self: Any, wo: Any, wi: Any, u: Any) -> Any:
+def _record(bound: BSDF, functions: tuple[str, ...]) -> graph.Graph:
+    def every(self: BSDF, wo: Direction, wi: Direction, u: Direction) -> tuple[object, ...]:
         """The driver of a recording; no part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):
             self = settle(self, derive(self))
@@ -180,17 +179,17 @@ def _record(bound: Any, functions: tuple[str, ...]) -> graph.Graph:
 
 
 @ops.function
-def derive(self: Any) -> Any:
+def derive(self: BSDF) -> dict[str, object]:
     """What follows from the parameters alone: to be computed once, not for every pair of directions."""
     return _derive(self)
 
 
-def _derive(material: BSDF) -> dict[str, Any]:
+def _derive(material: BSDF) -> dict[str, object]:
     """What every material of the tree derives, by its path."""
     return {path: inner.derive() for path, inner in tree.walk(material) if inner.derives}
 
 
-def settle(material: BSDF, derived: dict[str, Any], path: str = "") -> BSDF:
+def settle(material: BSDF, derived: dict[str, object], path: str = "") -> BSDF:
     """A copy of a bound material whose tree holds what `derive` gave."""
     below = {name: settle(inner, derived, tree.join(path, name)) for name, inner in tree.children(material).items()}
     return binding.bound_copy(material, below, derived.get(path))
@@ -212,13 +211,13 @@ def flat(path: str) -> str:
     return path.replace(".", "_")
 
 
-def field_list(value: Any) -> list[tuple[str, str]]:
+def field_list(value: object) -> list[tuple[str, str]]:
     """(path, type) of a model's numeric parameters, those of inner materials included."""
     pairs = ((place("x" + path), node.type) for path, node in graph._flatten(value, ""))
     return [(rest, shape(type_)) for (_, rest, derived), type_ in pairs if not derived]
 
 
-def derived_list(value: Any) -> list[tuple[str, str]]:
+def derived_list(value: object) -> list[tuple[str, str]]:
     """(path, type) of derived values: of those that a model holds, or of a dict of them."""
     if not isinstance(value, BSDF | dict):
         return []
@@ -266,7 +265,7 @@ def _free(name: str, taken: list[str]) -> str:
     return found
 
 
-def check(model: Any, functions: Any, where: str) -> tuple[str, ...]:
+def check(model: object, functions: str | Sequence[str], where: str) -> tuple[str, ...]:
     """The functions asked for that the model has, each once; InputError where there can be no shader code.
 
     functions  names in a sequence, or in one string with commas between them

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,9 @@ SIZES = {"vec2": 2, "vec3": 3, "vec4": 4}
 COMPARE = {"lt", "le", "gt", "ge", "eq", "ne"}
 LOGIC = {"and", "or", "not"}
 ELEMENTWISE = {"add", "sub", "mul", "div", "neg", "abs", "minimum", "maximum"}
+
+Kind: TypeAlias = Any  # of a value: its name, or the `Record` that it is
+Static: TypeAlias = Any  # what is known of a value when it is written: a number, a name, a routine, a table
 
 
 class Value:
@@ -38,7 +41,7 @@ class Value:
 
     __slots__ = ("args", "name", "op", "order", "source", "static", "type")
 
-    def __init__(self, op: str, type: Any, args: tuple, static: Any, order: int) -> None:
+    def __init__(self, op: str, type: Kind, args: tuple, static: Static, order: int) -> None:
         self.op, self.type, self.args, self.static, self.order = op, type, args, static, order
         self.name, self.source = "", ""
 
@@ -80,7 +83,7 @@ class Routine:
         self.record: Record | None = None
 
     @property
-    def type(self) -> Any:
+    def type(self) -> Kind:
         return self.results[0][1].type if self.single else self.record
 
     def values(self) -> list[Value]:
@@ -146,7 +149,7 @@ class _Simplifier:
 
     # ------------------------------------------------------------------ making values
 
-    def make(self, op: str, type_: Any, args: tuple = (), static: Any = None, name: str = "") -> Value:
+    def make(self, op: str, type_: Kind, args: tuple = (), static: Static = None, name: str = "") -> Value:
         key = (op, type_ if isinstance(type_, str) else id(type_), tuple(a.order for a in args), _key(static), name)
         value = self.table.get(key)
         if value is None:
@@ -154,7 +157,7 @@ class _Simplifier:
             value = self.table[key] = Value(op, type_, args, static, self.count)
         return value
 
-    def constant(self, number: Any, type_: str = "float", source: str = "") -> Value:
+    def constant(self, number: Static, type_: str = "float", source: str = "") -> Value:
         """A number; by name, where the line of the source that uses it does so."""
         if isinstance(number, bool | np.bool_):
             return self.make("constant", "bool" if type_ == "float" else type_, (), bool(number))
@@ -402,7 +405,7 @@ class _Simplifier:
         return self.build(value.op, args, value.type)
 
 
-def _key(static: Any) -> Any:
+def _key(static: Static) -> object:
     if isinstance(static, float):
         return ("float", struct.pack("d", static))
     if isinstance(static, tuple):
@@ -437,7 +440,7 @@ _FOLD: dict[str, Callable] = {
 }
 
 
-def _compute(op: str, numbers: list) -> Any:
+def _compute(op: str, numbers: list) -> Static:
     if op not in _FOLD:
         return None
     try:

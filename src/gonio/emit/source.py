@@ -7,7 +7,6 @@ import functools
 import linecache
 import sys
 from pathlib import Path
-from typing import Any
 
 
 @functools.cache
@@ -73,7 +72,7 @@ _OPERATORS: dict[type, str] = {
 }
 
 
-def _makes(expression: Any, op: str) -> bool:
+def _makes(expression: object, op: str) -> bool:
     """Whether the outermost step of an expression is an operation."""
     if isinstance(expression, ast.BinOp):
         return _OPERATORS.get(type(expression.op)) == op

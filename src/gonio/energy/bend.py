@@ -9,12 +9,13 @@ albedo is a smooth function of z in [0, 1] whatever the width, down to a limit a
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import ops
 from ..ops import Scalar, sqr, sqrt
+from ..ops.backend import Array
 from ..optics.masking import term
 from ..optics.ndf import distribution
 
@@ -69,16 +70,16 @@ def knee(form: Form, masking: str, alpha: Scalar) -> Scalar:
 
 def numpy_knee(form: Form, masking: str, alpha: np.ndarray) -> np.ndarray:
     """The same of an array."""
-    onset: Any = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
+    onset: Array = term(masking).onset(ops.backend.types("float64").float(np.ravel(alpha)))
     return _bend(form, np.asarray(onset.numpy()).reshape(np.shape(alpha)))
 
 
-def _bend(form: Form, width: Any) -> Any:
+def _bend(form: Form, width: Array) -> Array:
     return form.factor * width / (1.0 + form.hold * width) if form.hold else form.factor * width
 
 
 @ops.function
-def descent(form: Form, mu: Any, bend: Any) -> Any:
+def descent(form: Form, mu: Array, bend: Array) -> Array:
     """z / r: 0 at the normal; nothing here is a difference of near values."""
     mu = ops.maximum(mu, bend * form.least)
     fall = 1.0 - mu

@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar, overload
+from typing import Protocol, TypeVar, overload
 
 from . import graph
 from .backend import (
@@ -25,7 +25,7 @@ from .backend import (
 )
 from .graph import Graph, Node, RecordingError, record
 from .table import Table, inset, lookup
-from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Vector, Vector3
+from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Value, Vector, Vector3
 
 __all__ = [
     "Direction",
@@ -93,7 +93,7 @@ def function(python_function: F) -> F:
     """Mark a function of the vocabulary: it stays a function of its own, by name and docstring, when recorded."""
 
     @functools.wraps(python_function)
-    def wrapper(*args: Any, **kwargs: Any) -> Any:
+    def wrapper(*args: object, **kwargs: object) -> object:
         if graph._stack and graph.recording((*args, *kwargs.values())):
             return graph.call(python_function, args, kwargs)
         return python_function(*args, **kwargs)
@@ -117,7 +117,7 @@ class _Binary(Protocol):
 
 
 def _unary(name: str, drjit_name: str | None = None) -> _Unary:
-    def word(x: Any) -> Any:
+    def word(x: Value) -> Value:
         if isinstance(x, Node):
             return graph.emit(name, x.type, x)
         if is_drjit(x):
@@ -139,8 +139,8 @@ floor = _unary("floor")
 abs = _unary("abs")
 
 
-def _binary(name: str, drjit_name: str, python: Callable[[Any, Any], Any]) -> _Binary:
-    def word(a: Any, b: Any) -> Any:
+def _binary(name: str, drjit_name: str, python: Callable[[Value, Value], Value]) -> _Binary:
+    def word(a: Value, b: Value) -> Value:
         if isinstance(a, Node) or isinstance(b, Node):
             return graph.arithmetic(name, a, b)
         if is_drjit(a) or is_drjit(b):
@@ -165,7 +165,7 @@ def where(mask: Mask | bool, a: Scalar | float, b: V) -> V: ...
 def where(mask: Mask | bool, a: Scalar | float, b: Scalar | float) -> Scalar: ...
 @overload
 def where(mask: Mask | bool, a: Mask, b: Mask) -> Mask: ...
-def where(mask: Any, a: Any, b: Any) -> Any:
+def where(mask: Value, a: Value, b: Value) -> Value:
     """`a` where `mask` holds, else `b`; both are computed."""
     if isinstance(mask, Node) or isinstance(a, Node) or isinstance(b, Node):
         if isinstance(mask, bool):
@@ -186,17 +186,17 @@ def pow(x: Scalar, y: Scalar | float) -> Scalar:
 def isfinite(x: Scalar | Vector) -> Mask:
     """True where x is neither infinite nor NaN."""
     if isinstance(x, Node):
-        mask: Any = graph.emit("isfinite", "bool", x)
+        mask: Value = graph.emit("isfinite", "bool", x)
         return mask
     return drjit().isfinite(x)
 
 
-def is_single(x: Any) -> bool:
+def is_single(x: Value) -> bool:
     """Whether x is a Dr.Jit value in float32."""
     return is_drjit(x) and drjit().itemsize_v(x) == 4
 
 
-def is_short(x: Any) -> bool:
+def is_short(x: Value) -> bool:
     """Whether x is computed in 32 bits, by Dr.Jit or a shader, so that steps below its last digits can be left out."""
     if isinstance(x, Node):
         return graph._stack[-1][0].single
@@ -218,7 +218,7 @@ def fma(a: V, b: V | Scalar | float, c: V | Scalar | float) -> V: ...
 def fma(a: Scalar | float, b: V, c: V | Scalar | float) -> V: ...
 @overload
 def fma(a: Scalar | float, b: Scalar | float, c: V) -> V: ...
-def fma(a: Any, b: Any, c: Any) -> Any:
+def fma(a: Value, b: Value, c: Value) -> Value:
     """a b + c, in float32 in one operation and rounded once; float64, the oracle, rounds both as NumPy does."""
     return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
@@ -240,7 +240,7 @@ def rsqrt(x: T) -> T:
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 
-def _guarded(mask: Any, x: Any) -> Any:
+def _guarded(mask: Value, x: Value) -> Value:
     """x where the mask holds, else 1: what a branch that is not chosen may take the gradient of."""
     return where(mask, x, 1.0) if not is_drjit(x) or drjit().grad_enabled(x) else x
 
@@ -249,7 +249,7 @@ def _guarded(mask: Any, x: Any) -> Any:
 def safe_sqrt(x: T) -> T:
     """sqrt(max(x, 0)), with gradient 0 instead of infinity where x <= 0."""
     positive = x > 0.0
-    root: Any = where(positive, sqrt(_guarded(positive, x)), 0.0)
+    root: Value = where(positive, sqrt(_guarded(positive, x)), 0.0)
     return root
 
 
@@ -260,7 +260,7 @@ def safe_div(a: V, b: V | Scalar) -> V: ...
 @overload
 def safe_div(a: Scalar | float, b: V) -> V: ...
 @function
-def safe_div(a: Any, b: Any) -> Any:
+def safe_div(a: Value, b: Value) -> Value:
     """a / b, and 0 where b = 0."""
     some = b != 0.0
     return where(some, a / _guarded(some, b), 0.0)

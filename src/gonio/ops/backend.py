@@ -8,16 +8,16 @@ from __future__ import annotations
 import sys
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple, TypeAlias, TypeGuard, get_args
+from typing import NamedTuple, TypeAlias, TypeGuard, get_args
 
 import numpy as np
 
 from .. import llvm
 from ..errors import InputError
-from .types import Precision
+from .types import Precision, Value
 
 # A Dr.Jit array. Dr.Jit's stubs describe one device and precision, our code is written for all.
-Array: TypeAlias = Any
+Array: TypeAlias = Value
 
 PRECISIONS = get_args(Precision)
 _precision: Precision = "float32"

@@ -20,11 +20,15 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from types import FrameType
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
 from ..errors import GonioError
+from .types import Value
+
+Operand: TypeAlias = "Node | float"
 
 _HERE = str(Path(__file__).parent)
 _SIZES = {"vec2": 2, "vec3": 3}
@@ -49,7 +53,7 @@ def _name_locals(function: Function) -> None:
     frame is preferred to one in a plain function that it calls, the first name to a later one.
     """
     found = []
-    frame: Any = sys._getframe(1)
+    frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_code is not _define.__code__:
         if not frame.f_code.co_filename.startswith(_HERE):
             found.append(frame)
@@ -70,7 +74,7 @@ class Node:
     __slots__ = ("args", "depth", "function", "index", "name", "op", "source", "static", "type")
     __array_ufunc__ = None  # NumPy scalars on the left must defer to the operators below
 
-    def __init__(self, function: Function, op: str, type: str, args: tuple, static: Any = None) -> None:
+    def __init__(self, function: Function, op: str, type: str, args: tuple, static: Value = None) -> None:
         self.function, self.op, self.type, self.args, self.static = function, op, type, args, static
         self.source = _source_line()
         self.name, self.depth = "", 1000
@@ -97,40 +101,40 @@ class Node:
     def __invert__(self) -> Node:
         return emit("not", "bool", self)
 
-    def __add__(self, other: Any) -> Node:
+    def __add__(self, other: Operand) -> Node:
         return arithmetic("add", self, other)
 
-    def __radd__(self, other: Any) -> Node:
+    def __radd__(self, other: Operand) -> Node:
         return arithmetic("add", other, self)
 
-    def __sub__(self, other: Any) -> Node:
+    def __sub__(self, other: Operand) -> Node:
         return arithmetic("sub", self, other)
 
-    def __rsub__(self, other: Any) -> Node:
+    def __rsub__(self, other: Operand) -> Node:
         return arithmetic("sub", other, self)
 
-    def __mul__(self, other: Any) -> Node:
+    def __mul__(self, other: Operand) -> Node:
         return arithmetic("mul", self, other)
 
-    def __rmul__(self, other: Any) -> Node:
+    def __rmul__(self, other: Operand) -> Node:
         return arithmetic("mul", other, self)
 
-    def __truediv__(self, other: Any) -> Node:
+    def __truediv__(self, other: Operand) -> Node:
         return arithmetic("div", self, other)
 
-    def __rtruediv__(self, other: Any) -> Node:
+    def __rtruediv__(self, other: Operand) -> Node:
         return arithmetic("div", other, self)
 
-    def __lt__(self, other: Any) -> Node:
+    def __lt__(self, other: Operand) -> Node:
         return emit("lt", "bool", self, other)
 
-    def __le__(self, other: Any) -> Node:
+    def __le__(self, other: Operand) -> Node:
         return emit("le", "bool", self, other)
 
-    def __gt__(self, other: Any) -> Node:
+    def __gt__(self, other: Operand) -> Node:
         return emit("gt", "bool", self, other)
 
-    def __ge__(self, other: Any) -> Node:
+    def __ge__(self, other: Operand) -> Node:
         return emit("ge", "bool", self, other)
 
     def __eq__(self, other: object) -> Node:  # type: ignore[override]
@@ -139,12 +143,12 @@ class Node:
     def __ne__(self, other: object) -> Node:  # type: ignore[override]
         return emit("ne", "bool", self, other)
 
-    def __and__(self, other: Any) -> Node:
+    def __and__(self, other: Operand) -> Node:
         return emit("and", "bool", self, other)
 
     __rand__ = __and__
 
-    def __or__(self, other: Any) -> Node:
+    def __or__(self, other: Operand) -> Node:
         return emit("or", "bool", self, other)
 
     __ror__ = __or__
@@ -164,9 +168,9 @@ class Function:
     def __init__(self, name: str, doc: str, source: str) -> None:
         self.name, self.doc, self.source = name, doc, source
         self.parameters: dict[str, str] = {}
-        self.arguments: dict[str, Any] = {}
+        self.arguments: dict[str, Value] = {}
         self.nodes: list[Node] = []
-        self.result: Any = None
+        self.result: Value = None
 
     def parameter(self, name: str, type: str) -> Node:
         self.parameters[name] = type
@@ -191,7 +195,7 @@ class Graph:
     def __init__(self, replacements: dict[str, Callable] | None = None, single: bool = False) -> None:
         self.functions: list[Function] = []
         self.replacements, self.single = replacements or {}, single
-        self._known: dict[Any, Function] = {}
+        self._known: dict[object, Function] = {}
 
     @property
     def entry(self) -> Function:
@@ -203,7 +207,7 @@ class Graph:
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(str(self))}</pre>"
 
-    def evaluate(self, **values: Any) -> Any:
+    def evaluate(self, **values: Value) -> Value:
         """Run the graph on NumPy arrays in float64, as an independent reading of the same source.
 
         values  by parameter name ("self.alpha" of a model as self_alpha); vectors and spectra component first,
@@ -239,7 +243,7 @@ def _reference(value: object) -> str:
 _stack: list[tuple[Graph, Function]] = []
 
 
-def emit(op: str, type: str, *args: Any, static: Any = None) -> Node:
+def emit(op: str, type: str, *args: Value, static: Value = None) -> Node:
     """Append one operation to the function that is being recorded."""
     if not _stack:
         raise RecordingError("a recorded value outlived its recording", _source_line())
@@ -256,7 +260,7 @@ def emit(op: str, type: str, *args: Any, static: Any = None) -> Node:
     return Node(function, op, type, args, static)
 
 
-def type_of(value: Any) -> str:
+def type_of(value: object) -> str:
     if isinstance(value, Node):
         return value.type
     if isinstance(value, bool | np.bool_):
@@ -266,7 +270,7 @@ def type_of(value: Any) -> str:
     raise RecordingError(f"a {type(value).__name__} inside recorded code", _source_line(), "numbers and nodes only")
 
 
-def widest(*values: Any) -> str:
+def widest(*values: object) -> str:
     """The type of an elementwise operation: floats broadcast over one wider type."""
     types = {type_of(v) for v in values} - {"float"}
     if len(types) > 1:
@@ -274,14 +278,14 @@ def widest(*values: Any) -> str:
     return types.pop() if types else "float"
 
 
-def arithmetic(op: str, a: Any, b: Any) -> Node:
+def arithmetic(op: str, a: Operand, b: Operand) -> Node:
     return emit(op, widest(a, b), a, b)
 
 
 # --------------------------------------------------------------------------- structured arguments and results
 
 
-def _flatten(value: Any, name: str) -> Iterator[tuple[str, Node]]:
+def _flatten(value: object, name: str) -> Iterator[tuple[str, Node]]:
     """The nodes inside an argument (node, tuple, list, dict, object with fields), each with its path."""
     if isinstance(value, Node):
         yield name, value
@@ -301,14 +305,14 @@ def _flatten(value: Any, name: str) -> Iterator[tuple[str, Node]]:
 class Composite(Protocol):
     """An object that a recording follows into its parts: a material."""
 
-    def __parts__(self) -> Mapping[str, Any]:
+    def __parts__(self) -> Mapping[str, object]:
         """What may hold values, by name."""
 
-    def __with_parts__(self, parts: Mapping[str, Any]) -> Any:
+    def __with_parts__(self, parts: Mapping[str, object]) -> object:
         """A copy with other parts."""
 
 
-def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
+def _rebuild(value: Value, replace: Callable[[Node], object]) -> Value:
     """The same structure with each node replaced."""
     if isinstance(value, Node):
         return replace(value)
@@ -322,7 +326,7 @@ def _rebuild(value: Any, replace: Callable[[Node], Any]) -> Any:
     return value
 
 
-def _static_key(value: Any) -> Any:
+def _static_key(value: object) -> object:
     """What of an argument is not a node but shapes the recording: names, flags, classes and plain numbers."""
     if isinstance(value, Node):
         return value.type
@@ -340,7 +344,7 @@ def _static_key(value: Any) -> Any:
     return (type(value), repr(value) if isinstance(value, float) else value)
 
 
-def _define(graph: Graph, python_function: Callable, arguments: dict[str, Any], name: str) -> Function:
+def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value], name: str) -> Function:
     source = f"{python_function.__code__.co_filename}:{python_function.__code__.co_firstlineno}"
     function = Function(name, inspect.getdoc(python_function) or "", source)
     _stack.append((graph, function))
@@ -361,7 +365,7 @@ def _next(replacements: Iterator[Node], _: Node) -> Node:
     return next(replacements)
 
 
-def _rebuild_constants(result: Any) -> Any:
+def _rebuild_constants(result: Value) -> Value:
     """Numbers that a function returns as they stand become nodes, so that a result is nodes only."""
     if isinstance(result, bool | int | float | np.number):
         return emit("constant", type_of(result), static=result)
@@ -373,7 +377,7 @@ def _rebuild_constants(result: Any) -> Any:
     return result
 
 
-def call(python_function: Callable, args: tuple, kwargs: dict) -> Any:
+def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
     """Record a call of a `@function`, defining it first where this combination of types is new."""
     bound = inspect.signature(python_function).bind(*args, **kwargs)
     bound.apply_defaults()
@@ -416,7 +420,7 @@ def record(
     types: dict[str, str] | None = None,
     name: str = "",
     into: Graph | None = None,
-    **more: Any,
+    **more: Value,
 ) -> Graph:
     """Record a function of named arguments.
 
@@ -432,7 +436,7 @@ def record(
             kinds[argument] = values.pop(argument)
     outer = Function("outer", "", "")
     signature = inspect.signature(python_function)
-    arguments: dict[str, Any] = {}
+    arguments: dict[str, Value] = {}
     for argument in signature.parameters:
         if argument in kinds:
             arguments[argument] = Node(outer, "parameter", kinds[argument], (), static=argument)
@@ -450,11 +454,11 @@ def symbol(kind: str) -> Node:
 # --------------------------------------------------------------------------- evaluation in NumPy
 
 
-def _erf(x: Any) -> np.ndarray:
+def _erf(x: Value) -> np.ndarray:
     return np.vectorize(math.erf, otypes=[float])(x)
 
 
-def _dot(a: Any, b: Any) -> np.ndarray:
+def _dot(a: Value, b: Value) -> np.ndarray:
     return sum(a[i] * b[i] for i in range(len(a)))
 
 
@@ -494,11 +498,11 @@ _NUMPY: dict[str, Callable] = {
 }
 
 
-def _run(function: Function, arguments: list) -> Any:
-    values: list[Any] = []
+def _run(function: Function, arguments: list) -> Value:
+    values: list[Value] = []
     remaining = iter(arguments)
 
-    def get(arg: Any) -> Any:
+    def get(arg: Value) -> Value:
         return values[arg.index] if isinstance(arg, Node) else arg
 
     for node in function.nodes:
@@ -525,7 +529,7 @@ def _run(function: Function, arguments: list) -> Any:
     return _rebuild(function.result, get)
 
 
-def _leaves(value: Any) -> Iterator[Any]:
+def _leaves(value: Value) -> Iterator[Value]:
     if isinstance(value, tuple | dict):
         for item in value.values() if isinstance(value, dict) else value:
             yield from _leaves(item)

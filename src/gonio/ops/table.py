@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from functools import reduce
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from . import graph
-from .backend import Types, drjit, is_drjit, types_like
+from .backend import Array, Types, drjit, is_drjit, types_like
+from .types import Scalar
 
 
 class Table:
@@ -31,7 +31,7 @@ class Table:
         self.name = name
         self.values = np.array(values, dtype=np.float64, order="C")
         self.values.setflags(write=False)
-        self._arrays: dict[type, Any] = {}
+        self._arrays: dict[type, Array] = {}
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -45,7 +45,7 @@ class Table:
     def __repr__(self) -> str:
         return f"Table({self.name!r}, {' x '.join(map(str, self.shape))}, {self.channels} channels)"
 
-    def array(self, kind: Types) -> Any:
+    def array(self, kind: Types) -> Array:
         """The values as an evaluated Dr.Jit array, made once a type: new contents compile no kernel."""
         if kind.float not in self._arrays:
             array = kind.float(self.values.ravel())
@@ -54,15 +54,18 @@ class Table:
         return self._arrays[kind.float]
 
 
-def inset(x: Any, count: int) -> Any:
+def inset(x: Array, count: int) -> Array:
     """The coordinate at which an axis of `count` texels has its first node at x = 0 and its last at x = 1."""
     return x * ((count - 1) / count) + 0.5 / count
 
 
-def lookup(table: Table, *coordinates: Any) -> tuple[Any, ...]:
+def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
     """Every channel of a table at a point, linear between texel centres (see the module)."""
     if any(isinstance(x, graph.Node) for x in coordinates):
-        return tuple(graph.emit("lookup", "float", *coordinates, static=(table, c)) for c in range(table.channels))
+        symbols: list[Array] = [
+            graph.emit("lookup", "float", *coordinates, static=(table, c)) for c in range(table.channels)
+        ]
+        return tuple(symbols)
     if not any(is_drjit(x) for x in coordinates):
         values = _numpy_lookup(table, *coordinates)
         return tuple(values[c] for c in range(table.channels))
@@ -79,10 +82,10 @@ def lookup(table: Table, *coordinates: Any) -> tuple[Any, ...]:
     # four channels come in one fetch
     width = 4 if table.channels % 4 == 0 else 1
     fetched = kind.vec4 if width == 4 else kind.float
-    result: list[Any] = [0.0] * table.channels
+    result: list[Array] = [0.0] * table.channels
     for corner in product((0, 1), repeat=len(cells)):
-        weight: Any = 1.0
-        index: Any = UInt(0)
+        weight: Array = 1.0
+        index: Array = UInt(0)
         for cell, place, step, count in zip(cells, places, corner, table.shape, strict=True):
             index = index * count + (cell + min(step, count - 1))
             weight = weight * (place if step else 1.0 - place)
@@ -93,7 +96,7 @@ def lookup(table: Table, *coordinates: Any) -> tuple[Any, ...]:
     return tuple(result)
 
 
-def _numpy_lookup(table: Table, *coordinates: Any) -> np.ndarray:
+def _numpy_lookup(table: Table, *coordinates: Array) -> np.ndarray:
     """Every channel, channels first: the rule in NumPy float64."""
     points = np.broadcast_arrays(*[np.asarray(x, float) for x in coordinates])
     cells, places = [], []

@@ -9,10 +9,13 @@ never tested for: `Scalar` in a signature is a promise to the reader, kept by th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypeVar
 
 Mode: TypeAlias = Literal["radiance", "importance"]
 Precision: TypeAlias = Literal["float32", "float64"]
+
+# A value whose type only Dr.Jit knows, or a symbol in its place, where code asks which it is
+Value: TypeAlias = Any
 
 
 class Mask:

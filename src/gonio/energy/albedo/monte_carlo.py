@@ -8,13 +8,15 @@ visible  normals as wo sees them; the weight is G / G1(o), at most 1 (Heitz2014b
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ... import ops
 from ...errors import InputError, did_you_mean
 from ...ops import Precision, backend
+from ...ops.backend import Array
 from ...optics import frame, masking, warp
 from ...optics.ndf import distribution
 from .quadrature import known_masking
@@ -49,15 +51,15 @@ def methods(ndf: str) -> tuple[str, ...]:
 def estimate(
     ndf: str,
     masking_name: str,
-    mu: Any,
-    alpha: Any,
+    mu: ArrayLike,
+    alpha: ArrayLike,
     method: str,
     spp: int = 1024,
     points: str = "hammersley",
     seed: int = 0,
     precision: Precision = "float32",
-    alpha_y: Any = None,
-    phi: Any = 0.0,
+    alpha_y: ArrayLike | None = None,
+    phi: ArrayLike = 0.0,
 ) -> Estimate:
     """E at each (mu, alpha) from `spp` samples.
 
@@ -85,7 +87,7 @@ def estimate(
     first, second = [kind.float(c) for c in (hammersley(spp).T if points == "hammersley" else np.zeros((2, 1)))]
     generator = kind.module.PCG32(size=count, initstate=seed)
 
-    def weight(u1: Any, u2: Any) -> Any:
+    def weight(u1: Array, u2: Array) -> Array:
         if method == "cosine":
             wi = warp.square_to_cosine_hemisphere(u1, u2)
             m = frame.half_vector(wo, wi)
@@ -103,7 +105,7 @@ def estimate(
             value = o_m * g / (mu_ * m.z)
         return dr.select((wi.z > 0.0) & (o_m > 0.0), value, 0.0)
 
-    def body(i: Any, total: Any, squares: Any, rng: Any) -> tuple[Any, Any, Any, Any]:
+    def body(i: Array, total: Array, squares: Array, rng: Array) -> tuple[Array, Array, Array, Array]:
         if points == "hammersley":
             u1, u2 = dr.gather(kind.float, first, i), dr.gather(kind.float, second, i)
         else:

@@ -35,12 +35,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ... import ops
-from ...ops import backend
+from ...ops import Direction, Pair, Scalar, Spectrum, backend
+from ...ops.backend import Array
 from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
 from ...optics.special import gauss
@@ -59,6 +61,10 @@ GLASS_JUDGE = (24, 20)
 SMALLEST_MU = 1e-6  # the integrand holds 1 / mu: the limit mu -> 0 is taken here
 SMALLEST_ALPHA = 1e-5
 _LANES = 1 << 22  # points in flight at once: 32 MiB an array
+
+
+# (distribution, wo, normal m, o.m, widths, eta) -> what is integrated, without D
+Integrand: TypeAlias = Callable[[NDF, Direction, Direction, Scalar, Pair, Array], tuple[Scalar, ...]]
 
 
 class Moments(NamedTuple):
@@ -82,7 +88,7 @@ def longest_slope(ndf: NDF) -> float:
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
     m = kind.vec3(kind.float(t * c), kind.float(0.0 * t), kind.float(c))
-    found: Any = ndf.D(m, kind.vec2(1.0, 1.0))
+    found: Array = ndf.D(m, kind.vec2(1.0, 1.0))
     density = np.asarray(found.numpy()) * c**4 * np.pi * t**2
     beyond = np.flatnonzero(density < 1e-9)
     return float(t[beyond[0]]) if len(beyond) else float(t[-1])
@@ -96,10 +102,10 @@ def known_masking(name: str) -> str:
 def moments(
     ndf: str,
     masking_name: str,
-    mu: Any,
-    alpha: Any,
-    alpha_y: Any = None,
-    phi: Any = 0.0,
+    mu: ArrayLike,
+    alpha: ArrayLike,
+    alpha_y: ArrayLike | None = None,
+    phi: ArrayLike = 0.0,
     nodes: tuple[int, int] | None = None,
 ) -> Moments:
     """E at each (mu, alpha): the albedo of D G / (4 cos cos) with F = 1, and with F = (1 - o.m)^5.
@@ -112,7 +118,7 @@ def moments(
     """
     known_masking(masking_name)
 
-    def terms(chosen: NDF, wo: Any, m: Any, o_m: Any, widths: Any, _: Any) -> tuple[Any, ...]:
+    def terms(chosen: NDF, wo: Direction, m: Direction, o_m: Scalar, widths: Pair, _: Scalar) -> tuple[Scalar, ...]:
         value = masking.masking_shadowing(masking_name, chosen, wo, frame.reflect(wo, m), m, widths)
         c = ops.maximum(1.0 - o_m, 0.0)
         return value, value * (ops.sqr(ops.sqr(c)) * c)
@@ -121,8 +127,8 @@ def moments(
 
 
 def reflected(
-    ndf: str, masking_name: str, reflectance: Callable[[Any], Any], mu: Any, alpha: Any, alpha_y: Any = None,
-    phi: Any = 0.0, nodes: tuple[int, int] | None = None,
+    ndf: str, masking_name: str, reflectance: Callable[[Scalar], Spectrum], mu: ArrayLike, alpha: ArrayLike,
+    alpha_y: ArrayLike | None = None, phi: ArrayLike = 0.0, nodes: tuple[int, int] | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Albedo of a microfacet BRDF with any Fresnel reflectance: a function of the facet's cosine to a spectrum.
 
@@ -130,17 +136,17 @@ def reflected(
     """
     known_masking(masking_name)
 
-    def terms(chosen: NDF, wo: Any, m: Any, o_m: Any, widths: Any, _: Any) -> tuple[Any, ...]:
+    def terms(chosen: NDF, wo: Direction, m: Direction, o_m: Scalar, widths: Pair, _: Scalar) -> tuple[Scalar, ...]:
         g = masking.masking_shadowing(masking_name, chosen, wo, frame.reflect(wo, m), m, widths)
-        f = reflectance(o_m)
+        f: Array = reflectance(o_m)
         return tuple(g * channel for channel in (f if backend.drjit().is_vector_v(f) else (f, f, f)))
 
     return np.stack(over_normals(ndf, terms, 3, mu, alpha, alpha_y, phi, nodes=nodes), axis=-1)
 
 
 def glass(
-    ndf: str, masking_name: str, fresnel_name: str, mu: Any, alpha: Any, eta: Any, alpha_y: Any = None,
-    phi: Any = 0.0, nodes: tuple[int, int] = GLASS_NODES,
+    ndf: str, masking_name: str, fresnel_name: str, mu: ArrayLike, alpha: ArrayLike, eta: ArrayLike,
+    alpha_y: ArrayLike | None = None, phi: ArrayLike = 0.0, nodes: tuple[int, int] = GLASS_NODES,
 ) -> TwoWays:  # fmt: skip
     """Power reflected and transmitted by a rough dielectric (albedo 1); their sum is E(mu, alpha, eta).
 
@@ -149,7 +155,7 @@ def glass(
     known_masking(masking_name)
     kind = fresnel.kind(fresnel_name)
 
-    def terms(chosen: NDF, wo: Any, m: Any, o_m: Any, widths: Any, eta_: Any) -> tuple[Any, ...]:
+    def terms(chosen: NDF, wo: Direction, m: Direction, o_m: Scalar, widths: Pair, eta_: Scalar) -> tuple[Scalar, ...]:
         cos_t = fresnel.cos_transmitted(o_m, eta_)
         f = kind.dielectric(o_m, cos_t, eta_)
         mirrored, through = frame.reflect(wo, m), frame.refract(wo, m, cos_t, eta_)
@@ -162,7 +168,7 @@ def glass(
 
 
 def average(
-    ndf: str, masking_name: str, alpha: Any, nodes: tuple[int, int] | None = None, count: int = 32
+    ndf: str, masking_name: str, alpha: ArrayLike, nodes: tuple[int, int] | None = None, count: int = 32
 ) -> np.ndarray:
     """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by Gauss-Legendre in sqrt(mu)."""
     x, w = gauss(count)
@@ -171,8 +177,8 @@ def average(
 
 
 def over_normals(
-    ndf: str, terms: Callable[..., tuple[Any, ...]], channels: int, mu: Any, alpha: Any, alpha_y: Any, phi: Any,
-    eta: Any = None, nodes: tuple[int, int] | None = None,
+    ndf: str, terms: Integrand, channels: int, mu: ArrayLike, alpha: ArrayLike, alpha_y: ArrayLike | None,
+    phi: ArrayLike, eta: ArrayLike | None = None, nodes: tuple[int, int] | None = None,
 ) -> list[np.ndarray]:  # fmt: skip
     """int D(m) (o.m) / mu terms(...) dm over the normals that mirror o above the surface or, with eta, that o sees.
 
@@ -196,7 +202,7 @@ def over_normals(
 
 
 def _over_azimuths(
-    ndf: NDF, terms: Callable[..., tuple[Any, ...]], channels: int, points: list[np.ndarray], nodes: tuple[int, int],
+    ndf: NDF, terms: Integrand, channels: int, points: list[np.ndarray], nodes: tuple[int, int],
     sides: int, through: bool,
 ) -> list[np.ndarray]:  # fmt: skip
     """One entry of a wavefront is a point and a stretched azimuth; slopes are a loop inside the kernel."""
@@ -220,9 +226,9 @@ def _over_azimuths(
 
 
 def _over_slopes(
-    ndf: NDF, terms: Callable[..., tuple[Any, ...]], channels: int, mu: Any, alpha: Any, phi: Any, eta: Any, chi: Any,
-    chi_weight: Any, side: Any, n_slope: int, limit: Any,
-) -> list[Any]:  # fmt: skip
+    ndf: NDF, terms: Integrand, channels: int, mu: Array, alpha: Array, phi: Array, eta: Array | None,
+    chi: Array, chi_weight: Array, side: Array, n_slope: int, limit: Array,
+) -> list[Array]:  # fmt: skip
     """The integral over slopes along one stretched azimuth, times the azimuth's weight."""
     dr = backend.drjit()
     Float = type(mu)
@@ -282,7 +288,7 @@ def _over_slopes(
     # tan(delta) = tan(theta_o) cos(phi_m - phi_o)
     delta = dr.atan((slope.x * wo.x + slope.y * wo.y) / (spread * mu))
 
-    def x_at(theta: Any) -> Any:
+    def x_at(theta: Array) -> Array:
         """The variable at an angle of the normal; beyond the distribution's end, its end."""
         inside = theta < 0.5 * ops.pi - 1e-9
         t = dr.select(inside, dr.tan(dr.select(inside, theta, 0.0)) / spread, limit)
@@ -310,7 +316,7 @@ def _over_slopes(
 
     node, node_weight = [Float(v) for v in gauss(n_slope)]
 
-    def body(i: Any, *sums: Any) -> tuple[Any, ...]:
+    def body(i: Array, *sums: Array) -> tuple[Array, ...]:
         s, ds = dr.gather(Float, node, i % n_slope), dr.gather(Float, node_weight, i % n_slope)
         if eta is not None:
             s, ds = s * s * (3.0 - 2.0 * s), ds * 6.0 * s * (1.0 - s)
@@ -342,10 +348,10 @@ def _in_three(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([x, 1.0 + x, 2.0 + x]), np.tile(w, 3)
 
 
-def _asinh(t: Any) -> Any:
+def _asinh(t: Array) -> Array:
     """asinh for t >= 0."""
     return ops.log(t + ops.sqrt(1.0 + t * t))
 
 
-def _signed_asinh(t: Any) -> Any:
+def _signed_asinh(t: Array) -> Array:
     return ops.copysign(_asinh(ops.abs(t)), t)

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...models.microfacet import widths
-from ...ops import backend, dot, maximum, sqrt, vec3, where
+from ...ops import Direction, Pair, Scalar, backend, dot, maximum, sqrt, vec3, where
+from ...ops.backend import Array
 from ...ops.graph import Node, RecordingError
 from ...optics import frame, fresnel
 from ...optics.ndf import distribution
@@ -28,20 +29,20 @@ MOST_BOUNCES = 128  # at alpha = 1 less than 1e-9 of the light is left after the
 FLAT = 1e-6  # below this |w.z| a walker stays at its height
 
 
-def signed_lambda(w: Any, alpha: Any) -> Any:
+def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
     """Smith's Lambda with its sign: Lambda(-w) = -1 - Lambda(w)."""
     above = distribution("ggx").Lambda(w, alpha)
     return where(w.z > 0.0, above, -1.0 - above)
 
 
-def escape(w: Any, height: Any, alpha: Any) -> Any:
+def escape(w: Direction, height: Array, alpha: Pair) -> Array:
     """G1(w, h): the chance to leave from C(h) = height along w; 0 downward."""
     dr = backend.drjit()
     power = maximum(distribution("ggx").Lambda(w, alpha), 0.0)
     return where(w.z > 0.0, dr.power(dr.clip(height, 1e-12, 1.0), power), 0.0)
 
 
-def meet(w: Any, height: Any, u: Any, alpha: Any) -> tuple[Any, Any]:
+def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Array]:
     """(C(h') where it meets the surface next, whether it leaves)."""
     dr = backend.drjit()
     leaves = u > 1.0 - escape(w, height, alpha)
@@ -54,7 +55,7 @@ def meet(w: Any, height: Any, u: Any, alpha: Any) -> tuple[Any, Any]:
     return dr.clip(there, 1e-12, 1.0), leaves
 
 
-def visible_density(v: Any, m: Any, alpha: Any) -> Any:
+def visible_density(v: Direction, m: Direction, alpha: Pair) -> Scalar:
     """Density of normals as v sees them, above or below the horizon: max(v.m, 0) D(m) / projected area (Heitz2016)."""
     slant = sqrt(v.z * v.z + (alpha.x * v.x) * (alpha.x * v.x) + (alpha.y * v.y) * (alpha.y * v.y))
     # v.z + slant cancels for v.z < 0; slant^2 - v.z^2 does not
@@ -66,14 +67,15 @@ def visible_density(v: Any, m: Any, alpha: Any) -> Any:
 class Left(NamedTuple):
     """Where a walk ended: direction, weight (a spectrum), meetings."""
 
-    w: Any
-    weight: Any
-    bounces: Any
+    w: Array
+    weight: Array
+    bounces: Array
 
 
-def walk(base: Any, wo: Any, wi: Any, rng: Any, alpha: Any, power: bool) -> tuple[Any, Left]:
+def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) -> tuple[Array, Left]:
     """Follow one walker a lane from wo; (light of two meetings or more that goes out along wi, where it went itself).
 
+    base   a conductor or a dielectric, bound
     wi     the target, or None
     power  whether transmission is of power, or of radiance, which carries (eta_o / eta_i)^2
     The value is times |cos theta_i|.
@@ -91,15 +93,15 @@ def walk(base: Any, wo: Any, wi: Any, rng: Any, alpha: Any, power: bool) -> tupl
     weight = type(base.albedo)(weight)
     eta_of = (lambda s: dr.select(s > 0.0, base.eta, 1.0 / base.eta)) if not metal else (lambda s: Float(1.0))
 
-    def reflectance(cos: Any, eta: Any) -> Any:
+    def reflectance(cos: Array, eta: Array) -> Array:
         if metal:
             return base.reflectance(cos)  # a spectrum, albedo included
         return base.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
 
-    def uniform(generator: Any) -> Any:
+    def uniform(generator: Array) -> Array:
         return generator.next_float64() if kind.float is backend.types("float64").float else generator.next_float32()
 
-    def onward(v: Any, side: Any, height: Any) -> Any:
+    def onward(v: Array, side: Array, height: Array) -> Array:
         """Phase function from v to the target times the chance to leave along it; no albedo for glass."""
         eta = eta_of(side)
         target = vec3(wi.x, wi.y, wi.z) * side
@@ -118,7 +120,9 @@ def walk(base: Any, wo: Any, wi: Any, rng: Any, alpha: Any, power: bool) -> tupl
         below = vec3(-target.x, -target.y, -target.z)
         return reflected + where((target.z < 0.0) & (o_m > 0.0), down * escape(below, 1.0 - height, alpha), 0.0)
 
-    def body(w: Any, height: Any, side: Any, weight: Any, total: Any, alive: Any, bounces: Any, rng: Any) -> tuple:
+    def body(
+        w: Array, height: Array, side: Array, weight: Array, total: Array, alive: Array, bounces: Array, rng: Array
+    ) -> tuple:
         there, leaves = meet(w, height, uniform(rng), alpha)
         alive = alive & ~leaves
         v = vec3(-w.x, -w.y, -w.z)
@@ -165,12 +169,12 @@ def walk(base: Any, wo: Any, wi: Any, rng: Any, alpha: Any, power: bool) -> tupl
     return total, Left(w * end_side, weight, bounces)
 
 
-def generator(wo: Any, wi: Any, seed: Any) -> Any:
+def generator(wo: Direction, wi: Direction, seed: Array) -> Array:
     """A generator a lane, seeded by the bits of both directions and the seed: new numbers for each pair."""
     dr = backend.drjit()
     kind = backend.types_like(type(wo))
     UInt = kind.module.UInt32
-    state: Any = UInt(0x9E3779B9)
+    state: Array = UInt(0x9E3779B9)
     for value in (*(wo[i] for i in range(3)), *(wi[i] for i in range(3)), seed):
         bits = dr.reinterpret_array(UInt, kind.module.Float(value))
         state = (state ^ bits) * UInt(0x85EBCA6B)

@@ -16,12 +16,13 @@ two axes, see `anisotropic`.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from ... import ops
-from ...ops import Table, sqr, sqrt
+from ...ops import Scalar, Table, sqr, sqrt
+from ...ops.backend import Array
 from ...optics.special import gauss
 from .. import cache
 from ..albedo import quadrature
@@ -39,7 +40,7 @@ def bernstein(x: np.ndarray, degree: int) -> np.ndarray:
     return x[..., None] ** k * (1.0 - x[..., None]) ** (degree - k)
 
 
-def fit(form: Form, bend: np.ndarray, missing: Any, nodes: int = NODES_OF_FIT) -> np.ndarray:
+def fit(form: Form, bend: np.ndarray, missing: Callable[..., np.ndarray], nodes: int = NODES_OF_FIT) -> np.ndarray:
     """c_k >= 0 at each bend: nearly minimax, by non-negative least squares, reweighted.
 
     missing  a function of mu (rows, nodes) to M
@@ -232,13 +233,13 @@ def _inverse(form: Form, rows: np.ndarray, bend: np.ndarray, count: int) -> np.n
     return np.array([np.interp(np.linspace(0.0, 1.0, count), row, grid) for row in below])
 
 
-def coefficients(ndf: str, masking: str, alpha: Any) -> tuple[Any, ...]:
+def coefficients(ndf: str, masking: str, alpha: Scalar) -> tuple[Scalar, ...]:
     """c_0 to c_10 and M_avg, at an isotropic width."""
     row = ops.inset(sqrt(alpha), ROWS)
     return ops.lookup(isotropic(ndf, masking), row)
 
 
-def turn(found: tuple[Any, ...], along: Any, across: Any) -> tuple[Any, ...]:
+def turn(found: tuple[Array, ...], along: Array, across: Array) -> tuple[Array, ...]:
     """c_0 to c_10 of a direction from the channels of `anisotropic`.
 
     along, across  (1 + y) / 2 and (1 - y) / 2
@@ -253,7 +254,7 @@ def turn(found: tuple[Any, ...], along: Any, across: Any) -> tuple[Any, ...]:
 
 
 @ops.function
-def _weigh(factors: tuple[Any, ...], terms: tuple[Any, ...]) -> Any:
+def _weigh(factors: tuple[Array, ...], terms: tuple[Array, ...]) -> Array:
     """Sum of the terms, each times its factor."""
     total = factors[0] * terms[0]
     for factor, value in zip(factors[1:], terms[1:], strict=True):
@@ -261,7 +262,7 @@ def _weigh(factors: tuple[Any, ...], terms: tuple[Any, ...]) -> Any:
     return total
 
 
-def missing(form: Form, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
+def missing(form: Form, found: tuple[Array, ...], bend: Array, mu: Array) -> Array:
     """M(mu), not below 0.
 
     found  from `coefficients`, the c_k first;  bend  `knee` at this width
@@ -271,7 +272,7 @@ def missing(form: Form, found: tuple[Any, ...], bend: Any, mu: Any) -> Any:
 
 
 @ops.function
-def _polynomial(c: tuple[Any, ...], x: Any) -> Any:
+def _polynomial(c: tuple[Array, ...], x: Array) -> Array:
     """c_0 + c_1 x + c_2 x^2 + ..., by Horner's rule."""
     total = c[-1]
     for factor in reversed(c[:-1]):
@@ -279,7 +280,7 @@ def _polynomial(c: tuple[Any, ...], x: Any) -> Any:
     return total
 
 
-def _power(x: Any, exponent: int) -> Any:
+def _power(x: Array, exponent: int) -> Array:
     """x^exponent, by squaring."""
     if exponent == 1:
         return x

@@ -31,6 +31,7 @@ from ...ops import (
     vec3,
     where,
 )
+from ...ops.backend import Array
 from ..bend import form_of, knee
 from . import curves, lobe
 
@@ -144,7 +145,8 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     m_thin, m_dense = maximum(thin[-1], 0.0), maximum(dense[-1], 0.0)
     both = maximum(m_thin + m_dense, 2.0 * lobe.NOTHING)
     some = (m_thin > lobe.NOTHING) & (m_dense > lobe.NOTHING) & (abs(index - 1.0) > 1e-4)
-    enters = 1.0 - base.mean_reflectance()  # type: ignore[operator]
+    reflected: Array = base.mean_reflectance()  # a number, of glass
+    enters = 1.0 - reflected
 
     def side(name: str, found: tuple[Scalar, ...], average: Scalar, through: Scalar) -> Side:
         bend = knee(form_of(*names[:2], name), surface.masking, width)

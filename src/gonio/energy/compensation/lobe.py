@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 from ... import ops
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, sincos, sqrt, vec3, where
+from ...ops.backend import Array
 
 NOTHING = 1e-5  # M_avg below this is all error of the fit: nothing is given back
 
@@ -63,7 +64,7 @@ def over_pi(average: Scalar) -> Scalar:
     return where(some, ops.inv_pi / where(some, average, 1.0), 0.0)
 
 
-def from_square(mu2: Any, u: Scalar) -> Direction:
+def from_square(mu2: Array, u: Scalar) -> Direction:
     """The direction above the surface of squared cosine mu2 and azimuth 2 pi u."""
     mu2 = clamp(mu2, 1e-12, 1.0)
     sin_theta, (s, c) = sqrt(1.0 - mu2), sincos((2.0 * ops.pi) * u)

@@ -14,7 +14,7 @@ Where a base returns more than it receives, nothing is missing and nothing is ad
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from ...ops import (
     where,
 )
 from ...ops import pi as PI
+from ...ops.backend import Array
 from ...optics.special import gauss
 from . import lobe
 
@@ -127,7 +128,7 @@ def _uniform(base: BSDF) -> BSDF:
     name = type(base).__name__
     hint = "give numbers and plain colours; a Conductor or a Dielectric inside takes textures and arrays"
 
-    def one(parameter: Parameter, value: Any) -> Any:
+    def one(parameter: Parameter, value: Array) -> object:
         if value is None or dr.width(value) == 1:
             return value
         parts = list(value) if dr.is_vector_v(value) else [value]
@@ -141,7 +142,7 @@ def _uniform(base: BSDF) -> BSDF:
     return binding.bind(base, one)
 
 
-def _check_computed(*values: Any) -> None:
+def _check_computed(*values: object) -> None:
     if any(isinstance(value, Node) for value in values):
         what = "a base whose energy is found by sampling cannot be recorded"
         raise RecordingError(what, "KullaConty.base", "a Conductor or a Dielectric can")
@@ -153,7 +154,7 @@ def _types(base: BSDF) -> backend.Types:
     return backend.types(None)
 
 
-def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Any, Any]:
+def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array]:
     """E of the white base and of the base itself at each node, the mean over azimuth: spectra with NODES entries.
 
     Directions come from `sample` with the same POINTS of a lattice (R4, powers of x^5 = x + 1) at every node:
@@ -173,7 +174,7 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Any, Any]:
     wi, pdf = dr.detach(drawn.wi), dr.detach(drawn.pdf)
     share = where(pdf > 0.0, safe_div(1.0 / POINTS, pdf), 0.0)
 
-    def albedo(model: Any) -> Any:
+    def albedo(model: BSDF) -> Array:
         value = model.eval(wo, wi)
         return type(value)(*[dr.block_sum(channel * share, POINTS) for channel in value])
 
@@ -204,7 +205,7 @@ def _inverse(lost: np.ndarray) -> np.ndarray:
     return np.interp(np.linspace(0.0, 1.0, LOBE_NODES), below / below[-1], grid)
 
 
-def _read(table: Any, x: Any) -> Any:
+def _read(table: Array, x: Array) -> Array:
     """A derived array with nodes at both ends of [0, 1], linear between them."""
     dr = backend.drjit()
     kind = backend.types_like(type(x))

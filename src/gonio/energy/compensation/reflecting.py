@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ...models import BSDF, Microsurface
 from ...models.microfacet import SMOOTH, widths
@@ -23,6 +23,7 @@ from ...ops import (
     sqrt,
     where,
 )
+from ...ops.backend import Array
 from ...optics import frame
 from ..bend import form_of, knee
 from . import curves, lobe
@@ -118,7 +119,7 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     width = sqrt(alpha.x * alpha.y) if two else alpha.x
     *c, mean = curves.coefficients(*names, width)
     mean = maximum(mean, 0.0)
-    F_avg: Any = base.mean_reflectance(average)
+    F_avg: Array = base.mean_reflectance(average)
     turned, true_mean = None, mean
     if two:
         larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)

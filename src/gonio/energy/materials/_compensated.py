@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from ... import ops
 from ...models import BSDF, Sample, bsdf, method
 from ...models.material import Delta, InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
+from ...ops.backend import Array
 from ...optics.special import gauss
 from ..compensation import missing, reflecting
 from ..compensation.lobe import MissingEnergy
@@ -68,7 +69,7 @@ class _Compensated(BSDF):
     def delta(self) -> Delta:
         return self.base.delta
 
-    def tint(self, wo: Direction) -> Any:
+    def tint(self, wo: Direction) -> Spectrum:
         """The base's."""
         return self.base.tint(wo)
 
@@ -102,7 +103,7 @@ class _Compensated(BSDF):
         return self.derived.missing.at(w)
 
     @method
-    def terms(self, wo: Direction, wi: Direction) -> Any:
+    def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
         """`Parts`, with D, G and F of the base where it has them."""
         return with_terms(self.base, wo, wi, self.base.eval(wo, wi), self.added(wo, wi, "radiance"))
 
@@ -164,6 +165,6 @@ def lobe_ratio(added: Spectrum, lost: MissingEnergy) -> Scalar:
     return safe_div(mean(added), maximum(mean(lost.F_avg * lost.factor), 1e-6))
 
 
-def _direction(types: backend.Types, mu: NDArray[np.float64], phi: float = 0.0) -> Any:
+def _direction(types: backend.Types, mu: NDArray[np.float64], phi: float = 0.0) -> Array:
     sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
     return backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)

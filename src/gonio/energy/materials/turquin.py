@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ...models.material import Delta, InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
 from ..compensation import missing, reflecting
 from ..compensation.lobe import MissingEnergy
-from ._compensated import with_terms
+from ._compensated import AllParts, Parts, with_terms
 
 
 class Derived(NamedTuple):
@@ -45,7 +45,7 @@ class Turquin(BSDF):
     def delta(self) -> Delta:
         return self.base.delta
 
-    def tint(self, wo: Direction) -> Any:
+    def tint(self, wo: Direction) -> Spectrum:
         """The base's."""
         return self.base.tint(wo)
 
@@ -79,7 +79,7 @@ class Turquin(BSDF):
         return self.base.eval(wo, wi, mode) * self._factor(wo)
 
     @method
-    def terms(self, wo: Direction, wi: Direction) -> Any:
+    def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
         """The base, and what the factor adds to it; D, G and F of the base."""
         single = self.base.eval(wo, wi)
         return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))

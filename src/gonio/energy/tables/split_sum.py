@@ -7,14 +7,13 @@ A + B is E at F = 1, and B the albedo at F = (1 - o.m)^5.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...errors import InputError
 from ...models import Microsurface
 from ...models.microfacet import widths
 from ...ops import Direction, Scalar, Spectrum, Table, inset, lookup, maximum, sqrt
+from ...ops.backend import Array
 from .. import cache
 from ..albedo import quadrature
 from ..albedo.monte_carlo import hammersley
@@ -108,7 +107,7 @@ def _read(pyramid: list[np.ndarray], w: np.ndarray, mip: float) -> np.ndarray:
     """Trilinear lookup of directions in the pyramid; longitudes wrap."""
     mip = min(mip, len(pyramid) - 1.0)
     low = int(mip)
-    total: Any = 0.0
+    total: Array = 0.0
     for level, share in ((low, 1.0 - (mip - low)), (low + 1, mip - low)):
         if share == 0.0:
             continue
