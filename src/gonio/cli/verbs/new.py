@@ -13,7 +13,7 @@ from typer import Argument, Option
 
 from ...errors import InputError, did_you_mean
 from ..options import Json
-from .base import SUPPORT, verb
+from .base import MATERIALS, verb
 
 TEMPLATES = Path(__file__).parents[1] / "templates"  # a folder for each kind, with $file and $title to fill in
 
@@ -22,7 +22,7 @@ def _kinds() -> list[str]:
     return sorted(folder.name for folder in TEMPLATES.iterdir())
 
 
-@verb(SUPPORT, place=0)
+@verb(MATERIALS, place=9)
 def new(
     kind: Annotated[str, Argument(metavar="material", help="What to begin.", autocompletion=_kinds)],
     name: Annotated[str, Argument(metavar="NAME", help="Its name, such as velvet or crushed-velvet.")],
