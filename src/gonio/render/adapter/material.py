@@ -47,7 +47,7 @@ class PlacedMaterial:
                 self.slots[name] = Slot(variant, props, parameter, where, preset)
                 values[name] = self.slots[name].plain
             else:
-                values[name] = props.get(name, parameter.default)
+                values[name] = props.get(name, preset.values.get(name, parameter.default))
                 parameter.check(values[name], where)
         unknown = list(props.unqueried())
         if unknown:

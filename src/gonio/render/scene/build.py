@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from ...errors import GonioWarning, InputError
+from ...models import Parameter
+from ..images import RGB
+from ..types import MitsubaBSDF, Plugin, PluginDict, Scene
 from . import meshes, schema, textures
-from .materials import BY_TYPE, MaterialPart
+from .materials import BY_TYPE, MaterialPart, Value, numbers_in
 from .text import pointer
 from .values import ImageTexture, NormalMap, rgb
 
@@ -18,7 +22,7 @@ from .values import ImageTexture, NormalMap, rgb
 _SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
-def build(description: schema.SceneDescription, mi: Any) -> Any:
+def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
     """The `mi.Scene`: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
 
     Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
@@ -27,25 +31,25 @@ def build(description: schema.SceneDescription, mi: Any) -> Any:
 
 
 class _Builder:
-    def __init__(self, description: schema.SceneDescription, mi: Any) -> None:
+    def __init__(self, description: schema.SceneDescription, mi: ModuleType) -> None:
         from .. import adapter, lights  # here, since they start Dr.Jit
 
         adapter.register(mi)
         self.adapter = adapter
         lights.register(mi)
         self.description, self.mi = description, mi
-        self.bsdfs: dict[MaterialPart, Any] = {}
-        self.images: dict[tuple[Any, ...], np.ndarray] = {}
+        self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
+        self.images: dict[tuple[Path, bool], RGB] = {}
 
-    def scene(self) -> Any:
-        scene: dict[str, Any] = {"type": "scene", "sensor": self.sensor()}
+    def scene(self) -> Scene:
+        scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
         for index, shape in enumerate(self.description.shapes):
             scene[f"shape{index}"] = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
         for index, light in enumerate(self.description.lights):
             scene[f"light{index}"] = self.light(light, pointer("scene", "lights", index), f"light{index}")
         return self.load(scene, "/scene")
 
-    def load(self, plugin: dict[str, Any], where: str) -> Any:
+    def load(self, plugin: PluginDict, where: str) -> Plugin:
         """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
         try:
             with warnings.catch_warnings():
@@ -60,7 +64,7 @@ class _Builder:
                 "simplify this part, and report it if it should work",
             ) from error
 
-    def sensor(self) -> dict[str, Any]:
+    def sensor(self) -> PluginDict:
         camera = self.description.camera
         placed = camera.transform
         width, height = camera.film.size
@@ -86,7 +90,7 @@ class _Builder:
 
     # ------------------------------------------------------------------ lights
 
-    def light(self, light: Any, where: str, name: str) -> Any:
+    def light(self, light: schema.LightSource, where: str, name: str) -> Plugin | PluginDict:
         if isinstance(light, schema.AreaLight):
             # Mitsuba merges Python plugins whose properties are equal: the tag keeps two like lamps apart
             emitter = {"type": "gonio_area", "radiance": {"type": "rgb", "value": rgb(light.energy)}, "tag": name}
@@ -95,13 +99,16 @@ class _Builder:
             intensity = {"type": "rgb", "value": rgb(light.energy)}
             return {"type": "point", "position": list(light.position), "intensity": intensity}
         source = light.texture if light.texture is not None else light.radiance
+        assert source is not None, "one of the two is given"
         if isinstance(source, ImageTexture):
             return textures.environment(self.mi, self.image(source, f"{where}/texture"))
         return {"type": "constant", "radiance": {"type": "rgb", "value": rgb(source)}}
 
     # ------------------------------------------------------------------ shapes
 
-    def shape(self, shape: Any, where: str, name: str, emitter: dict[str, Any] | None = None) -> Any:
+    def shape(
+        self, shape: schema.Shape, where: str, name: str, emitter: PluginDict | None = None
+    ) -> Plugin | PluginDict:
         matrix = shape.transform.matrix()
         bsdf = self.bsdf(shape.material or BY_TYPE["matte"](type="matte"), f"{where}/material")
         # An object, not a dict: Mitsuba merges equal dicts, and one emitter cannot belong to two shapes.
@@ -114,7 +121,7 @@ class _Builder:
             return native
         return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
 
-    def native_shape(self, shape: Any, matrix: np.ndarray) -> dict[str, Any] | None:
+    def native_shape(self, shape: schema.Shape, matrix: np.ndarray) -> PluginDict | None:
         """Mitsuba's own exact shape, where it has one."""
         to_world = np.eye(4)
         if isinstance(shape, schema.Sphere):
@@ -132,7 +139,7 @@ class _Builder:
             return {"type": "rectangle", "to_world": self.mi.ScalarTransform4f(to_world)}
         return None
 
-    def triangles(self, shape: Any, where: str) -> meshes.Triangles:
+    def triangles(self, shape: schema.Shape, where: str) -> meshes.Triangles:
         if isinstance(shape, schema.Disk):
             return meshes.disk(shape.radius, shape.inner_radius, shape.phi_max)
         if isinstance(shape, schema.Cylinder):
@@ -141,19 +148,20 @@ class _Builder:
             return meshes.cone(shape.radius, shape.height, shape.phi_max)
         if isinstance(shape, schema.Cube):
             return meshes.cube()
+        assert isinstance(shape, schema.Mesh), "the others are Mitsuba's own"
         path = self.description.locate(shape.file, f"{where}/file")
         return meshes.read_mesh(path, self.description.where(f"{where}/file"))
 
     # ------------------------------------------------------------------ materials
 
-    def bsdf(self, material: MaterialPart, where: str) -> Any:
+    def bsdf(self, material: MaterialPart, where: str) -> MitsubaBSDF:
         if material not in self.bsdfs:
             self.bsdfs[material] = self.load(self.plugin(material, where), where)
         return self.bsdfs[material]
 
-    def plugin(self, material: MaterialPart, where: str) -> dict[str, Any]:
+    def plugin(self, material: MaterialPart, where: str) -> PluginDict:
         """The material as a Mitsuba dict."""
-        plugin: dict[str, Any] = {"type": self.adapter.register_model(self.mi, material.model)}
+        plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
         # Seen from behind nothing is black, as in the lab; a material that transmits has two sides of its own.
         plugin["two_sided"] = material.two_sided is not False
         if material.preset is not None:
@@ -168,9 +176,7 @@ class _Builder:
             elif parameters[name].kind == "spectrum":
                 plugin[name] = self.colour(value, parameters[name], here)
             elif isinstance(value, tuple):
-                pair = [self.scalar(item, parameters[name], here, squared) for item in value]
-                if any(isinstance(item, dict) for item in pair):  # the plugin takes two numbers or two textures
-                    pair = [item if isinstance(item, dict) else self.flat(item) for item in pair]
+                pair = (self.scalar(item, parameters[name], here, squared) for item in value)
                 plugin[f"{name}_x"], plugin[f"{name}_y"] = pair
             else:
                 plugin[name] = self.scalar(value, parameters[name], here, squared)
@@ -178,33 +184,31 @@ class _Builder:
             plugin = self.normal_mapped(plugin, material.normalmap, f"{where}/normalmap")
         return plugin
 
-    def colour(self, value: Any, parameter: Any, where: str) -> Any:
+    def colour(self, value: Value, parameter: Parameter, where: str) -> PluginDict:
         if isinstance(value, ImageTexture):
             pixels = self.image(value, where)
             self.check_range(pixels, parameter, value, where)
             return textures.bitmap(self.mi, np.broadcast_to(pixels, (*pixels.shape[:2], 3)), value.filter, value.wrap)
-        return {"type": "rgb", "value": rgb(value)}
+        numbers = list(numbers_in(value))
+        return {"type": "rgb", "value": numbers if len(numbers) == 3 else numbers * 3}
 
-    def scalar(self, value: Any, parameter: Any, where: str, squared: bool) -> Any:
+    def scalar(self, value: Value, parameter: Parameter, where: str, squared: bool) -> float | PluginDict:
         if isinstance(value, ImageTexture):
             pixels = self.image(value, where).mean(axis=2, keepdims=True)
             pixels = pixels**2 if squared else pixels
             self.check_range(pixels, parameter, value, where)
             return textures.bitmap(self.mi, pixels, value.filter, value.wrap)
-        return float(value) ** 2 if squared else float(value)
+        number = next(numbers_in(value))
+        return number**2 if squared else number
 
-    def flat(self, value: float) -> dict[str, Any]:
-        """A texture that has one value everywhere."""
-        return textures.bitmap(self.mi, np.full((1, 1, 1), value, np.float32), "nearest", "clamp")
-
-    def normal_mapped(self, plugin: dict[str, Any], texture: NormalMap, where: str) -> dict[str, Any]:
+    def normal_mapped(self, plugin: PluginDict, texture: NormalMap, where: str) -> PluginDict:
         pixels = self.image(texture, where)
         if pixels.shape[2] != 3:
             raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
         bitmap = textures.bitmap(self.mi, pixels, "bilinear", "repeat") | {"raw": True}
         return {"type": "normalmap", "normalmap": bitmap, "bsdf": plugin}
 
-    def image(self, texture: ImageTexture | NormalMap, where: str) -> np.ndarray:
+    def image(self, texture: ImageTexture | NormalMap, where: str) -> RGB:
         srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
         path = self.description.locate(texture.file, f"{where}/file")
         if (path, srgb) not in self.images:
@@ -212,7 +216,7 @@ class _Builder:
             self.images[path, srgb] = textures.load_image(self.mi, path, here, srgb=srgb)
         return self.images[path, srgb]
 
-    def check_range(self, pixels: np.ndarray, parameter: Any, texture: ImageTexture, where: str) -> None:
+    def check_range(self, pixels: RGB, parameter: Parameter, texture: ImageTexture, where: str) -> None:
         low, high = float(pixels.min()), float(pixels.max())
         if low < parameter.low or (high > parameter.high and not parameter.soft_high):
             wrong = low if low < parameter.low else high

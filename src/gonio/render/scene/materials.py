@@ -11,9 +11,9 @@ from __future__ import annotations
 import functools
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, TypeVar, Union
 
 import numpy as np
 from pydantic import (
@@ -35,6 +35,10 @@ from ...models import BSDF, Parameter, models, outside
 from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
+T = TypeVar("T")
+
+# What a parameter may be in a scene file
+Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[float | ImageTexture, ...]"
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class LabType:
     model: str
     doc: str
     renamed: dict[str, str] = field(default_factory=dict)
-    defaults: dict[str, Any] = field(default_factory=dict)
+    defaults: Mapping[str, float | str] = field(default_factory=dict)
     required: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
 
@@ -83,7 +87,7 @@ LAB = {
 class Argument(NamedTuple):
     """A parameter's value in a scene. `key` is its key in the file; `squared`: the parameter is the value's square."""
 
-    value: Any
+    value: Value
     key: str
     squared: bool = False
 
@@ -102,7 +106,7 @@ class MaterialPart(Part):
     dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
     lab: ClassVar[LabType | None]
 
-    def get(self, key: str) -> Any:
+    def get(self, key: str) -> Value | None:
         return getattr(self, _attribute(key))
 
     def arguments(self) -> dict[str, Argument]:
@@ -135,7 +139,7 @@ class MaterialPart(Part):
             elif isinstance(value, (bool, str)):
                 values[name] = value
             elif not any(isinstance(item, ImageTexture) for item in _items(value)):
-                numbers = [item**2 if squared else item for item in _items(value)]
+                numbers = [item**2 if squared else item for item in numbers_in(value)]
                 values[name] = tuple(numbers) if isinstance(value, (list, tuple)) else numbers[0]
         for name, parameter in parameters.items():
             if parameter.required and name not in values:
@@ -166,9 +170,10 @@ class MaterialPart(Part):
     def _check_preset(self) -> None:
         if self.preset is None:
             return
-        taken = [key for key in ("eta", "k") if key in self.declared and self.get(key) is not None]
+        sets = {name for preset in self.model.presets().values() for name in preset.values}
+        taken = [key for key, p in self.declared.items() if p.name in sets and self.get(key) is not None]
         if taken:
-            raise invalid(f"both 'preset' and '{taken[0]}' are given", "a preset sets the index; keep one", "preset")
+            raise invalid(f"both 'preset' and '{taken[0]}' are given", f"a preset sets {taken[0]}; keep one", "preset")
         try:
             self.model.preset(self.preset)
         except InputError as error:
@@ -190,7 +195,7 @@ _KINDS: dict[str, Any] = {
 }
 
 
-def numbers_in(value: Any) -> Iterator[float]:
+def numbers_in(value: object) -> Iterator[float]:
     """The plain numbers of a value: itself, a colour's channels, a pair's widths."""
     if isinstance(value, (list, tuple)):
         for item in value:
@@ -199,12 +204,12 @@ def numbers_in(value: Any) -> Iterator[float]:
         yield float(value)
 
 
-def _items(value: Any) -> tuple[Any, ...]:
+def _items(value: Value) -> tuple[Value, ...]:
     return tuple(value) if isinstance(value, (list, tuple)) else (value,)
 
 
-def _in_range(parameter: Parameter, key: str) -> Callable[[Any], Any]:
-    def check(value: Any) -> Any:
+def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
+    def check(value: T) -> T:
         for number in numbers_in(value):
             if number < parameter.low or (number > parameter.high and not parameter.soft_high):
                 raise invalid(f"{number:g} is out of range: {key} is {parameter.range}", _doc(parameter))
