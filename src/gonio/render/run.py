@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import __version__
+from .._version import __version__
 from ..errors import InputError, did_you_mean
 from . import denoise, engine, images, mitsuba_scene
 from .passes import Interrupts, Progress, Renders, run

@@ -331,9 +331,10 @@ class Renderer:
 def _give_way() -> None:
     """Let the browser's own drawing come first: lower priority for this thread and Dr.Jit's workers (Linux only)."""
     with contextlib.suppress(OSError):
+        lower = os.getpriority(os.PRIO_PROCESS, os.getpid()) + 10  # than the main thread's; 19 is the most
         for task in Path("/proc/self/task").iterdir():
             if (task / "comm").read_text().startswith("nt [") or int(task.name) == threading.get_native_id():
-                os.setpriority(os.PRIO_PROCESS, int(task.name), 10)
+                os.setpriority(os.PRIO_PROCESS, int(task.name), lower)
 
 
 def _worth_showing(reference: Reference, shown: int) -> bool:
