@@ -109,7 +109,7 @@ def test_changed_formulas_make_new_tables(folder, monkeypatch):
 
 def test_the_hash_of_formulas_hears_code_and_not_comments():
     plain = "def f(x):\n    return x * 2.0\n"
-    said = '"""A module."""\ndef f(x):\n    """Twice."""  # twice\n\n    return x * 2.0\n'
+    said = '"""A module."""\ndef f(x: float) -> float:\n    """Twice."""  # twice\n\n    return x * 2.0\n'
     assert cache._meaning(plain) == cache._meaning(said)
     assert cache._meaning(plain) != cache._meaning(plain.replace("2.0", "3.0"))
 

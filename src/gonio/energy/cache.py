@@ -74,11 +74,14 @@ def _formulas() -> str:
 
 
 def _meaning(source: str) -> str:
-    """What a file says to the interpreter: its syntax tree without docstrings."""
+    """What a file says to the interpreter: its syntax tree without docstrings and annotations."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:]
+        for annotation in ("returns", "annotation"):
+            if hasattr(node, annotation):
+                setattr(node, annotation, None)
     return ast.dump(tree, annotate_fields=False)
 
 
