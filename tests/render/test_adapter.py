@@ -172,6 +172,8 @@ def test_textures_vary_every_kind_of_parameter() -> None:
 
     cases = [
         ({"type": "gonio_conductor"}, "alpha", 0.1, 0.5),
+        ({"type": "gonio_conductor", "alpha_y": 0.6}, "alpha_x", 0.1, 0.5),
+        ({"type": "gonio_conductor", "alpha_x": 0.6}, "alpha_y", 0.1, 0.5),
         ({"type": "gonio_conductor", "alpha": 0.3, "k": 2.0}, "eta", 0.2, 0.9),
         ({"type": "gonio_conductor", "alpha_x": 0.1, "alpha_y": 0.6}, "rotation", 0.2, 0.8),
         ({"type": "gonio_lambert"}, "albedo", 0.2, 0.8),

@@ -269,6 +269,34 @@ assert abs(value[1 % len(value)][0] / expected - 1) < 0.02, (value, expected)
     assert got.returncode == 0, got.stderr[-2000:]
 
 
+def test_a_preset_sets_choices_and_numbers_of_a_plugin() -> None:
+    from collections.abc import Mapping
+
+    from gonio.models import BSDF, Preset, choice, spectrum
+
+    class Paint(BSDF):
+        """A diffuse surface that is matte or dead."""
+
+        kind: str = choice("dead", "how it reflects", {"matte": "as Lambert has it", "dead": "not at all"})
+        albedo: Any = spectrum(0.5, "share of light that is reflected", high=1.0)
+
+        @classmethod
+        def presets(cls) -> Mapping[str, Preset]:
+            return {"chalk": Preset("white chalk", {"kind": "matte", "albedo": 0.9})}
+
+        def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+            return self.albedo * (go.ops.abs(wi.z) * (go.ops.inv_pi if self.kind == "matte" else 0.0))
+
+    go.BSDF.family.add(Paint)
+    try:
+        bsdfs = [mi.load_dict({"type": "gonio_paint", **more}) for more in ({}, {"preset": "white chalk"})]
+        dead, chalk = (np.array(b.eval(mi.BSDFContext(), _interaction(), mi.Vector3f(WI.T))) for b in bsdfs)
+    finally:
+        go.BSDF.family.remove("paint")
+    assert not dead.any()
+    np.testing.assert_allclose(chalk[1], 0.9 / np.pi * np.abs(WI[:, 2]), rtol=1e-5)
+
+
 def test_a_class_loaded_anew_takes_its_place() -> None:
     plugins = []
     for factor in (1.0, 0.5):
