@@ -62,6 +62,21 @@ def _text(model: str, settings: Mapping[str, str], own: str = "") -> str:
     given = ",".join(filter(None, [own, *map("=".join, settings.items())]))
     return model.partition("(")[0] + (f"({given})" if given else "")
 
+    def instead_of(self, scene: Path) -> BSDF | None:
+        """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
+        is no material's name. Raises InputError for parameters without a material."""
+        from ..errors import InputError
+        from ..models import models, outside
+
+        text = str(scene)
+        head = text.partition("(")[0]
+        if not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models()):
+            return self.of(text)
+        if self.param or self.preset:
+            what = "parameters of a material given, and a scene"
+            raise InputError(what, "--param", "name a material, such as conductor, or change the scene")
+        return None
+
 
 @dataclass(frozen=True)
 class Rendering:
@@ -80,12 +95,13 @@ class Rendering:
     allow_outside: Outside = False
     allow_code: Code = False
 
-    def request(self, scene: Path, output: Path | None = None, timeout: float | None = None) -> Request:
-        """The request to render a scene, or a material that is named in its place, on a ball. Raises InputError for a
-        size or an exposure that is none."""
+    def request(
+        self, scene: Path, output: Path | None = None, timeout: float | None = None, material: BSDF | None = None
+    ) -> Request:
+        """The request to render a scene, or a material on a ball. Raises InputError for a size or an exposure that is
+        none."""
         from ..render import exposures, run
 
-        material = _material_in_place_of(scene)
         return run.Request(
             Path(material.name) if material else scene,
             output,
@@ -97,14 +113,3 @@ class Rendering:
                 "material": material,
             },
         )
-
-
-def _material_in_place_of(scene: Path) -> BSDF | None:
-    """The material of "ward.py:Ward" or "conductor(preset=Au)", where no file has that name."""
-    from ..models import models, notation, outside
-
-    text = str(scene)
-    head = text.partition("(")[0]
-    if scene.exists() or not (outside.names_code(head) or head.replace("_", "-") in models()):
-        return None
-    return notation.named(text)[0]

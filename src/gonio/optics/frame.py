@@ -56,7 +56,7 @@ def sin2(w: Direction) -> Scalar:
 
 @function
 def half_vector(wo: Direction, wi: Direction) -> Direction:
-    """Normal of the facet that mirrors wo into wi, unit; z where wo = -wi, which no facet above does."""
+    """Normal of the facet that mirrors wo into wi, unit; 0 where wo = -wi, which no facet above does."""
     h = wo + wi
     length2 = dot(h, h)
     return h * ops.rsqrt(ops.maximum(length2, TINY))

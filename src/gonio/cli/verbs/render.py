@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from ..options import Json, Rendering, SceneFile
+from ..options import Json, Material, Rendering, SceneFile
 from ..output import Bar, print_warnings
 from .base import INTERRUPTED, PICTURES, verb
 
@@ -22,6 +22,7 @@ def render(
     scene: SceneFile,
     *,
     output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help=".exr, .hdr, .png or .npz.")] = None,
+    made: Material,
     how: Rendering,
     timeout: Annotated[
         float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
@@ -38,12 +39,12 @@ def render(
       gonio render examples/phong
       gonio render examples/phong -o phong.exr --spp 256 --size 640x480
       gonio render examples/phong -o phong.png --exposure auto
-      gonio render ward.py:Ward -o ward.png
+      gonio render ward.py:Ward -p alpha=.1,.4 -o ward.png
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
     from ...render import run
 
-    request = how.request(scene, output, timeout)
+    request = how.request(scene, output, timeout, made.instead_of(scene))
     with Bar(scene.name) as bar:
         result = run.render(request, report=bar.update, notice=bar.stopping)
     if as_json:

@@ -144,7 +144,7 @@ def scene(material: dict) -> dict:
         "bake ward.py:OwnWard --size 4 -o tables",
         "bake facets.py:Flat --size 4 --lut E -o tables",
         "explain ward.py:OwnWard",
-        "render ward.py:OwnWard --spp 1 --size 16x16 -o w.exr",
+        "render ward.py:OwnWard -p alpha=.1,.3 --spp 1 --size 16x16 -o w.exr",
         "render mix(a=ward.py:OwnWard,b=mirror) --spp 1 --size 16x16 -o m.exr",
         "compensation ward.py:OwnWard --walks 1000",
         "view ward.py:OwnWard --export w.html",
