@@ -57,25 +57,25 @@ class Material:
     def text(self, model: str) -> str:
         return self.texts([model])[0]
 
-
-def _text(model: str, settings: Mapping[str, str], own: str = "") -> str:
-    given = ",".join(filter(None, [own, *map("=".join, settings.items())]))
-    return model.partition("(")[0] + (f"({given})" if given else "")
-
     def instead_of(self, scene: Path) -> BSDF | None:
         """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
         is no material's name. Raises InputError for parameters without a material."""
         from ..errors import InputError
-        from ..models import models, outside
+        from ..models import models, notation, outside
 
         text = str(scene)
         head = text.partition("(")[0]
         if not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models()):
-            return self.of(text)
+            return notation.named(self.text(text))[0]
         if self.param or self.preset:
             what = "parameters of a material given, and a scene"
             raise InputError(what, "--param", "name a material, such as conductor, or change the scene")
         return None
+
+
+def _text(model: str, settings: Mapping[str, str], own: str = "") -> str:
+    given = ",".join(filter(None, [own, *map("=".join, settings.items())]))
+    return model.partition("(")[0] + (f"({given})" if given else "")
 
 
 @dataclass(frozen=True)
