@@ -28,7 +28,8 @@ void main() { gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float
 
 const FRAGMENT = `${HEADER}${TONE_GLSL}
 uniform sampler2D picture;      // sums
-uniform float samples, exposure;
+uniform sampler2D early;        // what counts beside them while they are few: see renderer.ts
+uniform float samples, early_share, exposure;
 uniform int curve;
 uniform bool has_sign;          // a difference: what is negative is blue, what is positive orange
 uniform vec3 theme;             // colour behind the balls, sRGB
@@ -56,13 +57,15 @@ void main() {
     color = vec4(mix(theme, srgb(hue * min(abs(value), 1.0)), sum.a), 1.0);
     return;
   }
+  vec4 both = sum * samples + early_share * texture(early, position);
+  vec3 mean = both.rgb / max(both.a, 1e-6);
   if (in_environment) {
-    vec3 light = sum.rgb + (1.0 - min(sum.a, 1.0)) * behind(2.0 * position - 1.0);
+    vec3 light = mean * sum.a + (1.0 - min(sum.a, 1.0)) * behind(2.0 * position - 1.0);
     color = vec4(tone_mapped(light * exposure, curve), 1.0);
     return;
   }
   // The theme's colour is paper, not light: it is mixed in on the screen, so that rims stay smooth.
-  vec3 ball = tone_mapped(sum.rgb / max(sum.a, 1e-6) * exposure, curve);
+  vec3 ball = tone_mapped(mean * exposure, curve);
   color = vec4(mix(theme, ball, min(sum.a, 1.0)), 1.0);
 }
 `;

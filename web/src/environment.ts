@@ -138,9 +138,29 @@ export class AlbedoTables {
   }
 }
 
-const LEVELS = 6;
-const LEVEL_SAMPLES = 64;
-const LEVEL_PASSES = 4;
+/** Path of the width that roughness means for this material, or null. */
+export const alphaOf = (shader: Shader): string | null => shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null)?.path ?? null;
+
+/** Root of the width, of the geometric mean of two; null where the material has none. */
+export function roughnessOf(shader: Shader, values: Values): number | null {
+  const path = alphaOf(shader);
+  if (!path) return null;
+  const width = [values[path] as number | number[]].flat();
+  return Math.min(Math.sqrt(width.reduce((a, b) => a * b, 1) ** (1 / width.length)), 1);
+}
+
+const LEVELS = 7;
+const LEVEL_WIDTH = 512; // of the sharpest; the last is 8 texels wide
+const LEVEL_SAMPLES = 16;
+const LEVEL_PASSES = 16;
+const SHARP_PASSES = [1, 4]; // of the first levels: the lobe is all but a mirror's, and they have the most texels
+
+export interface PrefilteredLevel {
+  texture: WebGLTexture;
+  level: number;
+  complete: boolean;
+  finished: boolean;
+}
 
 interface Prefiltered {
   texture: WebGLTexture;
@@ -159,26 +179,25 @@ export class PrefilteredEnvironments {
     private full: boolean,
   ) {}
 
-  /** Texture and level for a ball. */
-  of(shader: Shader, values: Values, picture: EnvironmentPicture): { texture: WebGLTexture; level: number; complete: boolean; finished: boolean } {
-    const alpha = shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null);
+  /** Texture and level for a ball; null where nothing was made for it yet and it is not to be made now. */
+  of(shader: Shader, values: Values, picture: EnvironmentPicture, make = true): PrefilteredLevel | null {
+    const alpha = alphaOf(shader);
     const rest = { ...values };
-    if (alpha) delete rest[alpha.path];
+    if (alpha) delete rest[alpha];
     // Maps are made in the environment's own frame, so turning it makes nothing anew.
     const key = `${shader.key} ${picture.key} ${JSON.stringify(rest)}`;
     let entry = this.made.get(key);
+    if (!make && !entry) return null;
     if (!entry) {
       if (this.made.size >= 8) this.forget();
-      entry = this.create(alpha ? LEVELS : 1, alpha ? 256 : 64);
+      entry = this.create(alpha ? LEVELS : 1, alpha ? LEVEL_WIDTH : 64);
       this.made.set(key, entry);
     }
     const before = entry.passes;
-    if (entry.passes < LEVEL_PASSES) this.pass(entry, shader, values, alpha?.path ?? null, picture);
-    const width = alpha ? [values[alpha.path] as number | number[]].flat() : [0];
-    const mean = Math.sqrt(width.reduce((a, b) => a * b, 1) ** (1 / width.length));
+    if (make && entry.passes < LEVEL_PASSES) this.pass(entry, shader, values, alpha, picture);
     return {
       texture: entry.texture,
-      level: Math.min(mean, 1) * (entry.framebuffers.length - 1),
+      level: (roughnessOf(shader, values) ?? 0) * (entry.framebuffers.length - 1),
       complete: entry.passes >= LEVEL_PASSES,
       finished: before < LEVEL_PASSES && entry.passes >= LEVEL_PASSES,
     };
@@ -214,6 +233,8 @@ export class PrefilteredEnvironments {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE);
     entry.framebuffers.forEach((framebuffer, level) => {
+      const passes = (alpha ? SHARP_PASSES[level] : undefined) ?? LEVEL_PASSES;
+      if (entry.passes >= passes) return;
       const size = entry.width >> level;
       const roughness = level / Math.max(entry.framebuffers.length - 1, 1);
       const width = Math.max(roughness * roughness, 1e-3);
@@ -226,6 +247,7 @@ export class PrefilteredEnvironments {
       gl.uniform1f(program.uniform("environment_rotation"), 0);
       gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * LEVEL_SAMPLES));
       gl.uniform2f(program.uniform("size"), size, size / 2);
+      gl.uniform1f(program.uniform("points"), LEVEL_SAMPLES * passes);
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
       gl.viewport(0, 0, size, size / 2);
       gl.drawArrays(gl.TRIANGLES, 0, 3);

@@ -17,6 +17,8 @@ export interface ShadingKey {
   geometry: "sphere" | "mesh";
   lights: boolean;
   environment: EnvironmentUse;
+  /** What is taken off again, to see by how much two ways differ. */
+  minus: EnvironmentUse;
   term: Term;
 }
 
@@ -240,10 +242,60 @@ function scattered(shader: Shader, term: Term): string {
 /** D, G and F are numbers at a half vector, not light: the page shows the number itself. */
 export const isFactor = (term: Term): term is "D" | "G" | "F" => term === "D" || term === "G" || term === "F";
 
+/** Differences, below zero as well as above. */
+export const isSigned = (term: Term): boolean => term === "difference" || term === "split-error";
+
+/** Terms of everything that a material scatters. */
+export const isWhole = (term: Term): boolean => ["full", "compensated", "rows", "split", "split-error"].includes(term);
+
+/**
+ * Whether the split sum means anything for a material: one lobe of microfacets about the mirrored direction, alike
+ * all round. Light that passes through, or a lobe about the normal, would be looked up in the wrong place.
+ */
+export const splits = (manifest: Manifest): boolean =>
+  manifest.isotropic && !manifest.stochastic && !manifest.transmits && Boolean(manifest.functions.terms && manifest.terms?.some((t) => t.name === "D"));
+
 export function hasTerm(manifest: Manifest, term: Term): boolean {
-  if (term === "full" || term === "rows" || term === "compensated") return true;
+  if (term === "split" || term === "split-error") return splits(manifest);
+  if (isWhole(term)) return true;
   const name = term === "difference" ? "single" : term;
   return Boolean(manifest.functions.terms && manifest.terms?.some((t) => t.name === name));
+}
+
+/** Statements that add what an environment gives by one way of integrating it, or take it off. */
+function environmentBody(shader: Shader, use: EnvironmentUse, term: Term, add: "+=" | "-="): string[] {
+  if (use === "none") return [];
+  const { call } = materialText(shader);
+  const split = (reflectance: string) => ["  {", "    vec3 mirrored = frame * vec3(-wo.xy, wo.z);", `    radiance ${add} ${reflectance} * prefiltered_radiance(mirrored) * environment_scale;`, "  }"];
+  if (use === "albedo") return [`  radiance ${add} page_albedo(wo.z) * environment_constant * environment_scale;`];
+  if (use === "split-sum") return split("page_albedo(wo.z)");
+  if (use === "dfg") {
+    const straight = `${call("terms", "vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 1.0)")}.F`;
+    return ["  vec2 scale_bias = page_dfg(wo.z);", ...split(`(${straight} * scale_bias.x + scale_bias.y)`)];
+  }
+  const mapped = use === "mapped";
+  const weight = isWhole(term) ? "s.weight" : `s.pdf > 0.0 && !s.delta ? (${scattered(shader, term)}) / s.pdf : vec3(0.0)`;
+  const body = [
+    "  {",
+    "    vec3 u = fract(random_point + page_shift(uvec2(gl_FragCoord.xy), 3u));",
+    `    Sample s = ${call("sample", "wo, u")};`,
+    "    vec3 wi = s.wi;",
+    `    vec3 weight = ${weight};`,
+    // A sample that goes nowhere has weight 0 and may have any direction.
+    "    if (any(notEqual(weight, vec3(0.0)))) {",
+    "      vec3 d = normalize(frame * wi);",
+    // Both ways to find a direction are weighed by their densities (balance heuristic, Veach1997): the sun by its own, gloss by its own.
+    ...(mapped ? ["      if (!s.delta) weight *= s.pdf / (s.pdf + page_bright_density(d));"] : []),
+    `      radiance ${add} weight * environment_radiance(d);`,
+    "    }",
+  ];
+  if (mapped)
+    body.push(`    float density;
+    vec3 bright = page_bright_direction(fract(area_point + page_shift(uvec2(gl_FragCoord.xy), 5u).xy), density);
+    wi = bright * frame;
+    vec3 value = ${scattered(shader, term)};
+    if (any(greaterThan(abs(value), vec3(0.0)))) radiance ${add} value * environment_radiance(bright) / (density + ${call("pdf", "wo, wi")});`);
+  return [...body, "  }"];
 }
 
 export function fragmentText(shader: Shader, key: ShadingKey): string {
@@ -275,42 +327,14 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
     radiance += irradiance * (${scattered(shader, key.term)});
   }`);
     }
-    if (key.environment !== "none") parts.push(ENVIRONMENT);
-    if (key.environment === "sampled" || key.environment === "mapped") {
-      const mapped = key.environment === "mapped";
-      if (mapped) parts.push(IMPORTANCE_GLSL);
-      const whole = key.term === "full" || key.term === "compensated" || key.term === "rows";
-      body.push("  vec3 u = fract(random_point + page_shift(uvec2(gl_FragCoord.xy), 3u));");
-      body.push(`  Sample s = ${call("sample", "wo, u")};`);
-      body.push("  vec3 wi = s.wi;");
-      const weight = whole ? "s.weight" : `s.pdf > 0.0 && !s.delta ? (${scattered(shader, key.term)}) / s.pdf : vec3(0.0)`;
-      body.push(`  vec3 weight = ${weight};`);
-      // A sample that goes nowhere has weight 0 and may have any direction.
-      body.push("  if (any(notEqual(weight, vec3(0.0)))) {");
-      body.push("    vec3 d = normalize(frame * wi);");
-      // Both ways to find a direction are weighed by their densities (balance heuristic, Veach1997): the sun by its own, gloss by its own.
-      if (mapped) body.push("    if (!s.delta) weight *= s.pdf / (s.pdf + page_bright_density(d));");
-      body.push("    radiance += weight * environment_radiance(d);", "  }");
-      if (mapped)
-        body.push(`  float density;
-  vec3 bright = page_bright_direction(fract(area_point + page_shift(uvec2(gl_FragCoord.xy), 5u).xy), density);
-  wi = bright * frame;
-  vec3 value = ${scattered(shader, key.term)};
-  if (any(greaterThan(abs(value), vec3(0.0)))) radiance += value * environment_radiance(bright) / (density + ${call("pdf", "wo, wi")});`);
-    } else if (key.environment === "albedo") {
-      parts.push(ALBEDO);
-      body.push("  radiance += page_albedo(wo.z) * environment_constant * environment_scale;");
-    } else if (key.environment === "dfg") {
-      parts.push(DFG, SPLIT);
-      body.push(`  vec3 straight = ${call("terms", "vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 1.0)")}.F;`);
-      body.push("  vec2 scale_bias = page_dfg(wo.z);");
-      body.push("  vec3 mirrored = frame * vec3(-wo.xy, wo.z);");
-      body.push("  radiance += (straight * scale_bias.x + scale_bias.y) * prefiltered_radiance(mirrored) * environment_scale;");
-    } else if (key.environment === "split-sum") {
-      parts.push(ALBEDO, SPLIT);
-      body.push("  vec3 mirrored = frame * vec3(-wo.xy, wo.z);");
-      body.push("  radiance += page_albedo(wo.z) * prefiltered_radiance(mirrored) * environment_scale;");
-    }
+    const uses = [key.environment, key.minus];
+    const any = (...wanted: EnvironmentUse[]) => uses.some((use) => wanted.includes(use));
+    if (uses.some((use) => use !== "none")) parts.push(ENVIRONMENT);
+    if (any("mapped")) parts.push(IMPORTANCE_GLSL);
+    if (any("albedo", "split-sum")) parts.push(ALBEDO);
+    if (any("split-sum", "dfg")) parts.push(SPLIT);
+    if (any("dfg")) parts.push(DFG);
+    body.push(...environmentBody(shader, key.environment, key.term, "+="), ...environmentBody(shader, key.minus, key.term, "-="));
   }
   const place =
     key.geometry === "sphere"
@@ -388,6 +412,7 @@ export function prefilterText(shader: Shader, samples: number): string {
   const derived = manifest.derived ? `${manifest.derived.struct} derived_here() { return ${manifest.functions.derive}(material); }\n` : "";
   return `${HEADER}${text}${derived}${RANDOM}${ENVIRONMENT}
 uniform vec2 size;
+uniform float points;   // over all passes
 layout(location = 0) out vec4 color;
 void main() {
   vec2 uv = gl_FragCoord.xy / size;
@@ -403,7 +428,7 @@ void main() {
     float weight = dot(s.weight, vec3(1.0 / 3.0));
     // As much of the picture as one sample stands for, by its mip levels (Krivanek and Colbert 2008): a small sun
     // would else be hit by few samples and leave blotches.
-    float share = 1.0 / (${samples * 4}.0 * max(s.pdf, 1e-6));
+    float share = 1.0 / (points * max(s.pdf, 1e-6));
     vec2 texels = vec2(textureSize(environment_map, 0));
     float lod = s.delta ? 0.0 : max(0.0, 0.5 * log2(share * texels.x * texels.y / 12.566370614359172) + 0.5);
     if (weight > 0.0) sum += weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), lod).rgb, 1.0);

@@ -118,7 +118,7 @@ export class Live {
     if (app.frames === this.awaited) return this.later();
     const { state } = app;
     // The server traces whole materials on balls: beside a single term or another shape its picture would mislead.
-    const whole = state.view.term === "full" || state.view.term === "compensated";
+    const whole = ["full", "compensated", "split"].includes(state.view.term);
     this.status.message = !whole ? "of whole materials only" : state.view.mesh !== "sphere" ? "of spheres only" : "";
     if (this.status.message) {
       this.sent = "";

@@ -6,13 +6,13 @@
  */
 import { type Values, type Vec3, decodeFloats } from "./data";
 import { TONES, displayProgram } from "./display";
-import { AlbedoTables, type EnvironmentPicture, PrefilteredEnvironments } from "./environment";
-import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, fragmentText, hasTerm, isFactor, vertexText } from "./glsl";
+import { AlbedoTables, type EnvironmentPicture, type PrefilteredLevel, PrefilteredEnvironments, alphaOf, roughnessOf } from "./environment";
+import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, fragmentText, hasTerm, isFactor, isSigned, isWhole, splits, vertexText } from "./glsl";
 import { actingLights, bindLights, environmentOf, localLights } from "./lights";
 import type { MeshBuffers } from "./meshes";
 import type { Picture, Presenter } from "./panel";
 import type { Program, Shader, ShaderLibrary } from "./shaders";
-import type { State, Term } from "./state";
+import type { State } from "./state";
 import { type Target, areaSequence, createTarget, deleteTarget, floatBlending, readTarget, sequence } from "./targets";
 import { type Frame, cameraFrame, fitted, length, sphereBounds, sub } from "./vectors";
 
@@ -47,21 +47,33 @@ const SAMPLES_STILL = 256;
 const SAMPLES_RANDOM = 4096;
 const SAMPLES_HALF = 64; // float16 sums: at 64 a sample is still 16 units in the last place
 
-/** Path of the width that roughness means for this material, or null. */
-const alphaOf = (shader: Shader): string | null => shader.manifest.parameters.find((p) => p.kind === "alpha" && p.field !== null)?.path ?? null;
+/** From so many samples on the split sum no longer counts beside them: docs/viewer.md, "Light of an environment". */
+const EARLY_END = 64;
+
+interface Prepared {
+  draw: Draw;
+  program: Program;
+  row: number;
+  level: PrefilteredLevel | null;
+  /** Whether its tables are complete, and whether they became so just now. */
+  complete: boolean;
+  finished: boolean;
+}
 
 export class Renderer {
   samples = 0;
   /** Draw calls and pictures since the page was loaded, for tests and the status line. */
   frames = 0;
   private target: Target | null = null;
+  /** The split sum times what it counts for, while the sum in `target` is still noisy. */
+  private early: Target | null = null;
+  private hasEarly = false;
   private readonly full: boolean;
   private readonly albedo: AlbedoTables;
   private readonly prefiltered: PrefilteredEnvironments;
   private readonly empty: WebGLVertexArrayObject;
   private black: WebGLTexture;
   private readonly dfg: WebGLTexture | null;
-  private restart = false;
   /** False while tables that the picture is made of still refine. */
   settled = true;
 
@@ -96,6 +108,8 @@ export class Renderer {
   resize(width: number, height: number): void {
     if (this.target?.width === width && this.target.height === height) return;
     deleteTarget(this.gl, this.target);
+    deleteTarget(this.gl, this.early);
+    this.early = null;
     this.target = createTarget(this.gl, width, height, this.full, true);
     this.samples = 0;
   }
@@ -108,7 +122,7 @@ export class Renderer {
     const lights = actingLights(scene.state);
     const random =
       lights.some((l) => l.type === "area") ||
-      (environmentOf(lights) !== null && scene.balls.some((b) => this.environmentUse(scene, b.shader) === "sampled"));
+      (environmentOf(lights) !== null && scene.balls.some((b) => Object.values(this.environmentUse(scene, b.shader)).includes("sampled")));
     const wanted = random && !isFactor(scene.state.view.term) ? SAMPLES_RANDOM : SAMPLES_STILL;
     return this.full ? wanted : Math.min(wanted, SAMPLES_HALF);
   }
@@ -119,17 +133,47 @@ export class Renderer {
 
   /** Adds one sample to every pixel. `hurry` leaves tables that refine over time for later. */
   step(scene: Scene, hurry: boolean): void {
-    const { gl, target } = this;
+    const { target } = this;
     if (!target) return;
     const frame = cameraFrame(scene.state.camera);
     const draws = this.draws(scene, frame);
     // Tables first: they have their own framebuffers.
-    this.settled = true;
-    const prepared = draws.map((draw) => ({ draw, ...this.prepare(scene, draw, hurry) }));
-    if (this.restart) {
-      this.restart = false;
-      this.samples = 0;
+    const prepared = draws.map((draw) => this.prepare(scene, draw, this.uses(scene, draw.shader), hurry));
+    this.settled = prepared.every(({ complete }) => complete);
+    if (prepared.some(({ finished }) => finished)) this.samples = 0;
+    if (this.samples === 0) this.hasEarly = false;
+    if (!this.hasEarly && this.samples < EARLY_END) this.drawEarly(scene, frame, prepared, hurry);
+    this.sum(scene, frame, target, prepared, this.samples === 0);
+    this.samples += 1;
+    this.frames += 1;
+  }
+
+  /** The split sum in place of what is sampled, as soon as its tables are there. */
+  private drawEarly(scene: Scene, frame: Frame, prepared: Prepared[], hurry: boolean): void {
+    const { state, environment } = scene;
+    if (!environment || state.environment !== "sampled" || !["full", "compensated"].includes(state.view.term)) return;
+    const target = this.target as Target;
+    const draws: Prepared[] = [];
+    for (const { draw, ...rest } of prepared) {
+      const roughness = roughnessOf(draw.shader, draw.values);
+      const sampled = this.uses(scene, draw.shader).environment === "mapped";
+      if (!sampled || roughness === null || !splits(draw.shader.manifest)) {
+        draws.push({ draw: { ...draw, gain: 0, cover: 0 }, ...rest });
+        continue;
+      }
+      if (!this.prefiltered.of(draw.shader, draw.values, environment, !hurry)?.complete) return;
+      // Samples that it is worth: the smoother the ball, the less it errs. At every number of them the picture is nearer the truth.
+      const weight = 4 / Math.max(roughness, 0.25) ** 2;
+      draws.push(this.prepare(scene, { ...draw, gain: weight, cover: weight }, { environment: "split-sum", minus: "none" }, true));
     }
+    if (draws.every(({ draw }) => draw.gain === 0)) return;
+    this.hasEarly = true;
+    this.early ??= createTarget(this.gl, target.width, target.height, this.full, true);
+    this.sum(scene, frame, this.early, draws, true);
+  }
+
+  private sum(scene: Scene, frame: Frame, target: Target, prepared: Prepared[], anew: boolean): void {
+    const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
     gl.viewport(0, 0, target.width, target.height);
     gl.disable(gl.SCISSOR_TEST);
@@ -139,9 +183,9 @@ export class Renderer {
     gl.depthFunc(gl.LEQUAL);
     gl.clearColor(0, 0, 0, 0);
     gl.clearDepth(1);
-    gl.clear(gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT | (this.samples === 0 ? gl.COLOR_BUFFER_BIT : 0));
+    gl.clear(gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT | (anew ? gl.COLOR_BUFFER_BIT : 0));
     if (scene.mesh) {
-      this.depthPass(scene.mesh, draws, frame);
+      this.depthPass(scene.mesh, prepared.map(({ draw }) => draw), frame);
       // Two triangles at one depth would both add their light: the first counts.
       gl.enable(gl.STENCIL_TEST);
       gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
@@ -149,14 +193,12 @@ export class Renderer {
     gl.enable(gl.BLEND);
     gl.blendEquation(gl.FUNC_ADD);
     gl.blendFunc(gl.ONE, gl.ONE);
-    for (const { draw, program, row, level } of prepared) this.draw(scene, frame, draw, program, row, level);
+    for (const one of prepared) this.draw(scene, frame, one);
     gl.disable(gl.BLEND);
     gl.disable(gl.DEPTH_TEST);
     gl.disable(gl.STENCIL_TEST);
     gl.bindVertexArray(null);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    this.samples += 1;
-    this.frames += 1;
   }
 
   /** Front to back, since a sum cannot take back what a nearer ball hides. */
@@ -171,49 +213,64 @@ export class Renderer {
     });
   }
 
-  environmentUse(scene: Scene, shader: Shader): EnvironmentUse {
+  /** How the environment is integrated, and what is taken off again. */
+  environmentUse(scene: Scene, shader: Shader): Pick<ShadingKey, "environment" | "minus"> {
+    const { view } = scene.state;
+    const splitting = view.term === "split" || view.term === "split-error";
+    const environment = this.integral(scene, shader, splitting);
+    if (view.term !== "split-error") return { environment, minus: "none" };
+    // Where there is no split sum nothing differs.
+    return environment === "sampled" ? { environment: "none", minus: "none" } : { environment, minus: environment === "none" ? "none" : "sampled" };
+  }
+
+  private integral(scene: Scene, shader: Shader, splitting: boolean): EnvironmentUse {
     const { state } = scene;
+    const { manifest } = shader;
     const light = environmentOf(actingLights(state));
     if (!light) return "none";
     // Where the albedo depends on the angle to the normal alone, the sum over directions need not be done per pixel.
-    const whole: Term[] = ["full", "compensated", "rows"];
-    const curve = shader.manifest.isotropic && !shader.manifest.stochastic && whole.includes(state.view.term);
-    if (!curve) return "sampled";
+    if (!manifest.isotropic || manifest.stochastic || !isWhole(state.view.term)) return "sampled";
     if (!light.image || !scene.environment) return "albedo";
-    if (state.environment !== "dfg") return state.environment;
+    const method = splitting && state.environment === "sampled" ? "split-sum" : state.environment;
+    if (method !== "dfg") return splits(manifest) ? method : "sampled";
     // The two numbers hold single scattering and multiply a reflectance at normal incidence: a compensated material,
     // or one without Fresnel's term, takes its own albedo instead.
-    const single = hasTerm(shader.manifest, "F") && !hasTerm(shader.manifest, "multi");
-    return this.dfg && single && alphaOf(shader) ? "dfg" : "split-sum";
+    const single = hasTerm(manifest, "F") && !hasTerm(manifest, "multi");
+    return !splits(manifest) ? "sampled" : this.dfg && single && alphaOf(shader) ? "dfg" : "split-sum";
   }
 
-  private prepare(scene: Scene, draw: Draw, hurry: boolean): { program: Program; row: number; level: { texture: WebGLTexture; level: number } | null } {
+  /** `environmentUse`, with what is sampled by a picture where there is one. */
+  private uses(scene: Scene, shader: Shader): Pick<ShadingKey, "environment" | "minus"> {
+    if (isFactor(scene.state.view.term)) return { environment: "none", minus: "none" };
+    const { environment, minus } = this.environmentUse(scene, shader);
+    const pictured = scene.environment && environmentOf(actingLights(scene.state))?.image;
+    const way = (use: EnvironmentUse) => (use === "sampled" && pictured ? "mapped" : use);
+    return { environment: way(environment), minus: way(minus) };
+  }
+
+  private prepare(scene: Scene, draw: Draw, uses: Pick<ShadingKey, "environment" | "minus">, hurry: boolean): Prepared {
     const { gl } = this;
-    const lights = actingLights(scene.state);
-    const use = isFactor(scene.state.view.term) ? "none" : this.environmentUse(scene, draw.shader);
-    const key: ShadingKey = {
-      geometry: scene.mesh ? "mesh" : "sphere",
-      lights: localLights(lights).length > 0,
-      environment: use === "sampled" && scene.environment && environmentOf(lights)?.image ? "mapped" : use,
-      term: scene.state.view.term,
-    };
+    const { term } = scene.state.view;
+    // Lights that are no environment are summed exactly: between two integrals of it nothing of them is left.
+    const lights = term !== "split-error" && localLights(actingLights(scene.state)).length > 0;
+    const key: ShadingKey = { geometry: scene.mesh ? "mesh" : "sphere", lights, ...uses, term };
+    const { environment: use } = uses;
     let row = 0;
-    let level = null;
+    let level: PrefilteredLevel | null = null;
+    const tables: { complete: boolean; finished: boolean }[] = [];
     if (use === "albedo" || use === "split-sum") {
       gl.bindVertexArray(this.empty);
       const made = this.albedo.row(draw.shader, draw.values, hurry ? 1 : 4);
       row = made.row;
-      if (made.finished) this.restart = true;
-      if (!made.complete) this.settled = false;
+      tables.push(made);
     }
     if ((use === "split-sum" || use === "dfg") && scene.environment) {
-      const made = this.prefiltered.of(draw.shader, draw.values, scene.environment);
-      level = made;
-      if (made.finished) this.restart = true;
-      if (!made.complete) this.settled = false;
+      level = this.prefiltered.of(draw.shader, draw.values, scene.environment);
+      if (level) tables.push(level);
     }
-    const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${key.environment} ${key.term}`;
-    return { program: this.shaders.program(name, vertexText(draw.shader, key.geometry), fragmentText(draw.shader, key)), row, level };
+    const [complete, finished] = [tables.every((table) => table.complete), tables.some((table) => table.finished)];
+    const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${key.environment} ${key.minus} ${key.term}`;
+    return { draw, program: this.shaders.program(name, vertexText(draw.shader, key.geometry), fragmentText(draw.shader, key)), row, level, complete, finished };
   }
 
   private camera(program: Program, frame: Frame): void {
@@ -243,7 +300,7 @@ export class Renderer {
     gl.colorMask(true, true, true, true);
   }
 
-  private draw(scene: Scene, frame: Frame, draw: Draw, program: Program, row: number, level: { texture: WebGLTexture; level: number } | null): void {
+  private draw(scene: Scene, frame: Frame, { draw, program, row, level }: Prepared): void {
     const { gl } = this;
     const target = this.target as Target;
     const bounds = scene.mesh ? null : sphereBounds(frame, draw.center, 1, target.width / target.height);
@@ -302,6 +359,11 @@ export class Renderer {
     gl.uniform1f(program.uniform("environment_rotation"), light?.rotation ?? 0);
   }
 
+  /** How much of `early` is shown now. */
+  get earlyShare(): number {
+    return this.hasEarly ? Math.max(0, 1 - this.samples / EARLY_END) / Math.sqrt(this.samples) : 0;
+  }
+
   /** Draws the sum to the canvas, or lets a panel draw it its own way. */
   present(scene: Scene, presenter: Presenter | null, width: number, height: number): void {
     const { gl, target } = this;
@@ -322,13 +384,17 @@ export class Renderer {
     gl.bindTexture(gl.TEXTURE_2D, target.texture);
     gl.uniform1i(program.uniform("picture"), 0);
     gl.uniform1f(program.uniform("samples"), this.samples);
+    gl.uniform1f(program.uniform("early_share"), this.earlyShare);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, this.earlyShare > 0 && this.early ? this.early.texture : this.black);
+    gl.uniform1i(program.uniform("early"), 1);
     gl.uniform1f(program.uniform("exposure"), 2 ** state.display.exposure);
     gl.uniform1i(program.uniform("curve"), TONES[state.display.tone].index);
-    gl.uniform1i(program.uniform("has_sign"), scene.minuend.length > 0 || state.view.term === "difference" ? 1 : 0);
+    gl.uniform1i(program.uniform("has_sign"), scene.minuend.length > 0 || isSigned(state.view.term) ? 1 : 0);
     gl.uniform3fv(program.uniform("theme"), scene.paper);
     const shown = environmentOf(actingLights(state)) !== null && (state.furnace || state.view.background === "environment");
     gl.uniform1i(program.uniform("in_environment"), shown && !isFactor(state.view.term) ? 1 : 0);
-    let unit = 1;
+    let unit = 2;
     this.environmentUniforms(program, scene, (name, value) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, value ?? this.black);

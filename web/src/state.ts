@@ -19,7 +19,8 @@ export interface Slot {
   visible: boolean;
 }
 
-export type Term = "full" | "D" | "G" | "F" | "single" | "multi" | "compensated" | "difference" | "rows";
+export const TERMS = ["full", "D", "G", "F", "single", "multi", "compensated", "difference", "split", "split-error", "rows"] as const;
+export type Term = (typeof TERMS)[number];
 export type MeshName = "sphere" | "shaderball" | "torus" | "file";
 /** Brute force; albedo of the material itself times the blurred picture; the two-number table times it. */
 export type EnvironmentMethod = "sampled" | "split-sum" | "dfg";

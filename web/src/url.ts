@@ -1,7 +1,7 @@
 /** The state in the URL's fragment: what differs from the page's initial state, as JSON in base64url. */
 import { newLight } from "./lights";
 import type { Material, Parameter, Values } from "./data";
-import type { Light, State } from "./state";
+import { type Light, type State, TERMS } from "./state";
 
 type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
 
@@ -69,7 +69,7 @@ function bounded(state: State, initial: State, materials: readonly Material[]): 
   const named: [holder: object, key: string, values: string[]][] = [
     [state, "environment", ["sampled", "split-sum", "dfg"]],
     [state.view, "mesh", ["sphere", "shaderball", "torus"]],
-    [state.view, "term", ["full", "D", "G", "F", "single", "multi", "compensated", "difference", "rows"]],
+    [state.view, "term", [...TERMS]],
     [state.view, "background", ["theme", "environment"]],
     [state.display, "tone", ["none", "reinhard", "filmic"]],
     [state.display, "theme", ["auto", "light", "dark"]],

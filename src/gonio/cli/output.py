@@ -92,7 +92,7 @@ def print_tables(manifest: Mapping[str, Any], path: Path, as_json: bool) -> None
     from ..energy.tables import baked
 
     print(f"{path}: {baked.title(manifest)}")
-    table = listing(*baked.HEADINGS)
+    table = listing(*baked.headings(manifest))
     for row in baked.rows(manifest):
         table.add_row(*row)
     print_rich(table)

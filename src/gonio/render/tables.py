@@ -4,11 +4,13 @@
     manifest.json   the manifest alone, for people and scripts
     E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. Of a table with
                     three axes the slices stand one below the other, the first on top
-With layout "homework": E.png and E_avg.png exactly as the homework has them (`baked.homework_pictures`).
+With layout "homework": E.png and E_avg.png exactly as the homework has them (`baked.homework_pictures`). Of an
+environment the levels are level_0.exr, level_1.exr ...
 """
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +20,7 @@ import numpy as np
 
 from .. import files
 from ..energy.tables import bake as baking
+from ..energy.tables import prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, models, notation, outside
@@ -26,7 +29,7 @@ from . import images
 
 
 def bake(
-    target: str | BSDF,
+    target: str | Path | BSDF,
     output: str | Path | None = None,
     *,
     lut: Sequence[str] | None = None,
@@ -41,12 +44,17 @@ def bake(
     azimuths: int = baking.AZIMUTHS,
     store: str = "E",
     flip: bool = True,
+    ndf: str | None = None,
+    levels: int | None = None,
 ) -> Baked:
-    """Bake tables of directional albedo, its average, the split sum and rough glass; see what they hold and err by.
+    """Bake tables of directional albedo, its average, the split sum and rough glass, or an environment blurred for the
+    split sum; see what they hold and err by.
 
         go.bake("ggx", "tables").arrays["E"]            # [roughness, mu]
+        go.bake("sky.hdr", "sky", ndf="beckmann")       # level_0, level_1 ... [theta, phi, rgb]
 
-    target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"
+    target    a distribution by name (F = 1), or a material, also as text: "conductor(preset=Au)"; or a picture of an
+              environment (.hdr, .exr, .npz; latitude-longitude), of which "prefiltered" is the only table
     output    folder to write, all files or none; None writes nothing
     lut       of "E", "Eavg", "dfg", "glass"; None is all that the target has, but glass
     size      texels along each axis, 1 to 4096
@@ -55,10 +63,18 @@ def bake(
     masking   of a distribution; a material brings its own
     layout    "linear", "stretched" or "homework" (linear axes, and the homework's pictures by `store` and `flip`)
     aspect    alpha_y / alpha_x of a distribution; other than 1 it adds the axis phi, of so many `azimuths`
+    ndf       of an environment: the distribution it is blurred by (ggx), into so many `levels` of roughness 0 to 1 (6);
+              `masking` is what the split sum is judged with
     What was baked before comes from the user's cache. Returns a Baked: `arrays` by name and `manifest`.
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
     folder = None if output is None else files.check_folder(output)
+    if _is_picture(target, lut):
+        others: dict[str, object] = {"size": size, "method": method, "spp": spp, "points": points, "seed": seed}
+        others |= {"layout": layout, "aspect": aspect, "azimuths": azimuths, "store": store, "flip": flip}
+        _check_default(others, "an environment takes --ndf, --levels and --masking")
+        return _prefiltered(Path(str(target)), folder, ndf, levels, masking)
+    _check_default({"ndf": ndf, "levels": levels}, "it goes with a picture: gonio bake sky.hdr --lut prefiltered")
     what = _target(target)
     tables = tuple(lut) if lut else None
     homework = layout == "homework"
@@ -87,17 +103,60 @@ def bake(
         baked.manifest["pictures"] = {"store": store, "bottom row": "lowest" if flip else "highest", "x": "n.v"}
     else:
         contents = _pictures(baked)
+    _write(baked, folder, contents)
+    return baked
+
+
+def _check_default(options: dict[str, object], hint: str) -> None:
+    """InputError for options that do not belong to what is baked, where they were given."""
+    for name, value in options.items():
+        if value != inspect.signature(bake).parameters[name].default:
+            raise InputError(f"--{name} {value} does not go with this target", f"--{name}", hint)
+
+
+def _is_picture(target: str | Path | BSDF, lut: Sequence[str] | None) -> bool:
+    """Whether an environment is meant: by its suffix, or by what is asked for."""
+    pictured = not isinstance(target, BSDF) and Path(target).suffix.lower() in images.SUFFIXES
+    others = [name for name in lut or () if name != "prefiltered"]
+    if pictured and others:
+        raise InputError(f"table '{others[0]}' of a picture", "--lut", "of an environment: --lut prefiltered")
+    if not pictured and lut and "prefiltered" in lut:
+        what = f"'prefiltered' of '{target}', which is no picture ({', '.join(images.SUFFIXES)})"
+        raise InputError(what, "--lut", "give an environment: gonio bake sky.hdr --lut prefiltered")
+    return pictured
+
+
+def _prefiltered(picture: Path, folder: Path | None, ndf: str | None, levels: int | None, masking: str | None) -> Baked:
+    """The levels of an environment, written as pictures too."""
+    source = images.read(picture)
+    if not source.hdr:
+        what = "a screen's picture, which is cut off at white"
+        raise InputError(what, str(picture), "give linear radiance, .hdr or .exr")
+    if levels is None:  # as many as a small map has room for
+        levels = min(prefilter.LEVELS, max(len(source.pixels).bit_length() - 1, 2))
+    baked = prefilter.bake(source.pixels, ndf or "ggx", levels, masking or "smith-correlated", str(picture))
+    if folder is not None:
+        contents = {}
+        for (name, pixels), level in zip(baked.arrays.items(), baked.manifest["levels"], strict=True):
+            facts = {"ndf": baked.manifest["ndf"], "roughness": level["roughness"], "alpha": level["alpha"]}
+            contents[f"{name}.exr"] = images._bitmap_bytes(pixels.astype(np.float32), facts, "OpenEXR")
+        _write(baked, folder, contents)
+    return baked
+
+
+def _write(baked: Baked, folder: Path, contents: dict[str, bytes]) -> None:
+    """The pictures, tables.npz and manifest.json: all or none."""
     baked.manifest["files"] = ["tables.npz", "manifest.json", *contents]
     contents["tables.npz"] = baked.npz()
     contents["manifest.json"] = (json.dumps(baked.manifest, indent=2) + "\n").encode()
     files.write_all(folder, contents)
-    return baked
 
 
-def _target(target: str | BSDF) -> str | BSDF:
+def _target(target: str | Path | BSDF) -> str | BSDF:
     """A distribution's name, or a material."""
     if isinstance(target, BSDF):
         return target
+    target = str(target)
     name, bracket, _ = target.partition("(")
     if name in distributions():
         if bracket:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import files
 from ..energy.tables.baked import Baked, load
+from ..render import images
 from . import figures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SLICES = 4  # of a table with three axes, at most
 
@@ -33,6 +37,8 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
     from matplotlib.figure import Figure
 
     baked = load(folder)
+    if "levels" in baked.manifest:
+        return figures.Drawing(_levels(baked), f"gonio plot {folder}")
     rows = [row for name in baked.manifest["dims"] for row in _rows(baked, name)]
     curves = [panel for row in rows for panel in row if panel.curve]
     rows = [row for row in rows if not row[0].curve] or [[]]
@@ -51,6 +57,30 @@ def draw_tables(folder: str | Path) -> figures.Drawing:
             scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, 1), "gray")
             figure.colorbar(scale, ax=grid, shrink=0.8 / len(rows), pad=0.01)
     return figures.Drawing(figure, f"gonio plot {folder}")
+
+
+def _levels(baked: Baked) -> Figure:
+    """The levels of an environment as a screen shows them: as bright that a twentieth of the map is white."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    names = list(baked.manifest["dims"])
+    white = float(np.quantile(baked.arrays[names[0]].max(-1), 0.95)) or 1.0
+    with mpl.rc_context(figures.STYLE):
+        figure = Figure(figsize=(9.0, 2.6 * ((len(names) + 1) // 2) + 0.4), layout="constrained")
+        title = f"{baked.manifest['target']} blurred by {baked.manifest['ndf']}; errors are rms"
+        figure.suptitle(title, fontsize=11)
+        grid = figure.subplots((len(names) + 1) // 2, 2, squeeze=False).ravel()
+        for axes in grid:
+            axes.set_axis_off()
+        for axes, name, level in zip(grid, names, baked.manifest["levels"], strict=False):
+            error = baked.manifest["error"][name]
+            split = error.get("split sum")
+            errors = "the map" if split is None else f"blur {error['rms']:.0e}, split sum {split:.1%}"
+            picture = images.to_screen((baked.arrays[name] / white).astype(np.float32))
+            axes.imshow(picture, extent=(0.0, 2.0, 0.0, 1.0), interpolation="bilinear")
+            axes.set_title(f"roughness {level['roughness']:.2g}: {errors}", fontsize=9)
+    return figure
 
 
 def _title(manifest: dict[str, Any]) -> str:

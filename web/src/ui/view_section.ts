@@ -4,7 +4,7 @@ import type { PageApp } from "../app";
 import { resetCamera } from "../camera";
 import { TONES } from "../display";
 import { hasTerm } from "../glsl";
-import { actingLights } from "../lights";
+import { actingLights, environmentOf } from "../lights";
 import type { State, Term } from "../state";
 import { ChoiceControl, RangeControl, TickControl, addRow } from "./controls";
 import { button, element, segmented } from "./dom";
@@ -18,6 +18,8 @@ const TERM_LABELS: Record<Term, [string, string]> = {
   multi: ["Multi", "Light that bounced more than once: what compensation adds."],
   compensated: ["Compensated", "Single and multi together. A row without compensation shows what it has."],
   difference: ["Full − single", "What compensation adds: orange above zero, blue below, black none."],
+  split: ["Split sum", "As engines do: albedo times the blurred environment. Full is the truth."],
+  "split-error": ["Split − full", "Error of the split sum: orange too bright, blue too dark, black none."],
   rows: ["Row A − row", "The first row minus each other row: orange above zero, blue below, black none."],
 };
 
@@ -37,6 +39,7 @@ export function termBar(app: PageApp): { host: HTMLElement; note: HTMLElement; u
       const slots = app.visibleSlots();
       const possible = (term: Term) => {
         if (term === "rows") return slots.length > 1;
+        if (term.startsWith("split") && !environmentOf(actingLights(app.state))) return false;
         if (term === "compensated") return slots.some((slot) => hasTerm(app.shaderOf(slot).manifest, "multi"));
         return slots.some((slot) => hasTerm(app.shaderOf(slot).manifest, term));
       };

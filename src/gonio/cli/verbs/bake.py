@@ -19,14 +19,14 @@ def bake(
         str,
         Argument(
             metavar="TARGET",
-            help="A distribution (ggx, beckmann), or a material.",
+            help="A distribution (ggx, beckmann), a material, or an environment (.hdr, .exr).",
             autocompletion=completion.materials_and_distributions,
         ),
     ],
     *,
     output: Annotated[Path, Option("-o", "--output", metavar="DIR", help="Folder to write.")] = Path("tables"),
     made: Material,
-    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass", help="Which tables.")] = "",
+    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,prefiltered", help="Which tables.")] = "",
     size: Annotated[int, Option(metavar="N", help="Texels along each axis.")] = 128,
     method: Annotated[str, Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature",
     masking: Annotated[str | None, Option(metavar="NAME", help="Of a distribution: smith-correlated, ...")] = None,
@@ -40,11 +40,16 @@ def bake(
     azimuths: Annotated[int, Option(metavar="N", help="Slices along phi, with two widths.")] = 24,
     store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E",
     flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True,
+    ndf: Annotated[
+        str | None, Option(metavar="NAME", help="Of an environment: the distribution it is blurred by; ggx.")
+    ] = None,
+    levels: Annotated[int | None, Option(metavar="N", help="Of an environment: maps from roughness 0 to 1; 6.")] = None,
     as_json: Json = False,
 ) -> None:
     """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
 
-    With two widths the tables have a third axis, the azimuth. Of a material without a width: E over the cosine.
+    With two widths the tables have a third axis, the azimuth. Of a material without a width: E over the cosine. Of an
+    environment: its light blurred for each roughness, which the split sum multiplies by the albedo.
 
     \b
     Examples:
@@ -53,6 +58,7 @@ def bake(
       gonio bake ggx --lut glass --size 32 -o glass
       gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
       gonio bake conductor --preset Au --lut E,Eavg -o gold
+      gonio bake sky.hdr --lut prefiltered -o sky
     """
     from ...render import tables
 
@@ -71,5 +77,7 @@ def bake(
         azimuths=azimuths,
         store=store,
         flip=flip,
+        ndf=ndf,
+        levels=levels,
     )
     print_tables(baked.manifest, output, as_json)

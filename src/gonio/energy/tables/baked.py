@@ -28,7 +28,7 @@ class Baked:
     manifest: dict[str, Any]
 
     def _repr_html_(self) -> str:
-        return _html.table(rows(self.manifest), HEADINGS, title(self.manifest))
+        return _html.table(rows(self.manifest), headings(self.manifest), title(self.manifest))
 
     def npz(self) -> bytes:
         """tables.npz, the manifest and its hash inside it; the same bytes for the same content."""
@@ -43,7 +43,14 @@ class Baked:
         return stream.getvalue()
 
 
-HEADINGS = ("table", "shape", "max error", "rms", "between")
+def headings(manifest: Mapping[str, Any]) -> tuple[str, ...]:
+    """Of the columns that `rows` has."""
+    return ("table", "shape", "max error", "rms", "between", *_more(manifest))
+
+
+def _more(manifest: Mapping[str, Any]) -> list[str]:
+    """Errors that only some tables have."""
+    return ["split sum"] if any("split sum" in error for error in manifest["error"].values()) else []
 
 
 def title(manifest: Mapping[str, Any]) -> str:
@@ -54,11 +61,11 @@ def title(manifest: Mapping[str, Any]) -> str:
 
 
 def rows(manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Of each table its name, its shape along named axes and its errors: `HEADINGS`."""
-    found = []
+    """Of each table its name, its shape along named axes and its errors, as `headings` calls them."""
+    found, more = [], _more(manifest)
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
-        figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation")]
+        figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation", *more)]
         dims = [*manifest["dims"][name], ""]
         along = " x ".join(f"{n} {axis}".strip() for n, axis in zip(shape, dims, strict=False))
         found.append((name, along, *figures))

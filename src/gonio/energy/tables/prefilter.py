@@ -1,0 +1,366 @@
+"""An environment blurred for rough mirrors: the prefiltered levels of the split sum (Karis2013).
+
+    light reflected at o ~ E(o) L_alpha(r),   L_alpha(r) = int L(i) k(r.i) di / int k(r.i) di,   r = o mirrored at n,
+    k(z) = max(z, 0) D(m),   m halfway between r and i: the lobe seen straight on, o = n = r, weighed by i.n.
+
+**The method.** The kernel depends on the angle between r and i alone. Between two circles of latitude it is therefore a
+convolution over the azimuth, a product of Fourier series; over the latitudes a plain sum is left. No texel is left out
+and nothing is sampled, so a small sun leaves neither noise nor blotches. Where a lobe is many texels wide the map is
+averaged in blocks first, where it is narrower than a few texels the map is read between them.
+
+**Two errors.** That of the blur (each level against a sum over every texel of the map, finely divided) is far below
+what a screen shows. That of the split sum itself is not: it takes the lobe for round, never cut by the horizon, and
+masked alike all over. The manifest states both, for this environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from ...errors import InputError
+from ...ops import Direction, Scalar, backend, normalize, vec2, vec3, where
+from ...optics.masking import masking_shadowing
+from ...optics.ndf import NDF, distribution
+from ..albedo import quadrature
+from ..cache import content_hash
+from .baked import Baked
+
+Array: TypeAlias = NDArray[np.float64]
+Environment: TypeAlias = NDArray[np.floating]
+
+LEVELS = 6
+MOST_LEVELS = 10  # narrower lobes than (1 / 9)^2 want grids of several thousand rows
+SMALLEST, LARGEST = 4, 4096  # rows
+STEPS = 8.0  # rows of the map across a lobe's half width, and
+LEAST_ROWS = 128  # in all: the blur then errs by about 1e-3 at most
+JUDGE_STEPS, JUDGE_ROWS = 16.0, 256
+COSINES = (1.0, 0.7, 0.3)  # n.o at which the split sum is judged
+_LANES = 1 << 22  # points in flight at once: 32 MiB an array
+SCHEMA = 2
+
+
+def roughness_of(level: int, levels: int) -> float:
+    """Level 0 is the map itself, the last is for roughness 1."""
+    return level / (levels - 1)
+
+
+def prefilter(
+    environment: Environment, ndf: str = "ggx", levels: int = LEVELS, where: str = "environment"
+) -> list[Array]:
+    """The levels of an environment, each half as large as the one before; the first is the map itself.
+
+    environment  latitude-longitude radiance, (H, 2 H, channels), row 0 toward +z
+    where        what the environment is called in errors
+    Level l is for roughness l / (levels - 1), its texels in the same order as the map's.
+    Raises InputError for a map of another shape, with values that are negative or not finite, or too small for so many
+    levels, and for an unknown distribution.
+    """
+    source = _checked(environment, levels, where)
+    lobe = distribution(ndf)
+    return [source, *(_blurred(source, lobe, level, levels) for level in range(1, levels))]
+
+
+def bake(
+    environment: Environment, ndf: str = "ggx", levels: int = LEVELS, masking: str = "smith-correlated",
+    name: str = "environment",
+) -> Baked:  # fmt: skip
+    """The levels as arrays level_0, level_1 ..., rounded as a picture holds them; the manifest states their errors.
+
+    masking  what the split sum is judged with
+    name     of the environment, for the manifest
+    """
+    quadrature.known_masking(masking)
+    made = prefilter(environment, ndf, levels, name)
+    source = made[0]
+    arrays = {f"level_{level}": values.astype(np.float32).astype(np.float64) for level, values in enumerate(made)}
+    alphas = [roughness_of(level, levels) ** 2 for level in range(levels)]
+    manifest = {
+        "schema": SCHEMA,
+        "target": Path(name).name,
+        "ndf": distribution(ndf).name,
+        "masking": masking,
+        "method": "convolution",
+        "layout": "latitude-longitude",
+        "size": source.shape[0],
+        "levels": [
+            {"roughness": roughness_of(level, levels), "alpha": alpha, "size": [*values.shape[:2]]}
+            for level, (alpha, values) in enumerate(zip(alphas, made, strict=True))
+        ],
+        "axes": {
+            "theta": "row i at (i + 1/2) pi / H from the zenith",
+            "phi": "column j at (j + 1/2) 2 pi / W, in the order of the map",
+            "level": f"roughness = level / {levels - 1}, alpha = roughness^2",
+            "split sum": f"E(mu) L(r) against the integral itself at F = 1, mu = {', '.join(map(str, COSINES))}",
+        },
+        "texels": "linear between texels and between levels",
+        "errors are": "in units of the root mean square of what is right, over the directions judged",
+        "dims": {key: ["theta", "phi"] for key in arrays},
+        "tables": {key: [*array.shape] for key, array in arrays.items()},
+        "error": errors(made, ndf, masking),
+        "hash": {key: content_hash(array) for key, array in arrays.items()},
+    }
+    return Baked(arrays, manifest)
+
+
+def _checked(environment: Environment, levels: int, where: str) -> Array:
+    source = np.asarray(environment, dtype=np.float64)
+    if source.ndim != 3 or source.shape[1] != 2 * source.shape[0] or source.size == 0:
+        what = f"a picture of shape {source.shape}, expected latitude-longitude: (H, 2 H, channels)"
+        raise InputError(what, where, "give a panorama twice as wide as high, the zenith on top")
+    bad = np.count_nonzero(~np.isfinite(source) | (source < 0.0))
+    if bad:
+        raise InputError(f"{bad} values are negative or not finite", where, "radiance is 0 or more: mend the picture")
+    height = source.shape[0]
+    if not SMALLEST <= height <= LARGEST:
+        raise InputError(f"a map of {height} rows, expected {SMALLEST} to {LARGEST}", where, "scale the picture")
+    if not 2 <= levels <= MOST_LEVELS:
+        raise InputError(f"{levels} levels asked for", "--levels", f"give 2 to {MOST_LEVELS}")
+    if height >> (levels - 1) < 2:
+        what = f"{levels} levels of a map of {height} rows, each half as large as the one before"
+        raise InputError(what, where, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")
+    return source
+
+
+# --- the blur ---------------------------------------------------------------------------------------------
+
+
+def _half_width(alpha: float) -> float:
+    """The angle at which GGX's lobe has fallen to a quarter; other distributions are about as wide."""
+    return 2.0 * np.arctan(alpha)
+
+
+def _kernel(lobe: NDF, alpha: float, z: Array) -> Array:
+    """k(r.i), of any shape."""
+    kind = backend.types("float64")
+    width = backend.float_of(alpha, kind)
+    cosine = kind.float(np.ascontiguousarray(z.ravel()))
+    m = kind.vec3(_root(0.5 - 0.5 * cosine), 0.0, _root(0.5 + 0.5 * cosine))
+    value = lobe.D(m, kind.vec2(width, width)) * backend.drjit().maximum(cosine, 0.0)
+    return np.asarray(value).reshape(z.shape)
+
+
+def _root(x: Scalar) -> Scalar:
+    return backend.drjit().sqrt(backend.drjit().maximum(x, 0.0))
+
+
+def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
+    """One level, by convolution over the azimuth and a sum over latitudes."""
+    alpha = roughness_of(level, levels) ** 2
+    light = _resampled(source, max(STEPS * np.pi / _half_width(alpha), LEAST_ROWS))
+    (rows, columns), channels = light.shape[:2], light.shape[2]
+    height, width = source.shape[0] >> level, 2 * (source.shape[0] >> level)
+    theta_i, theta_o = _centres(rows), _centres(height)
+
+    # c_m of every row, for azimuths counted from 0 although the first texel's centre stands half a texel further on,
+    # to be read where the level's texels stand; times solid angle. The north and south of the map are mirror images for
+    # the kernel: the southern half of the level is the northern one of the map turned over.
+    order = np.arange(columns // 2)
+    turn = np.exp(1j * np.pi * order * (1.0 / width - 1.0 / columns))
+    series = np.fft.rfft(light, axis=1)[:, :-1] * turn[:, None] * _bands(rows)[:, None, None]
+    both = np.concatenate([series, series[::-1]], axis=2).transpose(1, 0, 2)
+
+    north = (height + 1) // 2
+    offsets = np.cos(np.arange(columns // 2 + 1) / columns * 2.0 * np.pi)
+    result = np.empty((height, width, channels))
+    step = max(1, _LANES // (rows * offsets.size))
+    for start in range(0, north, step):
+        theta = theta_o[start : min(start + step, north), None, None]
+        z = np.cos(theta) * np.cos(theta_i[:, None]) + np.sin(theta) * np.sin(theta_i[:, None]) * offsets
+        kernel = dct(_kernel(lobe, alpha, z), type=1)[..., :-1]  # Fourier series of an even function
+        mean = kernel[..., 0] @ _bands(rows)
+        found = np.matmul(kernel.transpose(2, 0, 1), both).transpose(1, 0, 2) / mean[:, None, None]
+        values = _at_centres(found, width) / columns
+        result[start : start + len(theta)] = values[..., :channels]
+        for row, mirrored in enumerate(values[..., channels:]):
+            result[height - 1 - start - row] = mirrored
+    return np.maximum(result, 0.0)  # a rounding may lie below
+
+
+def _at_centres(series: NDArray[np.complex128], width: int) -> Array:
+    """A Fourier series over axis 1 at `width` even steps."""
+    fold = max(1, -(-2 * series.shape[1] // width))
+    return np.fft.irfft(series, fold * width, axis=1)[:, ::fold] * (fold * width)
+
+
+def _resampled(source: Array, wanted: float) -> Array:
+    """The map on a grid of about `wanted` rows or more: averaged in whole blocks, or read between its texels."""
+    height = source.shape[0]
+    block = max((k for k in range(1, height // 4 + 1) if height % k == 0 and height / k >= wanted), default=1)
+    if block > 1:
+        split = (height // block, block, 2 * height // block, block, source.shape[2])
+        weighed = (source * _bands(height)[:, None, None]).reshape(split).sum((1, 3))
+        return weighed / (block * _bands(height).reshape(-1, block).sum(1))[:, None, None]
+    return _divided(source, int(np.ceil(wanted / height)))
+
+
+def _divided(source: Array, parts: int) -> Array:
+    """The map with every texel divided into parts x parts, read between the centres as renderers do."""
+    if parts <= 1:
+        return source
+    height, width = source.shape[:2]
+    across = np.concatenate([source[:, -1:], source, source[:, :1]], axis=1)
+    whole = np.concatenate([across[:1], across, across[-1:]], axis=0)
+    at = (np.arange(height * parts) + 0.5) / parts + 0.5
+    rows = _between(whole, at, 0)
+    return _between(rows, (np.arange(width * parts) + 0.5) / parts + 0.5, 1)
+
+
+def _between(values: Array, at: Array, axis: int) -> Array:
+    """Linear interpolation along an axis at places counted in entries."""
+    low = np.minimum(at.astype(int), values.shape[axis] - 2)
+    part = np.expand_dims(at - low, tuple(range(1, values.ndim - axis)))
+    return np.take(values, low, axis) * (1.0 - part) + np.take(values, low + 1, axis) * part
+
+
+def _centres(rows: int) -> Array:
+    """Angles from the zenith."""
+    return (np.arange(rows) + 0.5) / rows * np.pi
+
+
+def _bands(rows: int) -> Array:
+    """Solid angle of a row over 2 pi."""
+    edges = np.cos(np.arange(rows + 1) / rows * np.pi)
+    return edges[:-1] - edges[1:]
+
+
+# --- reading ----------------------------------------------------------------------------------------------
+
+
+def read(level: Array, directions: Array) -> Array:
+    """A level at directions (..., 3): linear between texels, the azimuth goes round, the poles hold."""
+    height, width = level.shape[:2]
+    y = np.clip(np.arccos(np.clip(directions[..., 2], -1.0, 1.0)) / np.pi * height - 0.5, 0.0, height - 1.0)
+    x = np.arctan2(directions[..., 1], directions[..., 0]) / (2.0 * np.pi) * width - 0.5
+    low, left = np.minimum(y.astype(int), height - 2), np.floor(x).astype(int)
+    down, right = (y - low)[..., None], (x - left)[..., None]
+    left, next_ = left % width, (left + 1) % width
+    top = level[low, left] * (1.0 - right) + level[low, next_] * right
+    bottom = level[low + 1, left] * (1.0 - right) + level[low + 1, next_] * right
+    return top * (1.0 - down) + bottom * down
+
+
+# --- the errors -------------------------------------------------------------------------------------------
+
+
+def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, float]]:
+    """By level: `max` and `rms` of the blur at texels; `interpolation`, the largest between texels and halfway to the
+    level before; `split sum`, rms. In units of the root mean square of what is right.
+
+    Judged by sums over every texel of the map, in eight directions spread evenly and at the level's brightest texel.
+    """
+    lobe, source = distribution(ndf), levels[0]
+    spread = _spread(8)
+    found = {"level_0": {"max": 0.0, "rms": 0.0}}
+    for level in range(1, len(levels)):
+        values, roughness = levels[level], roughness_of(level, len(levels))
+        directions = _of_texels(values)
+        at = [int(np.argmax(directions @ d)) for d in spread] + [int(np.argmax(values.sum(-1)))]
+        chosen = directions[np.unique(at)]
+        sky = EveryTexel(source, roughness**2)
+        right = np.stack([sky.blurred(lobe, n) for n in chosen])
+        figures = _figures(read(values, chosen) - right, right)
+        halfway = EveryTexel(source, (roughness - 0.5 / (len(levels) - 1)) ** 2, STEPS)
+        right = np.stack([halfway.blurred(lobe, n) for n in spread])
+        figures["interpolation"] = _figures(
+            0.5 * (read(values, spread) + read(levels[level - 1], spread)) - right, right
+        )["max"]
+        albedo = quadrature.moments(lobe.name, masking, np.array(COSINES), roughness**2).whole
+        split = np.concatenate([e * read(values, chosen) for e in albedo])
+        right = np.stack([sky.reflected(lobe, masking, *_mirrored(r, mu)) for mu in COSINES for r in chosen])
+        found[f"level_{level}"] = figures | {"split sum": _figures(split - right, right)["rms"]}
+    return found
+
+
+def _figures(difference: Array, right: Array) -> dict[str, float]:
+    unit = max(float(np.sqrt(np.mean(right**2))), 1e-300)
+    worst, rms = float(np.max(np.abs(difference))), float(np.sqrt(np.mean(difference**2)))
+    return {"max": worst / unit, "rms": rms / unit}
+
+
+class EveryTexel:
+    """Every texel of a map, divided finely enough for a lobe: what levels are judged by. No Fourier series here."""
+
+    def __init__(self, source: Array, alpha: float, steps: float = JUDGE_STEPS) -> None:
+        self.alpha = alpha
+        light = _resampled(source, max(steps * np.pi / _half_width(alpha), JUDGE_ROWS))
+        rows = light.shape[0]
+        power = light * (_bands(rows) * 2.0 * np.pi / light.shape[1])[:, None, None]
+        step = max(1, _LANES // light.shape[1])
+        kind = backend.types("float64")
+        self._bands: list[tuple[Direction, Array, Array]] = []
+        for start in range(0, rows, step):
+            w = _of_texels(light, start, start + step)
+            part = power[start : start + step].reshape(-1, light.shape[2])
+            solid = np.repeat(_bands(rows)[start : start + step] * 2.0 * np.pi / light.shape[1], light.shape[1])
+            self._bands.append((kind.vec3(*[kind.float(np.ascontiguousarray(c)) for c in w.T]), part, solid))
+
+    def _sums(self, n: Array, value: Callable[[Direction, Scalar], Scalar]) -> Iterator[tuple[Array, float]]:
+        """sum L value and sum value over all directions, value(i, alpha) in the frame of n."""
+        kind = backend.types("float64")
+        dr = backend.drjit()
+        alpha = backend.float_of(self.alpha, kind)
+        axes = [kind.vec3(*[backend.float_of(float(c), kind) for c in axis]) for axis in _frame(n)]
+        for w, power, solid in self._bands:
+            weight = np.asarray(value(kind.vec3(*[dr.dot(w, axis) for axis in axes]), alpha))
+            yield weight @ power, float(weight @ solid)
+
+    def blurred(self, lobe: NDF, n: Array) -> Array:
+        """L_alpha(n), straight from its definition."""
+
+        def value(i: Direction, alpha: Scalar) -> Scalar:
+            m = normalize(vec3(i.x, i.y, i.z + 1.0))
+            return _above(i, lobe.D(m, vec2(alpha, alpha)) * i.z)
+
+        light, weight = (np.sum(parts, axis=0) for parts in zip(*self._sums(n, value), strict=True))
+        return light / weight
+
+    def reflected(self, lobe: NDF, masking: str, o: Array, n: Array) -> Array:
+        """int L(i) D G / (4 o.n) di: what the split sum stands for, at F = 1."""
+        kind = backend.types("float64")
+        wo = kind.vec3(*[backend.float_of(float(o @ axis), kind) for axis in _frame(n)])
+
+        def value(i: Direction, alpha: Scalar) -> Scalar:
+            m = normalize(wo + i)
+            g = masking_shadowing(masking, lobe, wo, i, m, vec2(alpha, alpha))
+            return _above(i, lobe.D(m, vec2(alpha, alpha)) * g / (4.0 * wo.z))
+
+        return np.sum([light for light, _ in self._sums(n, value)], axis=0)
+
+
+def _above(i: Direction, value: Scalar) -> Scalar:
+    return where(i.z > 0.0, value, 0.0)
+
+
+def _frame(n: Array) -> Array:
+    """Two unit vectors across n, and n."""
+    t = np.cross([0.0, 1.0, 0.0] if abs(n[1]) < 0.9 else [1.0, 0.0, 0.0], n)
+    t /= np.linalg.norm(t)
+    return np.stack([t, np.cross(n, t), n])
+
+
+def _mirrored(r: Array, mu: float) -> tuple[Array, Array]:
+    """o and n whose mirrored direction is r, with o.n = mu; in any plane through r."""
+    n = mu * r + np.sqrt(1.0 - mu * mu) * _frame(r)[0]
+    return 2.0 * mu * n - r, n
+
+
+def _of_texels(level: Array, start: int = 0, stop: int | None = None) -> Array:
+    """Directions of the texels' centres in rows start to stop, (N, 3)."""
+    height, width = level.shape[:2]
+    theta, phi = _centres(height)[start:stop, None], (np.arange(width) + 0.5) / width * 2.0 * np.pi
+    sine = np.sin(theta)
+    return np.stack(np.broadcast_arrays(sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)), -1).reshape(-1, 3)
+
+
+def _spread(count: int) -> Array:
+    """Directions spread evenly over the sphere, none at a pole: a spiral in golden steps."""
+    z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    phi = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))
+    sine = np.sqrt(1.0 - z * z)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], -1)
