@@ -26,6 +26,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from ..errors import GonioError
+from .interpolation import read_in_numpy
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
@@ -520,10 +521,8 @@ def _run(function: Function, arguments: list) -> Value:
         elif node.op == "element":
             values.append(list(_leaves(args[0]))[node.static])
         elif node.op == "lookup":
-            from .table import _numpy_lookup
-
             table, channel = node.static
-            values.append(_numpy_lookup(table, *args)[channel])
+            values.append(read_in_numpy(table, *args)[channel])
         else:
             values.append(_NUMPY[node.op](*args))
     return _rebuild(function.result, get)

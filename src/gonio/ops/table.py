@@ -10,13 +10,13 @@ Dr.Jit and shader agree. To put nodes on both ends of an axis, use `inset`.
 
 from __future__ import annotations
 
-from functools import reduce
 from itertools import product
 
 import numpy as np
 
 from . import graph
 from .backend import Array, Types, drjit, is_drjit, types_like
+from .interpolation import read_in_numpy
 from .types import Scalar
 
 
@@ -67,7 +67,7 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
         ]
         return tuple(symbols)
     if not any(is_drjit(x) for x in coordinates):
-        values = _numpy_lookup(table, *coordinates)
+        values = read_in_numpy(table, *coordinates)
         return tuple(values[c] for c in range(table.channels))
     dr = drjit()
     kind = types_like(type(next(x for x in coordinates if is_drjit(x))))
@@ -94,24 +94,3 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
             for c in range(width):
                 result[first + c] = result[first + c] + weight * (texel[c] if width == 4 else texel)
     return tuple(result)
-
-
-def _numpy_lookup(table: Table, *coordinates: Array) -> np.ndarray:
-    """Every channel, channels first: the rule in NumPy float64."""
-    points = np.broadcast_arrays(*[np.asarray(x, float) for x in coordinates])
-    cells, places = [], []
-    for x, count in zip(points, table.shape, strict=True):
-        at = np.clip(x * count - 0.5, 0.0, count - 1.0)
-        cell = np.minimum(at.astype(int), max(count - 2, 0))
-        cells.append(cell)
-        places.append(at - cell)
-    total = np.zeros((*points[0].shape, table.channels))
-    for corner in product((0, 1), repeat=len(cells)):
-        index = tuple(
-            np.minimum(cell + step, count - 1) for cell, step, count in zip(cells, corner, table.shape, strict=True)
-        )
-        weight = reduce(
-            np.multiply, [place if step else 1.0 - place for place, step in zip(places, corner, strict=True)]
-        )
-        total += weight[..., None] * table.values[index]
-    return np.moveaxis(total, -1, 0)
