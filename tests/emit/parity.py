@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import gonio as go
 import numpy as np
 from gonio.emit.program import Program
-from gonio.models.base import Parameter
+from gonio.models import Parameter, binding, tree
 from gonio.ops import backend
 
 SIDE = 256  # the target is SIDE x SIDE pixels, one draw each
@@ -87,13 +87,10 @@ def _directions(rng: np.random.Generator, count: int, below: bool) -> np.ndarray
     return v.astype(np.float32)
 
 
-def _fields(model: Any, rng: np.random.Generator, count: int, path: str = "") -> Any:
-    for name, parameter in model.parameters().items():
-        value = getattr(model, name)
-        if parameter.kind == "bsdf":
-            yield from _fields(value, rng, count, f"{path}{name}.")
-        elif parameter.numeric and not (parameter.kind == "angle" and isinstance(value, int | float) and value == 0):
-            yield f"{path}{name}", _values(type(model).__name__, parameter, value, rng, count)
+def _fields(model: go.BSDF, rng: np.random.Generator, count: int) -> Any:
+    for path, parameter, value, owner in tree.leaves(model):
+        if parameter.numeric and not (parameter.kind == "angle" and isinstance(value, int | float) and value == 0):
+            yield path, _values(type(owner).__name__, parameter, value, rng, count)
 
 
 def _values(owner: str, parameter: Parameter, value: Any, rng: np.random.Generator, count: int) -> np.ndarray:
@@ -141,7 +138,7 @@ def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ..
         x = next(rows)
         return column(x[:, 0]) if x.shape[1] == 1 else vector(x)
 
-    bound: Any = model.bind(convert)
+    bound: Any = binding.bind(model, convert)
     count = len(draws.wo)
     found = getattr(bound, method)(vector(draws.wo), vector(draws.u if method == "sample" else draws.wi))
     results = found if isinstance(found, tuple) else (found,)
