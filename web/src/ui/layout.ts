@@ -109,7 +109,7 @@ export class Layout {
 
   showStatus(): void {
     const { renderer } = this.app;
-    const parts = [`raster ${renderer.samples} spp`];
+    const parts = [`raster ${renderer.samples} spp${renderer.earlyShare > 0 ? " + split sum" : ""}`];
     const live = this.live?.status;
     if (live) {
       if (!live.connected || live.message) parts.push(`reference: ${live.message}`);
