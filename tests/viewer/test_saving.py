@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from gonio.viewer import page, server, stage
 from gonio.viewer.stage import Stage
-from gonio.viewer.watch import Watch
+from gonio.viewer.watch import POLL_SECONDS, Watch
 from live_server import next_frame, read, running, speak, wait_for
 
 import browser
@@ -131,10 +131,11 @@ def test_a_file_that_is_being_written_is_waited_for(file: Path) -> None:
     watch: Watch[Stage] = Watch(code, made.append, faults.append)
     watch.start()
     try:
-        end = time.monotonic() + 0.5
-        while time.monotonic() < end:  # no pause between two writes is as long as one between two looks
+        end, last, pause = time.monotonic() + 0.5, time.monotonic(), 0.0
+        while last < end:
             file.write_text(WARD[: len(WARD) // 2])
             file.write_text(WARD.replace("number(0.3", "number(0.8"))
+            pause, last = max(pause, time.monotonic() - last), time.monotonic()
         wait_for(lambda: made)
         file.unlink()
         time.sleep(0.05)
@@ -142,7 +143,8 @@ def test_a_file_that_is_being_written_is_waited_for(file: Path) -> None:
         wait_for(lambda: slope(made[-1]) == 0.3)
     finally:
         watch.stop()
-    assert faults == []
+    # a machine that let the writer wait for as long as the watcher does has shown it half a file at rest
+    assert faults == [] or pause > POLL_SECONDS
 
 
 # --------------------------------------------------------------------------- the server

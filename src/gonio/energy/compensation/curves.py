@@ -17,6 +17,7 @@ two axes, see `anisotropic`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -244,13 +245,32 @@ def turn(found: tuple[Array, ...], along: Array, across: Array) -> tuple[Array, 
 
     along, across  (1 + y) / 2 and (1 - y) / 2
     """
-    along_to, across_to = [1.0, along], [1.0, across]
+    terms = _harmonics(along, across)
+    count = (DEGREE + 1) * HARMONICS
+    return tuple(_weigh(found[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
+
+
+class Harmonics(NamedTuple):
+    """along^j across^(6 - j)."""
+
+    h0: Array
+    h1: Array
+    h2: Array
+    h3: Array
+    h4: Array
+    h5: Array
+    h6: Array
+
+
+@ops.function
+def _harmonics(along: Array, across: Array) -> Harmonics:
+    """along^j across^(6 - j), j = 0 to 6."""
+    along_to, across_to = [along, along], [across, across]
     for _ in range(HARMONICS - 2):
         along_to.append(along_to[-1] * along)
         across_to.append(across_to[-1] * across)
-    terms = tuple(along_to[j] * across_to[HARMONICS - 1 - j] for j in range(HARMONICS))
-    count = (DEGREE + 1) * HARMONICS
-    return tuple(_weigh(found[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
+    between = (along_to[j] * across_to[HARMONICS - 1 - j] for j in range(1, HARMONICS - 1))
+    return Harmonics._make([across_to[HARMONICS - 1], *between, along_to[HARMONICS - 1]])
 
 
 @ops.function

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from ... import ops
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, sincos, sqrt, vec3, where
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, function, sincos, sqrt, vec3, where
 from ...ops.backend import Array
 
 NOTHING = 1e-5  # M_avg below this is all error of the fit: nothing is given back
@@ -58,6 +58,7 @@ def above(wo: Direction, wi: Direction) -> Mask:
     return (wo.z > 0.0) & (wi.z > 0.0)
 
 
+@function
 def over_pi(average: Scalar) -> Scalar:
     """1 / (pi M_avg), or 0 where nothing is missing."""
     some = average > NOTHING

@@ -160,6 +160,7 @@ def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi
     return AllParts(d, g, f, single, multi)
 
 
+@function
 def lobe_ratio(added: Spectrum, lost: MissingEnergy) -> Scalar:
     """Mean colour of what is given back over that of single scattering."""
     return safe_div(mean(added), maximum(mean(lost.F_avg * lost.factor), 1e-6))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
 from ...models import Breach, choice, method
-from ...ops import Direction, Mode, Scalar, Spectrum, abs
+from ...ops import Direction, Mode, Scalar, Spectrum, abs, function
 from ...optics.fresnel.artist import AVERAGES
 from ..compensation.lobe import MissingEnergy
 from ..compensation.missing import missing_energy
@@ -31,6 +31,7 @@ class Derived(NamedTuple):
     ratio: Scalar
 
 
+@function
 def returned(lost: MissingEnergy, color: str) -> Spectrum:
     """f_add = F_avg E_avg / (1 - F_avg (1 - E_avg)) (Kulla2017), or F_avg times that, by `color`."""
     F_avg, E_avg = lost.F_avg, 1.0 - lost.average
