@@ -15,6 +15,7 @@ class Effort:
     furnace_samples  of `sample`, for each of them
     accuracy         of integrals
     widths           widths of microfacet distributions that sampling is also tried at
+    places           other parameter values that every law is tried at, `gonio.verify.box`
     """
 
     name: str
@@ -24,10 +25,17 @@ class Effort:
     furnace_samples: int
     accuracy: float
     widths: tuple[float, ...] = ()
+    places: int = 0
 
 
 EFFORTS = {
-    "quick": Effort("quick", 1 << 13, 18, 12, 1 << 15, 1e-4),
-    "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0)),
-    "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0)),
+    "quick": Effort("quick", 1 << 13, 18, 12, 1 << 15, 1e-4, places=6),
+    "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0), 18),
+    "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0), 60),
+}
+# at each of the other places
+ELSEWHERE = {
+    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3),
+    "default": Effort("default", 1 << 12, 16, 5, 1 << 14, 3e-4),
+    "deep": Effort("deep", 1 << 14, 18, 9, 1 << 16, 1e-4),
 }

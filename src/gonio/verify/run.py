@@ -6,12 +6,14 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from .. import files
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import directions, page, statistics, subject
-from .effort import EFFORTS, Effort
+from . import box, directions, page, statistics, subject
+from .box import Place
+from .effort import EFFORTS, ELSEWHERE, Effort
 from .laws import Law, chosen
 from .report import SIGNIFICANCE, Report
 from .subject import Fault, Subject
@@ -58,25 +60,81 @@ def verify(
     subjects = _subjects(target, sweep)
     started = time.perf_counter()
     steps = len(subjects) * len(asked)
-    found: list[tuple[Subject, Law, Finding | Verdict, float]] = []
+    held: list[tuple[Subject, list[Place], Law, list[Asked]]] = []
     for one in subjects:
+        others = _places(one, effort, seed)
         for each in asked:
             if progress:
-                progress(len(found), steps, f"{one.title}: {each.name}")
-            began = time.perf_counter()
-            found.append((one, each, _judge(each, one, EFFORTS[effort], seed), time.perf_counter() - began))
-    tests = sum(len(what.trials) for _, _, what, _ in found if isinstance(what, Finding))
+                progress(len(held), steps, f"{one.title}: {each.name}")
+            held.append((one, others, each, _everywhere(each, one, others, effort, seed)))
+    tests = sum(len(it.what.trials) for _, _, _, all_ in held for it in all_ if isinstance(it.what, Finding))
     threshold = statistics.sidak(SIGNIFICANCE, tests)
     cards: dict[int, Card] = {}
-    for one, each, what, seconds in found:
-        began = time.perf_counter()
-        verdict = decide(each, one, what, threshold, seed) if isinstance(what, Finding) else what
-        verdict.seconds = seconds + time.perf_counter() - began
-        cards.setdefault(id(one), Card(one, [])).verdicts.append(verdict)
+    for one, others, each, all_ in held:
+        verdict = _joined([_verdict(each, it, threshold, seed) for it in all_], all_)
+        card = cards.setdefault(id(one), Card(one, [], box.covered(one, others)))
+        card.verdicts.append(verdict)
     made = Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
     if report is not None:
         page.write(made, Path(report))
     return made
+
+
+class Asked(NamedTuple):
+    """A law asked of a subject at a place: what it found, and how long that took."""
+
+    place: Place
+    what: Finding | Verdict
+    seconds: float
+
+
+def _places(one: Subject, effort: str, seed: int) -> list[Place]:
+    """The other values to try; none where the BSDF fails already at being asked, which the laws will report."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", GonioWarning)  # the box goes to the ends of the ranges on purpose
+        try:
+            return box.places(one, EFFORTS[effort], seed)
+        except Fault:
+            return []
+
+
+def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: int) -> list[Asked]:
+    """The law at the given values, and elsewhere unless it failed there already."""
+    found = []
+    for place in [Place({}, "given", one), *(others if law.everywhere else [])]:
+        began = time.perf_counter()
+        spend = EFFORTS[effort] if place.why == "given" else ELSEWHERE[effort]
+        what = _judge(law, place.subject, spend, seed)
+        found.append(Asked(place, what, time.perf_counter() - began))
+        if isinstance(what, Verdict) and what.failed:
+            break  # an exception, or no end: it would be the same, or take for ever
+    return found
+
+
+def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
+    began = time.perf_counter()
+    what, place = asked.what, asked.place
+    verdict = what if isinstance(what, Verdict) else decide(law, place.subject, what, threshold, seed, place)
+    verdict.seconds = asked.seconds + time.perf_counter() - began
+    return verdict
+
+
+def _joined(verdicts: list[Verdict], all_: list[Asked]) -> Verdict:
+    """One verdict of those at all places: the given one, unless the law holds there and fails elsewhere."""
+    first = verdicts[0]
+    failed = [(v, it.place) for v, it in zip(verdicts, all_, strict=True) if v.failed]
+    answer = first
+    if failed and not first.failed:
+        answer, place = failed[0]
+        answer.why = [f"at {place.words}: {line}" for line in answer.why]
+        answer.notes.insert(0, f"at the given values: {first.status}")
+    if len(failed) > 1:
+        where = "; ".join(place.words for _, place in failed[1:4] if place.words)
+        if where:
+            answer.notes.append(f"fails at {len(failed)} of {len(all_)} places, also at {where}")
+    answer.places = len(all_)
+    answer.seconds = sum(v.seconds for v in verdicts)
+    return answer
 
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
@@ -96,7 +154,9 @@ def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdi
         return verdict(FAIL, str(fault))
 
 
-def decide(law: Law, one: Subject, finding: Finding, threshold: float, seed: int) -> Verdict:
+def decide(
+    law: Law, one: Subject, finding: Finding, threshold: float, seed: int, place: Place | None = None
+) -> Verdict:
     """The verdict on a finding, once it is known how many statistical tests the report holds."""
     why = list(finding.problems)
     statistical: list[str] = []
@@ -118,7 +178,7 @@ def decide(law: Law, one: Subject, finding: Finding, threshold: float, seed: int
         if why or statistical:
             pass
         elif not over:
-            if breach.certain:
+            if breach.certain and (place is None or place.why == "given"):
                 status, why = FAIL, ["it is declared to be broken, and is not: " + breach.reason]
         elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
             status = DECLARED

@@ -113,9 +113,9 @@ class Subject:
         return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
 
     def replace(self, **values: Any) -> Subject:
-        """The same BSDF with other parameter values."""
+        """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""
         model = self.model
-        changed = tree.rebuild(model, values) if isinstance(model, BSDF) else model.replace(**values)
+        changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
         return Subject(changed, self.target, {**self.settings, **values})
 
     def command(self, *more: str) -> str:

@@ -33,6 +33,8 @@ def show_card(card: Card, console: Console) -> None:
     for v in card.verdicts:
         table.add_row(str(v.number), v.law, MARKS[v.status], escape(_figure(v)), _allowed(v), escape(_remark(v)))
     console.print(table)
+    if card.covered:
+        console.print(f"[dim]{escape(card.covered)}[/]\n")
     for v in card.verdicts:
         if v.failed:
             _explain(v, console)

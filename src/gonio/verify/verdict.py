@@ -70,7 +70,10 @@ class DoesNotApply(Exception):
 
 @dataclasses.dataclass
 class Verdict:
-    """A law's word on one subject."""
+    """A law's word on one subject.
+
+    places  values of the parameters at which it was asked, the given ones among them
+    """
 
     number: int
     law: str
@@ -87,6 +90,7 @@ class Verdict:
     why: list[str] = dataclasses.field(default_factory=list)
     notes: list[str] = dataclasses.field(default_factory=list)
     seconds: float = 0.0
+    places: int = 1
     evidence: Evidence | None = dataclasses.field(default=None, repr=False)
 
     @property
@@ -101,10 +105,11 @@ class Verdict:
 
 @dataclasses.dataclass
 class Card:
-    """All verdicts on one subject."""
+    """All verdicts on one subject; `covered` says at which values of its parameters."""
 
     subject: Subject
     verdicts: list[Verdict]
+    covered: str = ""
 
     @property
     def title(self) -> str:
@@ -126,6 +131,7 @@ class Card:
             "title": self.title,
             "target": self.subject.target,
             "settings": settings,
+            "covered": self.covered,
             "passed": self.passed,
             "verdicts": [verdict.as_dict() for verdict in self.verdicts],
         }

@@ -21,6 +21,7 @@ class Law:
     name     how it is called on the command line and in `breaks`
     title    the law as a sentence
     meaning  what its violation means for a picture
+    everywhere  whether it is also asked at other values of the parameters
     """
 
     family: ClassVar[Family[Law]]
@@ -28,6 +29,7 @@ class Law:
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""
     meaning: ClassVar[str] = ""
+    everywhere: ClassVar[bool] = True
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         raise NotImplementedError(f"{type(self).__name__} has no judge")

@@ -1,0 +1,259 @@
+"""Where in the ranges of its parameters a BSDF is tried: not only at the values that were given.
+
+A material that is right at its defaults may be wrong for a coat above .9, for a narrow lobe, or where two parameters
+meet. So the laws are asked again, at less cost, at corners, edges and random points of the declared ranges, and on both
+sides of every place where a scan along one parameter sees the values jump.
+
+    for place in box.places(subject, effort, seed): ...     place.values, place.why, place.subject
+
+No range is invented: a parameter that declares none stays at its value.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..models import BSDF, Parameter, tree
+from . import directions
+from .effort import Effort
+from .subject import Fault, Subject
+
+SCAN = 64  # values along one parameter
+RAYS = 96  # pairs of directions for each of them
+WIDE = 30.0  # a range whose ends differ by more is scanned and drawn from in equal ratios
+OPEN = 100.0  # how far a range without an upper end is followed, in units of its lower end, or of 1
+JUMP = 6.0  # how many times its neighbours' a step must be
+LEAST = 0.004  # and how large, as a share of the value: what is smaller no one sees
+SMALLEST = 1e-4  # of a range that starts at 0, where equal ratios have no first step
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """A point of the box.
+
+    values   what differs from the given material, by path
+    why      "given", "corner", "edge", "interior" or "jump"
+    subject  the BSDF there
+    """
+
+    values: dict[str, Any]
+    why: str
+    subject: Subject
+
+    @property
+    def words(self) -> str:
+        """ "alpha = 1, coat = 0.5"."""
+        return ", ".join(f"{name} = {_short(value)}" for name, value in self.values.items())
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One parameter that may move, from `low` to `high`; `ratio` where in equal ratios."""
+
+    path: str
+    low: float
+    high: float
+    ratio: bool
+
+    def at(self, share: float | np.ndarray) -> Any:
+        """The value at a share of the way, 0 to 1."""
+        if not self.ratio:
+            return self.low + share * (self.high - self.low)
+        low = self.low if self.low > 0.0 else SMALLEST * self.high
+        value = low * (self.high / low) ** share
+        return np.where(np.asarray(share) <= 0.0, self.low, value) if self.low <= 0.0 else value
+
+
+def axes(subject: Subject) -> list[Axis]:
+    """The parameters that declare a range, inner materials' included."""
+    if not isinstance(subject.model, BSDF):
+        return []
+    found = []
+    for leaf in tree.leaves(subject.model):
+        ends = _ends(leaf.parameter, leaf.value)
+        if ends is not None:
+            found.append(Axis(leaf.path, *ends))
+    return found
+
+
+def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
+    if not parameter.numeric or value is None:
+        return None
+    if parameter.kind == "angle":
+        return 0.0, 2.0 * math.pi, False
+    low, high = parameter.low, parameter.high
+    if not math.isfinite(low):
+        return None
+    if not math.isfinite(high):
+        high = OPEN * max(low, 1.0)
+    if not low < high:
+        return None
+    return low, high, high > WIDE * max(low, 1.0) or parameter.kind == "alpha"
+
+
+def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
+    """The points to try besides the given one, each once, in order of importance."""
+    along = axes(subject)
+    if not along or effort.places <= 0:
+        return []
+    rng = np.random.default_rng([seed, 71])
+    wanted: list[tuple[str, dict[str, Any]]] = []
+    for jump in jumps(subject, along, seed)[: max(2, effort.places // 3)]:
+        wanted.append(("jump", jump))
+    corners = [{axis.path: axis.at(float(end)) for axis in along} for end in (0, 1)]
+    if len(along) > 1:
+        for _ in range(2):
+            corners.append({axis.path: axis.at(float(rng.integers(2))) for axis in along})
+    edges = [{axis.path: axis.at(end)} for axis in along for end in (1.0, 0.0)]
+    rng.shuffle(edges)  # type: ignore[arg-type]
+    interior = [{axis.path: axis.at(rng.uniform()) for axis in along} for _ in range(effort.places)]
+    kinds = {"corner": corners, "edge": edges, "interior": interior}
+    while any(kinds.values()):
+        for why, rest in kinds.items():
+            if rest:
+                wanted.append((why, rest.pop(0)))
+    made: list[Place] = []
+    for why, values in wanted:
+        if len(made) >= effort.places:
+            break
+        values = {path: float(value) for path, value in values.items()}
+        if any(values == place.values for place in made):
+            continue
+        place = _made(subject, values, why)
+        if place is not None:
+            made.append(place)
+    return made
+
+
+def covered(subject: Subject, tried: list[Place]) -> str:
+    """What was tried, in a sentence."""
+    if not tried:
+        return "judged at the given values only" + ("" if axes(subject) else ": no parameter declares a range")
+    kinds = Counter(place.why for place in tried)
+    words = ", ".join(f"{count} {_PLURAL[why] if count > 1 else why}" for why, count in sorted(kinds.items()))
+    ranges = ", ".join(f"{axis.path} {axis.low:g} to {axis.high:.4g}" for axis in axes(subject))
+    return f"judged at the given values and {len(tried)} others ({words}) of {ranges}"
+
+
+_PLURAL = {"corner": "corners", "edge": "edges", "interior": "inside", "jump": "jumps"}
+
+
+def _made(subject: Subject, values: dict[str, Any], why: str) -> Place | None:
+    try:
+        return Place(values, why, subject.replace(**values))
+    except InputError:
+        return None  # the material refuses the values: it need not answer for them
+
+
+# --------------------------------------------------------------------------- where something changes fast
+
+
+def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]]:
+    """Values on the far side of a jump, and in its middle, the largest jump first.
+
+    Each parameter is moved through its range, the others as given, and eval, pdf and the mean weight are looked at. The
+    step from one value to the next is held against its neighbours': where it is many times theirs, something begins.
+    """
+    found: list[tuple[float, dict[str, Any]]] = []
+    for axis in along:
+        share = np.linspace(0.0, 1.0, SCAN)
+        values = np.asarray(axis.at(share), float)
+        try:
+            curves = _curves(subject, axis.path, values, seed)
+        except (Fault, InputError):
+            continue
+        for curve in curves:
+            for size, at in _steps(curve):
+                # the value just behind the step, and one further in: what begins there may end soon
+                found.append((size, {axis.path: float(values[at])}))
+    found.sort(key=lambda one: -one[0])
+    kept: list[dict[str, Any]] = []
+    for _, one in found:
+        if one not in kept:
+            kept.append(one)
+    return kept
+
+
+def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
+    """Sizes of the jumps of curves (SCAN, N) along the first axis, and the value behind each.
+
+    The median over the N curves of the absolute step in their logarithm, so that a factor over all directions shows
+    however small it is, and the largest tenth, so that one that a few directions have does.
+    """
+    least = 1e-6 * float(np.max(np.abs(curve), initial=0.0, where=np.isfinite(curve)))
+    if least <= 0.0:
+        return []
+    lit = np.abs(curve) > least
+    logs = np.log(np.maximum(np.abs(curve), least))
+    step = np.where(lit[1:] & lit[:-1], np.diff(logs, axis=0), 0.0)
+    # a smooth curve's steps follow from their neighbours: what does not is a jump or a kink
+    bend = np.abs(np.diff(step, axis=0))
+    found = []
+    for share in (50.0, 90.0):
+        size = np.percentile(bend, share, axis=1)
+        for i in range(len(size)):
+            near = np.concatenate([size[max(i - 5, 0) : max(i - 1, 0)], size[i + 2 : i + 6]])
+            usual = float(np.median(near)) if len(near) else 0.0
+            if size[i] > LEAST and size[i] > JUMP * usual:
+                found.append((float(size[i]) / (1.0 if share == 50.0 else 2.0), i + 1))
+                found.append((float(size[i]) / (1.01 if share == 50.0 else 2.02), i + 2))
+    return [(size, min(at, SCAN - 1)) for size, at in found]
+
+
+def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[np.ndarray]:
+    """eval, pdf (SCAN, N) and weights (SCAN, N) at the same directions and numbers for every value."""
+    rng = np.random.default_rng([seed, 72])
+    sides = np.array(subject.sides or (1,))
+    wo = directions.uniform(rng, RAYS)
+    wo[:, 2] = np.abs(wo[:, 2]) * rng.choice(sides, RAYS)
+    wi = directions.uniform(rng, RAYS)
+    if not subject.transmits:
+        wi[:, 2] = np.copysign(wi[:, 2], wo[:, 2])
+    third = RAYS // 3  # near the mirror direction, where narrow lobes are
+    wi[:third] = wo[:third] * [-1.0, -1.0, 1.0] + 0.15 * rng.normal(size=(third, 3))
+    wi[:third] /= np.linalg.norm(wi[:third], axis=1, keepdims=True)
+    wo, wi, u = directions.single(wo), directions.single(wi), directions.numbers(rng, RAYS)
+    count = len(values)
+    many = [np.tile(part, (count, 1)) for part in (wo, wi, u)]
+    together = _per_ray(subject, path, np.repeat(values, RAYS))
+    shape = (count, RAYS)
+    if together is not None:
+        value = together.eval(many[0], many[1], precision="float32")
+        density = together.pdf(many[0], many[1], "float32")
+        weight = together.sample(many[0], many[2], precision="float32").weight
+    else:
+        one = [subject.replace(**{path: float(v)}) for v in values]
+        value = np.concatenate([s.eval(wo, wi, precision="float32") for s in one])
+        density = np.concatenate([s.pdf(wo, wi, "float32") for s in one])
+        weight = np.concatenate([s.sample(wo, u, precision="float32").weight for s in one])
+    channels = [value[:, c].reshape(shape) for c in range(value.shape[1])]
+    same = all(np.array_equal(channels[0], other) for other in channels[1:])
+    return [*(channels[:1] if same else channels), density.reshape(shape), weight.mean(1).reshape(shape)]
+
+
+def _per_ray(subject: Subject, path: str, values: np.ndarray) -> Subject | None:
+    """The subject with one value a ray; None where it takes no arrays."""
+    parameter = next(leaf.parameter for leaf in tree.leaves(subject.model) if leaf.path == path)
+    array: Any = np.repeat(values[:, None], 3, axis=1) if parameter.kind == "spectrum" else values
+    if parameter.kind == "alpha":
+        array = (values, values)
+    try:
+        together = subject.replace(**{path: array})
+        probe = directions.at(np.full(len(values), 30.0), 10.0)
+        together.eval(probe, probe)
+    except (Fault, InputError):
+        return None
+    return together
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+__all__ = ["Axis", "Place", "axes", "jumps", "places"]
