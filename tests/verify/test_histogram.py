@@ -47,8 +47,8 @@ def test_the_kernel_counts_where_numpy_counts() -> None:
     s = one.sample(np.repeat(WO[1:2], len(u), 0), u, precision="float32")
     wi = s.wi[s.pdf > 0].astype(np.float32)
     height, turn = histogram._height(wi), histogram._turn(wi)
-    row = np.clip(np.searchsorted(grid.rows[0, 0], height, "right") - 1, 0, histogram.ROWS - 1)
-    expected = np.bincount(row, minlength=histogram.ROWS)
+    row = np.clip(np.searchsorted(grid.rows[0, 0], height, "right") - 1, 0, histogram.CELLS[0] - 1)
+    expected = np.bincount(row, minlength=histogram.CELLS[0])
     # a sample on an edge may be rounded to either side
     assert np.abs(counts.cells[0, 0].sum(1) - expected).sum() <= 6
     assert turn.min() >= 0 and turn.max() <= 4

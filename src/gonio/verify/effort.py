@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from . import histogram
+
 
 @dataclass(frozen=True)
 class Effort:
@@ -15,6 +17,8 @@ class Effort:
     furnace_samples  of `sample`, for each of them
     accuracy         of integrals
     widths           widths of microfacet distributions that sampling is also tried at
+    cells            rows and columns of the chi-square test, a side of the surface
+    grazing          whether views go to 89.9 degrees
     places           other parameter values that every law is tried at, `gonio.verify.box`
     """
 
@@ -26,6 +30,8 @@ class Effort:
     accuracy: float
     widths: tuple[float, ...] = ()
     places: int = 0
+    cells: tuple[int, int] = histogram.CELLS
+    grazing: bool = True
 
 
 EFFORTS = {
@@ -33,9 +39,10 @@ EFFORTS = {
     "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0), 18),
     "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0), 60),
 }
-# at each of the other places
+# At each of the other places. Not to the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower than the steps
+# between float32 directions.
 ELSEWHERE = {
-    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3),
-    "default": Effort("default", 1 << 12, 16, 5, 1 << 14, 3e-4),
-    "deep": Effort("deep", 1 << 14, 18, 9, 1 << 16, 1e-4),
+    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), grazing=False),
+    "default": Effort("default", 1 << 12, 16, 4, 1 << 14, 3e-4, cells=(30, 60), grazing=False),
+    "deep": Effort("deep", 1 << 14, 18, 8, 1 << 16, 1e-4, cells=(50, 100), grazing=False),
 }

@@ -25,9 +25,9 @@ from ..render.sampler import mix, unit
 from . import directions, statistics
 from .subject import Subject, guarded
 
-ROWS, COLUMNS = 100, 200  # a side of the surface: 20 000 cells
+CELLS = (100, 200)  # rows and columns a side of the surface
 COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
-PILOT = 1 << 15
+PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
 LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
 Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
@@ -40,8 +40,8 @@ class Grid(NamedTuple):
 
     wo     (N, 3)
     sides  which sides of the surface have cells
-    rows   edges of 1 - |z|, (N, sides, ROWS + 1), float32
-    columns  edges of the pseudo-angle, (N, sides, ROWS, COLUMNS + 1), float32
+    rows   edges of 1 - |z|, (N, sides, rows + 1), float32
+    columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
     """
 
     wo: np.ndarray
@@ -49,16 +49,22 @@ class Grid(NamedTuple):
     rows: np.ndarray
     columns: np.ndarray
 
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(N, sides, rows, columns)."""
+        n, sides, rows, edges = self.columns.shape
+        return n, sides, rows, edges - 1
+
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, ROWS, COLUMNS), and the integral of the pdf over all (N,)."""
+    """Probability of each cell (N, sides, rows, columns), and the integral of the pdf over all (N,)."""
 
     cells: np.ndarray
     total: np.ndarray
 
 
 class Counts(NamedTuple):
-    """Samples in each cell (N, sides, ROWS, COLUMNS), all others (N,), and how many were drawn for each wo."""
+    """Samples in each cell (N, sides, rows, columns), all others (N,), and how many were drawn for each wo."""
 
     cells: np.ndarray
     others: np.ndarray
@@ -76,34 +82,38 @@ class Outcome(NamedTuple):
 # --------------------------------------------------------------------------- the cells
 
 
-def place(subject: Subject, wo: np.ndarray, seed: int) -> Grid | None:
+def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
     """Cells where the pilot's samples are; None where there is no sample with a density."""
     rng = np.random.default_rng([seed, 11])
-    many = np.repeat(wo, PILOT, axis=0)
+    pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
+    many = np.repeat(wo, pilot, axis=0)
     drawn = subject.sample(many, directions.numbers(rng, len(many)), precision="float32")
     good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
     if not good.any():
         return None
-    rows = zip(drawn.wi.reshape(len(wo), PILOT, 3), good.reshape(len(wo), PILOT), strict=True)
-    return place_around([wi[kept] for wi, kept in rows], wo, lambda o, i: subject.pdf(o, i, "float32"))
+    rows = zip(drawn.wi.reshape(len(wo), pilot, 3), good.reshape(len(wo), pilot), strict=True)
+    return place_around([wi[kept] for wi, kept in rows], wo, lambda o, i: subject.pdf(o, i, "float32"), cells)
 
 
-def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density) -> Grid:
+def place_around(
+    pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS
+) -> Grid:
     """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf claims some."""
     sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
-    rows = np.empty((len(wo), len(sides), ROWS + 1), np.float32)
-    columns = np.empty((len(wo), len(sides), ROWS, COLUMNS + 1), np.float32)
+    many_rows, many_columns = cells
+    rows = np.empty((len(wo), len(sides), many_rows + 1), np.float32)
+    columns = np.empty((len(wo), len(sides), many_rows, many_columns + 1), np.float32)
     for i, wi in enumerate(pilot):
         for j, side in enumerate(sides):
             mine = wi[side * wi[:, 2] > 0.0]
             height, turn = _height(mine), _turn(mine)
             order = np.argsort(height)
             height, turn = height[order], turn[order]
-            rows[i, j] = _edges(height, 0.0, 1.0, ROWS)
+            rows[i, j] = _edges(height, 0.0, 1.0, many_rows)
             for r, (a, b) in enumerate(zip(rows[i, j][:-1], rows[i, j][1:], strict=True)):
                 first, last = np.searchsorted(height, [a, b])
                 more = max(300 - (last - first), 0) // 2  # neighbours say where a row with few samples has its own
-                columns[i, j, r] = _edges(turn[max(first - more, 0) : last + more], 0.0, 4.0, COLUMNS)
+                columns[i, j, r] = _edges(turn[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
     return Grid(wo, sides, rows, columns)
 
 
@@ -136,19 +146,24 @@ def _azimuth(turn: np.ndarray) -> np.ndarray:
 def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
     """count + 1 edges over [low, high]: half at quantiles, a quarter evenly, a quarter at growing distances."""
     inside = values[(values > low) & (values < high)]
-    if len(inside) < 20:
+    if not len(inside):
         return np.linspace(low, high, count + 1).astype(np.float32)
     even, far = count // 4, count // 4
     own = np.quantile(inside, np.linspace(0.0, 1.0, count + 1 - even - far))
     first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
-    steps = np.geomspace(1.0, 1e4, far // 2)
-    tails = [middle + max(last - middle, 1e-7) * steps, middle - max(middle - first, 1e-7) * steps]
+    tails = [middle + sign * _growing(reach, high - low, far // 2) for sign, reach in ((1, last - middle), (-1, middle - first))]
     spread = np.concatenate([own, np.linspace(low, high, even + 2)[1:-1], *tails])
     edges = np.sort(np.clip(spread, low, high))
     # clipped tails leave several edges at an end: cells of no width, which count nothing and expect nothing
     edges = np.concatenate([[low], edges, np.full(max(count - len(edges), 0), high)])[: count + 1]
     edges[-1] = high
     return edges.astype(np.float32)
+
+
+def _growing(first: float, last: float, count: int) -> np.ndarray:
+    """Distances in equal ratios, by 1e4 at least: a lobe of width 1e-4 has its tail a million of its heights away."""
+    first = max(first, 1e-10)
+    return np.geomspace(first, max(last, 1e4 * first), count)
 
 
 # --------------------------------------------------------------------------- what the pdf expects
@@ -159,12 +174,12 @@ def expect(pdf: Density, grid: Grid, tolerance: float) -> Expectation:
 
     tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
     """
-    n, sides = len(grid.wo), len(grid.sides)
-    a = np.repeat(grid.rows[..., :-1].astype(float)[..., None], COLUMNS, axis=-1).ravel()
-    b = np.repeat(grid.rows[..., 1:].astype(float)[..., None], COLUMNS, axis=-1).ravel()
+    shape = grid.shape
+    a = np.repeat(grid.rows[..., :-1].astype(float)[..., None], shape[3], axis=-1).ravel()
+    b = np.repeat(grid.rows[..., 1:].astype(float)[..., None], shape[3], axis=-1).ravel()
     azimuth = _azimuth(grid.columns.astype(float))
     c, d = azimuth[..., :-1].ravel(), azimuth[..., 1:].ravel()
-    row, side, _, _ = np.unravel_index(np.arange(len(a)), (n, sides, ROWS, COLUMNS))
+    row, side, _, _ = np.unravel_index(np.arange(len(a)), shape)
     side = np.array(grid.sides)[side]
     cells = np.zeros(len(a))
     owner = np.flatnonzero((b > a) & (d > c))
@@ -186,7 +201,7 @@ def expect(pdf: Density, grid: Grid, tolerance: float) -> Expectation:
         lo_a, hi_a, lo_c, hi_c = box.T
         parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
         box = np.stack([np.stack(p, -1) for p in parts], 1).reshape(-1, 4)
-    shaped = cells.reshape(n, sides, ROWS, COLUMNS)
+    shaped = cells.reshape(shape)
     return Expectation(shaped, shaped.sum((1, 2, 3)))
 
 
@@ -277,7 +292,7 @@ def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> C
     dr = backend.drjit()
     kind = backend.types("float32")
     UInt = kind.module.UInt32
-    n, sides = len(grid.wo), len(grid.sides)
+    n, sides, rows, columns = grid.shape
     reach = dr.abs(wi.x) + dr.abs(wi.y)
     turn = wi.y / dr.select(reach > 0.0, reach, 1.0)
     turn = dr.select(wi.x < 0.0, 2.0 - turn, dr.select(wi.y < 0.0, 4.0 + turn, turn))
@@ -290,13 +305,13 @@ def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> C
         group = which
         inside = above if grid.sides[0] > 0 else wi.z < 0.0
     row_edges, column_edges = (kind.float(np.ascontiguousarray(e.ravel())) for e in (grid.rows, grid.columns))
-    row = _find(kind, row_edges, group * (ROWS + 1), ROWS, height)
-    line = group * ROWS + row
-    column = _find(kind, column_edges, line * (COLUMNS + 1), COLUMNS, turn)
-    counts = dr.zeros(UInt, n * sides * ROWS * COLUMNS)
-    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), line * COLUMNS + column, inside & valid)
+    row = _find(kind, row_edges, group * (rows + 1), rows, height)
+    line = group * rows + row
+    column = _find(kind, column_edges, line * (columns + 1), columns, turn)
+    counts = dr.zeros(UInt, n * sides * rows * columns)
+    dr.scatter_reduce(dr.ReduceOp.Add, counts, UInt(1), line * columns + column, inside & valid)
     dr.eval(counts)
-    cells = counts.numpy().astype(np.int64).reshape(n, sides, ROWS, COLUMNS)
+    cells = counts.numpy().astype(np.int64).reshape(grid.shape)
     return Counts(cells, drawn - cells.sum((1, 2, 3)), drawn)
 
 
@@ -321,8 +336,8 @@ def compare(expected: Expectation, counts: Counts, row: int) -> Outcome:
     """p-values of one wo."""
     n = counts.drawn
     e, o = expected.cells[row] * n, counts.cells[row]
-    sides = e.shape[0]
-    coarse = (sides, ROWS // COARSE[0], COARSE[0], COLUMNS // COARSE[1], COARSE[1])
+    sides, rows, columns = e.shape
+    coarse = (sides, rows // COARSE[0], COARSE[0], columns // COARSE[1], COARSE[1])
     fine = _pearson(e.ravel(), o.ravel(), n)
     broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
     return Outcome(fine, broad, _others(float(expected.total[row]), int(counts.others[row]), n))

@@ -17,8 +17,8 @@ from ...optics.special import gauss
 
 ORDER = 4  # nodes a side: exact for polynomials of degree 7, and cheap enough to divide further instead
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
-DEPTH = 16  # a sixteenth of a right angle, halved 12 times more, is 2e-5: below the narrowest width that is no mirror
-SEEDED = 11  # halvings around samples
+DEPTH = 22  # halvings of a quarter of a right angle, 4e-7: a width of 2e-4 is that narrow across at 89.9 degrees
+SEEDED = 18  # halvings around samples
 LARGEST = 600_000  # cells evaluated in one round, some 10 M directions
 
 _X, _W = gauss(ORDER)

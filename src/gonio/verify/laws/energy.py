@@ -97,7 +97,7 @@ class Energy(Law):
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
     """Equal steps in the cosine, and grazing ones, from each side that answers."""
     mu = (np.arange(effort.furnace) + 0.5) / effort.furnace
-    theta = np.concatenate([np.degrees(np.arccos(mu)), GRAZING])
+    theta = np.concatenate([np.degrees(np.arccos(mu)), GRAZING if effort.grazing else ()])
     found = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
     return directions.single(np.concatenate(found))
 

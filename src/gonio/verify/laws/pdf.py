@@ -114,11 +114,12 @@ class _Tested(NamedTuple):
 
 def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[_Tested]:
     if wo is None:
-        grid_of = [*(ABOVE if 1 in subject.sides else ()), *(BELOW if -1 in subject.sides else ())]
+        above, below = (ABOVE, BELOW) if effort.grazing else (ABOVE[:6:2], BELOW[1:4])
+        grid_of = [*(above if 1 in subject.sides else ()), *(below if -1 in subject.sides else ())]
         wo = directions.single(np.array([directions.at(*angles) for angles in grid_of]).reshape(-1, 3))
     if not len(wo):
         return []
-    grid = histogram.place(subject, wo, seed)
+    grid = histogram.place(subject, wo, seed, effort.cells)
     if grid is None:
         return []
     expected = histogram.expect(subject.pdf, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
