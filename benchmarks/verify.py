@@ -118,7 +118,7 @@ def uniform(seeds: int) -> None:
     found: dict[str, list[float]] = {"fine": [], "coarse": [], "others": []}
     for seed in range(seeds):
         grid = histogram.place(one, wo, seed)
-        expected = histogram.expect(one.pdf, grid, 0.1 * 2.0**-9)
+        expected = histogram.expect(one, grid, 0.1 * 2.0**-9)
         counts = histogram.count(one, grid, 18, seed)
         for row in range(len(wo)):
             for kind, p in histogram.compare(expected, counts, row)._asdict().items():

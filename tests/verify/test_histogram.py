@@ -15,7 +15,7 @@ def outcomes(model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO) -
     one = subject.of(model)
     grid = histogram.place(one, wo, seed)
     assert grid is not None
-    expected = histogram.expect(one.pdf, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
+    expected = histogram.expect(one, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
     counts = histogram.count(one, grid, log_samples, seed)
     assert np.all(counts.cells.sum((1, 2, 3)) + counts.others == counts.drawn)
     return [histogram.compare(expected, counts, row) for row in range(len(wo))]

@@ -9,18 +9,19 @@ cancellation near the pole. Sampling, binning and counting are one kernel, in wh
 What fails, is a delta sample, or lands where no cell is, is counted too: its expectation is 1 - int pdf.
 
     grid = place(subject, wo, seed)
-    outcome = compare(expect(subject.pdf, grid, tolerance), count(subject, grid, log_samples, seed), row)
+    outcome = compare(expect(subject, grid, tolerance), count(subject, grid, log_samples, seed), row)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
 from ..ops import backend
 from ..ops.backend import Array, Types
+from ..optics.special import gauss
 from ..render.sampler import mix, unit
 from . import directions, statistics
 from .subject import Subject, guarded
@@ -28,11 +29,10 @@ from .subject import Subject, guarded
 CELLS = (100, 200)  # rows and columns a side of the surface
 COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
 PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
+DEPTH = 9  # divisions of a cell; a step such as total reflection's divides those that it runs through to the last
 LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
 Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
-
-_NODES = {n: np.polynomial.legendre.leggauss(n) for n in (2, 3, 4)}
 
 
 class Grid(NamedTuple):
@@ -57,10 +57,12 @@ class Grid(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, rows, columns), and the integral of the pdf over all (N,)."""
+    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and how far that may
+    be off where cells were still to be divided."""
 
     cells: np.ndarray
     total: np.ndarray
+    error: np.ndarray
 
 
 class Counts(NamedTuple):
@@ -149,7 +151,7 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
     if not len(inside):
         return np.linspace(low, high, count + 1).astype(np.float32)
     even, far = count // 4, count // 4
-    own = np.quantile(inside, np.linspace(0.0, 1.0, count + 1 - even - far))
+    own = np.sort(inside)[np.linspace(0, len(inside) - 1, count + 1 - even - far).astype(int)]
     first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
     tails = [middle + sign * _growing(reach, high - low, far // 2) for sign, reach in ((1, last - middle), (-1, middle - first))]
     spread = np.concatenate([own, np.linspace(low, high, even + 2)[1:-1], *tails])
@@ -163,18 +165,20 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
 def _growing(first: float, last: float, count: int) -> np.ndarray:
     """Distances in equal ratios, by 1e4 at least: a lobe of width 1e-4 has its tail a million of its heights away."""
     first = max(first, 1e-10)
-    return np.geomspace(first, max(last, 1e4 * first), count)
+    return first * max(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1))
 
 
 # --------------------------------------------------------------------------- what the pdf expects
 
 
-def expect(pdf: Density, grid: Grid, tolerance: float) -> Expectation:
+def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     """The pdf's integral over every cell; cells whose value is off by more than their noise allows are divided.
 
+    pdf        of a subject, or a function of rows
     tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
     """
     shape = grid.shape
+    look: _Look = _InKernel(pdf, grid.wo) if isinstance(pdf, Subject) else _ByRows(pdf, grid.wo)
     a = np.repeat(grid.rows[..., :-1].astype(float)[..., None], shape[3], axis=-1).ravel()
     b = np.repeat(grid.rows[..., 1:].astype(float)[..., None], shape[3], axis=-1).ravel()
     azimuth = _azimuth(grid.columns.astype(float))
@@ -184,82 +188,153 @@ def expect(pdf: Density, grid: Grid, tolerance: float) -> Expectation:
     cells = np.zeros(len(a))
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
-    for depth in range(9):
-        place = pdf, grid.wo[row[owner]], side[owner], box
-        (two, *_), (three, *_), (four, low, high) = (_gauss(*place, order) for order in (2, 3, 4))
+    unsettled = np.zeros(len(grid.wo))
+    for depth in range(DEPTH):
+        place = row[owner], side[owner], box
+        (two, _, _), (three, _, _), (four, low, high) = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
         # the error of four nodes is far below the difference from two: for smooth cells its square, over the value.
         # Where a step runs through the middle, two and four agree by chance, and three does not.
         off = np.maximum(0.3 * np.abs(four - two), np.abs(four - three))
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
-        divide = (off > allowed) | _has_a_step_aside(*place, low, high, allowed)
-        divide &= depth < 8
+        divide = (off > allowed) | _has_a_step_aside(look(*place, *_RIM), box, low, high, allowed)
+        divide &= depth < DEPTH - 1
+        np.add.at(unsettled, row[owner[~divide]], np.abs(four - three)[~divide])
         np.add.at(cells, owner[~divide], four[~divide])
         if not divide.any():
             break
         box, owner = box[divide], np.repeat(owner[divide], 4)
-        m, q = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
         lo_a, hi_a, lo_c, hi_c = box.T
+        # a narrow lobe's heights span decades: those are halved in ratio
+        m = np.where(hi_a > 4.0 * lo_a, np.maximum(np.sqrt(lo_a * hi_a), hi_a / 64.0), 0.5 * (lo_a + hi_a))
+        q = 0.5 * (lo_c + hi_c)
         parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
         box = np.stack([np.stack(p, -1) for p in parts], 1).reshape(-1, 4)
     shaped = cells.reshape(shape)
-    return Expectation(shaped, shaped.sum((1, 2, 3)))
+    return Expectation(shaped, shaped.sum((1, 2, 3)), unsettled)
 
 
-# just inside a cell's corners and the middles of its sides, as shares of its width
+class _Nodes(NamedTuple):
+    """Places (s, t) in [0, 1]^2 of a cell, and their weights, (K,) each."""
+
+    s: np.ndarray
+    t: np.ndarray
+    weight: np.ndarray
+
+
+def _gauss(order: int) -> _Nodes:
+    x, w = gauss(order)
+    s, t = np.meshgrid(x, x, indexing="ij")
+    return _Nodes(s.ravel(), t.ravel(), np.outer(w, w).ravel())
+
+
+_GAUSS = {order: _gauss(order) for order in (2, 3, 4)}
 _OUTSIDE = 0.07  # the share of a cell's width beyond the first of four nodes
-_RIM = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.9999) if (a, b) != (0.5, 0.5)])
+# just inside a cell's corners and the middles of its sides, as shares of its width
+_NEAR = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.9999) if (a, b) != (0.5, 0.5)])
+_RIM = _Nodes(_NEAR[:, 0], _NEAR[:, 1], np.zeros(len(_NEAR)))
 
 
-def _has_a_step_aside(
-    pdf: Density,
-    wo: np.ndarray,
-    side: np.ndarray,
-    box: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    allowed: np.ndarray,
-) -> np.ndarray:
+def _has_a_step_aside(rim: Seen, box: np.ndarray, low: np.ndarray, high: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """Whether the pdf on the rim of cells is quite another than at all their nodes, whose values span [low, high].
 
     Total reflection and the horizon end a density with a step; what lies between a cell's rim and its nodes would be
     lost, or taken for lit. A dark cell is divided at any light; others where what may be wrong is not allowed.
     """
-    value = pdf(np.repeat(wo, len(_RIM), axis=0), _directions(side, box, _RIM[:, 0], _RIM[:, 1]))
-    value = value.reshape(len(box), -1)
-    most, least = value.max(1), value.min(1)
     a, b, c, d = box.T
     strip = _OUTSIDE * (b - a) * (d - c)
-    above, below = most > 4.0 * high, 4.0 * least < low
-    matters = (above & (strip * (most - high) > allowed)) | (below & (strip * (low - least) > allowed))
-    return np.where(high <= 0.0, most > 0.0, matters)
+    above, below = rim.most > 4.0 * high, 4.0 * rim.least < low
+    matters = (above & (strip * (rim.most - high) > allowed)) | (below & (strip * (low - rim.least) > allowed))
+    return np.where(high <= 0.0, rim.most > 0.0, matters)
 
 
-def _directions(side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Unit vectors at places (s, t) in [0, 1]^2 of each box [a, b] x [c, d] of (1 - |z|, azimuth), row by row."""
-    a, b, c, d = box.T[..., None]
-    height, phi = a + (b - a) * s, c + (d - c) * t
-    r = np.sqrt(height * (2.0 - height))
-    return np.stack([r * np.cos(phi), r * np.sin(phi), (1.0 - height) * side[:, None]], -1).reshape(-1, 3)
+class Seen(NamedTuple):
+    """Of each box: its integral by the nodes' weights, and the least and the most pdf at them."""
+
+    integral: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
 
 
-def _gauss(
-    pdf: Density, wo: np.ndarray, side: np.ndarray, box: np.ndarray, order: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """int pdf over boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere; least and most pdf."""
-    x, w = _NODES[order]
-    x, w = 0.5 * (x + 1.0), 0.5 * w
-    s, t = np.meshgrid(x, x, indexing="ij")
-    weights = np.outer(w, w).ravel()
-    result, low, high = (np.empty(len(box)) for _ in range(3))
-    chunk = (1 << 22) // order**2
-    for start in range(0, len(box), chunk):
-        part = slice(start, start + chunk)
-        wi = _directions(side[part], box[part], s.ravel(), t.ravel())
-        value = pdf(np.repeat(wo[part], order**2, axis=0), wi).reshape(-1, order**2)
-        a, b, c, d = box[part].T
-        result[part] = value @ weights * (b - a) * (d - c)
-        low[part], high[part] = value.min(1), value.max(1)
-    return result, low, high
+class _Look(Protocol):
+    """The pdf at nodes of boxes [a, b] x [c, d] of (1 - |z|, azimuth), which are areas on the sphere."""
+
+    def __call__(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen: ...
+
+
+CHUNK = 1 << 22  # directions at a time
+
+
+class _ByRows:
+    """Of a function of rows (wo, wi)."""
+
+    def __init__(self, pdf: Density, wo: np.ndarray) -> None:
+        self.pdf, self.wo = pdf, wo
+
+    def __call__(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen:
+        values = np.empty((len(box), len(s)))
+        for start in range(0, len(box), CHUNK // len(s)):
+            part = slice(start, start + CHUNK // len(s))
+            a, b, c, d = box[part].T[..., None]
+            height, phi = a + (b - a) * s, c + (d - c) * t
+            r = np.sqrt(height * (2.0 - height))
+            wi = np.stack([r * np.cos(phi), r * np.sin(phi), (1.0 - height) * side[part, None]], -1).reshape(-1, 3)
+            values[part] = self.pdf(np.repeat(self.wo[row[part]], len(s), axis=0), wi).reshape(-1, len(s))
+        a, b, c, d = box.T
+        return Seen(values @ weight * (b - a) * (d - c), values.min(1), values.max(1))
+
+
+class _InKernel:
+    """Of a subject, its directions made in the kernel that asks it."""
+
+    def __init__(self, subject: Subject, wo: np.ndarray) -> None:
+        self.subject = subject
+        self.precision = subject.best
+        self.model = subject.bound(self.precision)
+        self.wo = wo
+
+    def __call__(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen:
+        parts = [
+            self._part(row[i : i + n], side[i : i + n], box[i : i + n], s, t, weight)
+            for n in [CHUNK // len(s)]
+            for i in range(0, len(box), n)
+        ]
+        if not parts:
+            return Seen(*np.empty((3, 0)))
+        return Seen(*[np.concatenate(column) for column in zip(*parts, strict=True)])
+
+    def _part(
+        self, row: np.ndarray, side: np.ndarray, box: np.ndarray, s: np.ndarray, t: np.ndarray, weight: np.ndarray
+    ) -> Seen:
+        dr = backend.drjit()
+        exact, own = backend.types("float64"), backend.types(self.precision)
+        UInt = exact.module.UInt32
+        index = dr.arange(UInt, len(box) * len(s))
+        cell, node = index // len(s), index % len(s)
+
+        def of_cell(column: np.ndarray) -> Array:
+            return dr.gather(exact.float, backend.float_of(column, exact), cell)
+
+        def of_node(column: np.ndarray) -> Array:
+            return dr.gather(exact.float, backend.float_of(column, exact), node)
+
+        a, b, c, d = (of_cell(column) for column in box.T)
+        height, phi = a + (b - a) * of_node(s), c + (d - c) * of_node(t)
+        r = dr.sqrt(height * (2.0 - height))
+        sin, cos = dr.sincos(phi)
+        wi = own.vec3(r * cos, r * sin, (1.0 - height) * of_cell(side))
+        wo = own.vec3(*[of_cell(column) for column in self.wo[row].T])
+        pdf = guarded(self.subject.model, "pdf", lambda: self.model.pdf(wo, wi))
+        value = exact.float(pdf) + dr.zeros(exact.float, len(index))
+        integral = dr.block_sum(value * of_node(weight) * (b - a) * (d - c), len(s))
+        least, most = (dr.block_reduce(op, value, len(s)) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max))
+        dr.eval(integral, least, most)
+        return Seen(integral.numpy(), least.numpy(), most.numpy())
 
 
 # --------------------------------------------------------------------------- what the samples say
@@ -340,7 +415,7 @@ def compare(expected: Expectation, counts: Counts, row: int) -> Outcome:
     coarse = (sides, rows // COARSE[0], COARSE[0], columns // COARSE[1], COARSE[1])
     fine = _pearson(e.ravel(), o.ravel(), n)
     broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
-    return Outcome(fine, broad, _others(float(expected.total[row]), int(counts.others[row]), n))
+    return Outcome(fine, broad, _others(float(expected.total[row]), float(expected.error[row]), int(counts.others[row]), n))
 
 
 def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
@@ -369,12 +444,13 @@ def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
 QUADRATURE = 3e-5  # what float32 pdfs summed over thousands of cells may be off by
 
 
-def _others(total: float, others: int, drawn: int) -> float:
+def _others(total: float, error: float, others: int, drawn: int) -> float:
     """p-value of how many samples lie in no cell, expected 1 - int pdf.
 
-    The integral is known to `QUADRATURE` only: the expectation nearest to what was seen within that counts.
+    The integral is known to `QUADRATURE` and its own error: the expectation nearest to what was seen within that counts.
     """
-    share = float(np.clip(others / drawn, 1.0 - total - QUADRATURE, 1.0 - total + QUADRATURE))
+    known = QUADRATURE + error
+    share = float(np.clip(others / drawn, 1.0 - total - known, 1.0 - total + known))
     if share <= 0.0:
         return 1.0 if others == 0 else 0.0
     return statistics.binomial_two_sided(others, drawn, min(share, 1.0))

@@ -13,6 +13,7 @@ import functools
 import inspect
 import shlex
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 from ..errors import GonioError, InputError
 from ..models import BSDF, Breach, Parameter, Sample, notation, tree
 from ..models.sample import SampleArrays
-from ..ops import Precision, backend
+from ..ops import Direction, Mode, Precision, Spectrum, backend
 from . import directions
 
 
@@ -168,6 +169,18 @@ class Subject:
         if isinstance(self.model, BSDF):
             return self.model.bind(backend.types(precision))
         return self.model
+
+    def power(self) -> Callable[[Direction, Direction], Spectrum]:
+        """`eval` of power (mode "importance") as a function of Dr.Jit vectors of 64 bits, in the best precision."""
+        own, exact = backend.types(self.best), backend.types("float64")
+        model = self.bound(self.best)
+        mode: Mode = "importance" if self.transmits else "radiance"  # one and the same, and one kernel is enough
+
+        def eval(wo: Direction, wi: Direction) -> Spectrum:
+            value = guarded(self.model, "eval", lambda: model.eval(own.vec3(wo), own.vec3(wi), mode))
+            return exact.vec3(value)
+
+        return eval
 
     def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:
         if not (self.transmits or method == "sample" or "mode" not in more):

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from ...ops import Direction, Scalar, Spectrum, backend
 from ...optics.special import gauss
 
 ORDER = 4  # nodes a side: exact for polynomials of degree 7, and cheap enough to divide further instead
@@ -23,7 +24,7 @@ LARGEST = 600_000  # cells evaluated in one round, some 10 M directions
 
 _X, _W = gauss(ORDER)
 
-Integrand: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Integrand: TypeAlias = Callable[[Direction, Direction], Spectrum]  # of Dr.Jit vectors of 64 bits
 # (wo, u) of rows (N, 3) -> a Sample of arrays: where cells are divided first
 Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
 
@@ -60,7 +61,7 @@ def integrate(
     """int integrand(wo, wi) dwi for each row of wo (N, 3).
 
     sample     the model's own sampling, which shows where its lobes are
-    integrand  (rows, 3), (rows, 3) -> (rows, channels), float64
+    integrand  (wo, wi) -> a vector of one entry a channel, of Dr.Jit vectors of 64 bits; it runs inside a kernel
     tolerance  absolute, of each integral; where cells run out the stated error is larger
     """
     cells = _seeded(sample, wo, seed)
@@ -129,18 +130,30 @@ def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: 
 
 def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells) -> np.ndarray:
     """The integral over each cell by ORDER x ORDER nodes, (cells, channels)."""
-    parts = []
-    chunk = max(1, (1 << 22) // ORDER**2)
+    dr = backend.drjit()
+    types = backend.types("float64")
     a, b = np.meshgrid(_X, _X, indexing="ij")
-    weights = np.outer(_W, _W).ravel()
-    nodes = np.stack([a.ravel(), b.ravel()], -1)
+    nodes = [backend.float_of(column.ravel(), types) for column in (a, b, np.outer(_W, _W))]
+    many = ORDER**2
+    parts = []
+    chunk = (1 << 22) // many
     for start in range(0, len(cells.row), chunk):
         part = cells.take(np.arange(start, min(start + chunk, len(cells.row))))
-        at = part.low[:, None, :] + part.size[:, None, :] * nodes
-        theta, phi = at[..., 0], at[..., 1]
-        sin = np.sin(theta)
-        wi = np.stack([sin * np.cos(phi), sin * np.sin(phi), np.cos(theta) * part.side[:, None]], -1).reshape(-1, 3)
-        value = integrand(np.repeat(wo[part.row], ORDER**2, axis=0), wi)
-        value = value.reshape(len(part.row), ORDER**2, -1) * sin[..., None]
-        parts.append(np.einsum("cnk,n->ck", value, weights) * np.prod(part.size, -1)[:, None])
+        index = dr.arange(types.module.UInt32, len(part.row) * many)
+        cell = index // many
+
+        def of_cell(column: np.ndarray, cell: Scalar = cell) -> Scalar:
+            return dr.gather(types.float, backend.float_of(column, types), cell)
+
+        s, t, weight = (dr.gather(types.float, column, index % many) for column in nodes)
+        width, height = of_cell(part.size[:, 0]), of_cell(part.size[:, 1])
+        (sin, cos), (sin_phi, cos_phi) = (
+            dr.sincos(of_cell(part.low[:, k]) + step * share) for k, step, share in ((0, width, s), (1, height, t))
+        )
+        wi = types.vec3(sin * cos_phi, sin * sin_phi, cos * of_cell(part.side))
+        value = integrand(types.vec3(*[of_cell(column) for column in wo[part.row].T]), wi)
+        area = weight * sin * width * height
+        sums = [dr.block_sum(channel * area, many) for channel in value]
+        dr.eval(sums)
+        parts.append(np.stack([one.numpy() for one in sums], -1))
     return np.concatenate(parts)

@@ -23,7 +23,7 @@ from ...errors import InputError, did_you_mean
 from ...models import BSDF, tree
 from ...models.microfacet import SMOOTH
 from ...models.parameters import pair_of
-from ...ops import backend
+from ...ops import Direction, Spectrum, backend
 from . import cubature, quadrature
 
 METHODS = ("auto", "closed-form", "quadrature", "sampling")
@@ -169,8 +169,10 @@ TOLERANCE = 1e-6
 
 
 def _by_cubature(model: BSDF, mu: np.ndarray, phi: np.ndarray, seed: int) -> Albedo:
-    def power(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-        return model.eval(wo, wi, mode="importance", precision="float64")
+    bound = model.bind(backend.types("float64"))
+
+    def power(wo: Direction, wi: Direction) -> Spectrum:
+        return bound.eval(wo, wi, "importance")
 
     found = cubature.integrate(model.sample, power, direction(mu, phi), TOLERANCE, seed)
     return Albedo(found.value, found.error, "quadrature")

@@ -109,9 +109,7 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
         return _uniformly(subject, wo, effort.furnace_samples, seed)
-    integral = cubature.integrate(
-        subject.sample, lambda o, i: subject.eval(o, i, "importance"), wo, effort.accuracy, seed
-    )
+    integral = cubature.integrate(subject.sample, subject.power(), wo, effort.accuracy, seed)
     return integral.value + ideal, integral.error + effort.accuracy
 
 

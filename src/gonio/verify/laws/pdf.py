@@ -122,7 +122,7 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
     grid = histogram.place(subject, wo, seed, effort.cells)
     if grid is None:
         return []
-    expected = histogram.expect(subject.pdf, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
+    expected = histogram.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
     counts = histogram.count(subject, grid, effort.log_samples, seed)
     tested = []
     for i in range(len(wo)):
