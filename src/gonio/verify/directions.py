@@ -63,3 +63,9 @@ def numbers(rng: np.random.Generator, count: int) -> np.ndarray:
 def single(w: np.ndarray) -> np.ndarray:
     """The directions as float32 holds them, in float64: both precisions then see the same input."""
     return w.astype(np.float32).astype(np.float64)
+
+
+def turned(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Directions (N, 3) turned about the normal by angles (N,), radians."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], -1)

@@ -97,9 +97,7 @@ def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = 
     return place_around([wi[kept] for wi, kept in rows], wo, lambda o, i: subject.pdf(o, i, "float32"), cells)
 
 
-def place_around(
-    pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS
-) -> Grid:
+def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
     """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf claims some."""
     sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
     many_rows, many_columns = cells
@@ -153,7 +151,10 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
     even, far = count // 4, count // 4
     own = np.sort(inside)[np.linspace(0, len(inside) - 1, count + 1 - even - far).astype(int)]
     first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
-    tails = [middle + sign * _growing(reach, high - low, far // 2) for sign, reach in ((1, last - middle), (-1, middle - first))]
+    tails = [
+        middle + sign * _growing(reach, high - low, far // 2)
+        for sign, reach in ((1, last - middle), (-1, middle - first))
+    ]
     spread = np.concatenate([own, np.linspace(low, high, even + 2)[1:-1], *tails])
     edges = np.sort(np.clip(spread, low, high))
     # clipped tails leave several edges at an end: cells of no width, which count nothing and expect nothing
@@ -415,7 +416,9 @@ def compare(expected: Expectation, counts: Counts, row: int) -> Outcome:
     coarse = (sides, rows // COARSE[0], COARSE[0], columns // COARSE[1], COARSE[1])
     fine = _pearson(e.ravel(), o.ravel(), n)
     broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
-    return Outcome(fine, broad, _others(float(expected.total[row]), float(expected.error[row]), int(counts.others[row]), n))
+    return Outcome(
+        fine, broad, _others(float(expected.total[row]), float(expected.error[row]), int(counts.others[row]), n)
+    )
 
 
 def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:

@@ -6,10 +6,11 @@ import numpy as np
 
 from ...energy.albedo import cubature
 from ...errors import InputError
-from .. import directions, statistics
+from ...ops import Mode, backend
+from .. import directions, histogram, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
-from ..subject import Subject
+from ..subject import Subject, guarded
 from ..verdict import Finding, Trial
 from .base import Law
 
@@ -141,16 +142,28 @@ def _uniformly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple
 
 def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean weight of power, its standard error, and the largest single contribution, (N, channels) each."""
+    dr = backend.drjit()
+    single, exact = backend.types("float32"), backend.types("float64")
+    model = subject.bound()
+    mode: Mode = "importance" if subject.transmits else "radiance"
     means, errors, largest = [], [], []
-    rows = max(1, (1 << 21) // count)
+    rows = max(1, (1 << 22) // count)
     for start in range(0, len(wo), rows):
         part = wo[start : start + rows]
-        u = directions.numbers(np.random.default_rng([seed, 51, start]), count * len(part))
-        s = subject.sample(np.repeat(part, count, axis=0), u, "importance", "float32")
-        weight = np.where((s.pdf > 0.0)[:, None], s.weight, 0.0).reshape(len(part), count, -1)
-        means.append(weight.mean(1))
-        errors.append(weight.std(1) / np.sqrt(count))
-        largest.append(weight.max(1) / count)
+        index = dr.arange(single.module.UInt32, len(part) * count)
+        which = index // dr.opaque(single.module.UInt32, count)
+        many = single.vec3(*[dr.gather(single.float, backend.float_of(column, single), which) for column in part.T])
+        u = histogram.random_numbers(single, index, seed + 8191 * start)
+        s = guarded(subject.model, "sample", lambda many=many, u=u: model.sample(many, u, mode))
+        weight = exact.vec3(dr.select(s[2] > 0.0, single.vec3(s[1]), 0.0)) + dr.zeros(exact.float, len(part) * count)
+        sums = [dr.block_sum(channel, count) for channel in weight]
+        squares = [dr.block_sum(dr.square(channel), count) for channel in weight]
+        most = [dr.block_reduce(dr.ReduceOp.Max, channel, count) for channel in weight]
+        dr.eval(sums, squares, most)
+        mean, square, top = (np.stack([one.numpy() for one in column], -1) for column in (sums, squares, most))
+        means.append(mean / count)
+        errors.append(np.sqrt(np.maximum(square / count - (mean / count) ** 2, 0.0) / count))
+        largest.append(top / count)
     return np.concatenate(means), np.concatenate(errors), np.concatenate(largest)
 
 

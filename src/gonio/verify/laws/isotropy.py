@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import directions
 from ..effort import Effort
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
@@ -32,7 +33,7 @@ class Isotropy(Law):
         exact = subject.best == "float64"
         wo, wi = pairs(subject, effort.pairs, seed, exact)
         turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
-        turned = _turned(wo, turn), _turned(wi, turn)
+        turned = directions.turned(wo, turn), directions.turned(wi, turn)
         mirrored = wo * np.array([1.0, -1.0, 1.0]), wi * np.array([1.0, -1.0, 1.0])
         error = np.zeros(len(wo))
         for a, b in (turned, mirrored):
@@ -89,8 +90,3 @@ class Isotropy(Law):
         if (along - across) * (float(pair[0]) - float(pair[1])) < 0.0:
             wider = "x" if along > across else "y"
             finding.problems.append(f"widths {pair[0]:g}, {pair[1]:g}, but wider along {wider}: axes swapped")
-
-
-def _turned(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], -1)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import directions, histogram, statistics
+from .. import directions, histogram
 from ..effort import Effort
 from ..figures import SampleCells
 from ..subject import Subject
@@ -47,7 +47,6 @@ class Pdf(Law):
         lowest, largest = 2.0, ""
         for settings, part in parts:
             name = ", ".join(f"{k} = {v:g}" for k, v in settings.items())
-            _deltas(part, name, finding, seed)
             if not part.has_density:
                 continue
             for tested in _chi_square(part, effort, seed):
@@ -131,36 +130,6 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
         outcome = histogram.compare(expected, counts, i)
         tested.append(_Tested(wo[i], outcome, float(expected.total[i]), cells, grid.sides))
     return tested
-
-
-def _deltas(subject: Subject, name: str, finding: Finding, seed: int) -> None:
-    """Delta samples come as often as their pdf, which is a probability, says: each direction that occurs is a test."""
-    where = [*(ABOVE[::2] if 1 in subject.sides else ()), *(BELOW[1::2] if -1 in subject.sides else ())]
-    count = 1 << 16
-
-    def frequencies(angles: tuple[float, float], seed: int) -> list[tuple[np.ndarray, float]]:
-        wo = np.tile(directions.single(directions.at(*angles)[None]), (count, 1))
-        s = subject.sample(wo, directions.numbers(np.random.default_rng([seed, 21]), count), precision="float32")
-        chosen = s.delta & (s.pdf > 0.0)
-        if not chosen.any():
-            return []
-        keys = np.round(s.wi[chosen], 4)
-        found = []
-        for key in np.unique(keys, axis=0)[:8]:
-            mine = np.all(keys == key, axis=1)
-            probability = float(s.pdf[chosen][mine].mean())
-            found.append((key, statistics.binomial_two_sided(int(mine.sum()), count, min(probability, 1.0))))
-        return found
-
-    for angles in where:
-        for i, (key, p) in enumerate(frequencies(angles, seed)):
-
-            def again(angles: tuple[float, float] = angles, i: int = i) -> float:
-                second = frequencies(angles, seed + 7919)
-                return second[i][1] if i < len(second) else 0.0
-
-            text = f"{name + ': ' if name else ''}delta toward {_angles(key)} from {angles[0]:g} degrees"
-            finding.trials.append(Trial(p, text, again))
 
 
 def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:

@@ -1,0 +1,426 @@
+"""Delta lobes: mirrors and smooth glass are held to Snell, Fresnel and the way back like any other lobe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import BSDF, binding, tree
+from ...ops import backend
+from .. import directions, lobes, statistics
+from ..effort import Effort
+from ..lobes import Lobes
+from ..subject import Subject, guarded
+from ..verdict import DoesNotApply, Finding, Trial
+from .base import Law
+
+EXACT, SINGLE = 1e-6, 2e-3
+SLOPES = 1e-4  # of gradients
+FORWARD = 1e-4  # what carries less than this share need not come back
+FLAT = 1e-3  # how far an index may be from 1 and still bend nothing
+INDICES = {"eta": 1.0, "int_ior": 1.0}  # parameters that name the index below, over that above
+
+
+class Miss(NamedTuple):
+    """One thing that is wrong: how much, in words, and where."""
+
+    size: float
+    text: str
+    wo: np.ndarray
+    wi: np.ndarray
+
+
+class DeltaLobes(Law):
+    """A delta lobe goes where Snell or the mirror says, carries (eta_o / eta_i)^2 in radiance, reflects as Fresnel's
+    equations for its own index say, comes back the same way, and is chosen as often as its pdf says."""
+
+    number = 10
+    name = "delta"
+    title = "delta lobes obey Snell and Fresnel, and come back the way they went"
+    meaning = "What is seen in mirrors and through glass is in the wrong place, too bright or too dark."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        wo = _views(subject, effort, seed)
+        seen = lobes.of(subject, wo, seed)
+        power = lobes.of(subject, wo, seed, "importance") if subject.transmits else seen
+        if not seen.found.any() and not power.found.any():
+            raise DoesNotApply("it has no delta lobe")
+        exact = subject.best == "float64"
+        tolerance = EXACT if exact else SINGLE
+        finding = Finding(
+            figure=0.0,
+            tolerance=tolerance,
+            reason="a few roundings" if exact else "a few roundings of float32",
+            shown=_shown(seen),
+        )
+        checks = [_direction, _indices, _modes, _back, _fresnel, _turned, _tinted]
+        if exact:
+            checks += [_single, _slopes]
+        worst: Miss | None = None
+        for check in checks:
+            wrong = max(check(subject, wo, seen, power, seed), key=lambda one: one.size, default=None)
+            if wrong is None or not wrong.size > tolerance:
+                continue
+            pair = f"wo at {_angles(wrong.wo)}, wi at {_angles(wrong.wi)} degrees"
+            finding.problems.append(f"{wrong.text} ({pair})")
+            if worst is None or wrong.size > worst.size:
+                worst = wrong
+        if worst is not None:
+            finding.figure = worst.size
+            finding.shown = f"off by {worst.size:.2g}" if np.isfinite(worst.size) else "not found again"
+            finding.worst = f"wo at {_angles(worst.wo)}, wi at {_angles(worst.wi)} degrees"
+        finding.trials += _frequencies(subject, effort, seed)
+        return finding
+
+
+def _shown(seen: Lobes) -> str:
+    most = int(seen.found.sum(1).max(initial=0))
+    return "1 lobe" if most == 1 else f"{most} lobes"
+
+
+def _angles(w: np.ndarray) -> str:
+    theta, phi = directions.angles(w)
+    return f"{theta:.4g}, {phi:.4g}"
+
+
+def _views(subject: Subject, effort: Effort, seed: int) -> np.ndarray:
+    """Views from each side that answers, from the normal to 89 degrees."""
+    rng = np.random.default_rng([seed, 91])
+    count = 48 if effort.grazing else 16
+    mu = np.concatenate([[1.0], (np.arange(count) + rng.uniform(size=count)) / count])
+    theta = np.degrees(np.arccos(np.clip(mu, np.cos(np.radians(89.0)), 1.0)))
+    sides = subject.sides or (1, -1)
+    return directions.single(
+        np.concatenate(
+            [directions.at(theta if s > 0 else 180.0 - theta, 360.0 * rng.uniform(size=len(theta))) for s in sides]
+        )
+    )
+
+
+Wrong = Iterator[Miss]
+
+
+def _each(wo: np.ndarray, part: Lobes) -> Iterator[tuple[np.ndarray, int]]:
+    """The views that have an n-th lobe, and n."""
+    for n in range(part.found.shape[1]):
+        rows = np.flatnonzero(part.found[:, n])
+        if len(rows):
+            yield rows, n
+
+
+def _direction(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """Unit vectors; refraction by Snell's law with the lobe's own eta. What reflects elsewhere than the mirror, or goes
+    on without bending the light by an index, is judged by the way back alone: gratings and corner cubes do."""
+    for rows, n in _each(wo, seen):
+        o, i, eta = wo[rows], seen.wi[rows, n], seen.eta[rows, n]
+        off = np.abs(np.linalg.norm(i, axis=1) - 1.0)
+        yield _worst(off, "a delta lobe's direction is no unit vector", o, i)
+        through = o[:, 2] * i[:, 2] < 0.0
+        bends = through & (np.abs(eta - 1.0) > FLAT)
+        if bends.any():
+            snell = np.abs(i[:, :2] + o[:, :2] / eta[:, None]).max(1) * bends
+            other = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * bends
+            text = "not refracted by Snell's law with the eta that the sample states"
+            if snell.max() > SINGLE and other.max() < SINGLE:
+                text += ": it is with 1 / eta, the light is bent the wrong way, or eta is that of the other side"
+            yield _worst(snell, text, o, i)
+        flat = through & ~bends
+        if flat.any():
+            sin_o, sin_i = np.hypot(o[:, 0], o[:, 1]), np.hypot(i[:, 0], i[:, 1])
+            usable = flat & (sin_o > 0.1) & (sin_i > 0.1)
+            index = sin_o[usable] / sin_i[usable]
+            if len(index) > 3 and np.ptp(index) < 1e-3 * index.mean() and abs(index.mean() - 1.0) > FLAT:
+                size = np.where(usable, abs(index.mean() - 1.0), 0.0)
+                yield _worst(size, f"bends by an index of {index.mean():.4g}, and states eta = 1", o, i)
+        near = ~through & (np.abs(i - o * [-1.0, -1.0, 1.0]).max(1) < 0.1)
+        miss = np.abs(i - o * [-1.0, -1.0, 1.0]).max(1) * near
+        yield _worst(miss, "beside the mirror direction", o, i)
+
+
+def _indices(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """Reflection stays in its medium, eta 1; from below eta is the inverse of that from above; a parameter that names
+    the index means it."""
+    named = _named_index(subject)
+    for rows, n in _each(wo, seen):
+        o, i, eta = wo[rows], seen.wi[rows, n], seen.eta[rows, n]
+        through = o[:, 2] * i[:, 2] < 0.0
+        yield _worst(np.abs(eta - 1.0) * ~through, "a reflection states an eta that is not 1", o, i)
+        above = np.where(o[:, 2] > 0.0, eta, 1.0 / np.where(eta > 0.0, eta, np.nan))[through]
+        if not len(above):
+            continue
+        if np.all(np.abs(above - 1.0) < FLAT):
+            continue  # straight through: no index at all
+        if named is not None:
+            off = np.zeros(len(o))
+            off[through] = np.abs(above / named - 1.0)
+            text = f"eta, seen from above, is {above[np.argmax(np.abs(above / named - 1.0))]:.4g}, the parameters say {named:.4g}"
+            yield _worst(off, text, o, i)
+        elif np.ptp(above) > FLAT * np.median(above):
+            off = np.zeros(len(o))
+            off[through] = np.abs(above / np.median(above) - 1.0)
+            yield _worst(off, "eta from below is not the inverse of that from above", o, i)
+
+
+def _named_index(subject: Subject) -> float | None:
+    """The index below over that above, where parameters of the material itself name it."""
+    names = subject.parameters
+    try:
+        if "eta" in names and names["eta"].kind == "float":
+            return float(subject.model.eta)
+        if "int_ior" in names:
+            return float(subject.model.int_ior) / float(getattr(subject.model, "ext_ior", 1.000277))
+    except TypeError:
+        pass
+    return None
+
+
+def _modes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """Radiance carries (eta_o / eta_i)^2 = 1 / eta^2 of what power does, in transmission alone (Veach1997, 5.2)."""
+    if not subject.transmits:
+        return
+    for rows, n in _each(wo, seen):
+        o, i = wo[rows], seen.wi[rows, n]
+        other, there = lobes.matched(Lobes(*[part[rows] for part in power]), i)
+        if not there.any():
+            continue
+        carried = power.carried[rows, other]
+        radiance = seen.carried[rows, n]
+        through = o[:, 2] * i[:, 2] < 0.0
+        expected = carried * np.where(through, seen.eta[rows, n] ** -2.0, 1.0)[:, None]
+        off = _relative(radiance, expected) * there
+        row = int(np.argmax(off))
+        if off[row] > EXACT:
+            ratio = float(radiance[row].mean() / max(carried[row].mean(), 1e-12))
+            what = "transmits" if through[row] else "reflects"
+            wanted = seen.eta[rows, n][row] ** -2.0 if through[row] else 1.0
+            yield Miss(
+                float(off[row]),
+                f"{what} {ratio:.4g} times as much radiance as power, {wanted:.4g} expected (1 / eta^2)",
+                o[row],
+                i[row],
+            )
+
+
+def _back(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """The lobe along wi, seen from wi, leads back to wo and carries the same power."""
+    for rows, n in _each(wo, power):
+        o, i = wo[rows], power.wi[rows, n]
+        there = power.carried[rows, n]
+        fine = np.isfinite(i).all(1) & (np.abs(np.linalg.norm(i, axis=1) - 1.0) < SINGLE) & (np.abs(i[:, 2]) > 1e-3)
+        fine &= there.max(1) > FORWARD
+        if not fine.any():
+            continue
+        o, i, there = o[fine], i[fine], there[fine]
+        again = lobes.of(subject, i, seed, "importance")
+        which, found = lobes.matched(again, o)
+        lost = np.where(found, 0.0, np.inf)
+        yield _worst(lost, "goes along wi, and no lobe leads back from there", o, i)
+        if found.any():
+            back = again.carried[np.arange(len(o)), which] if again.found.shape[1] else there
+            off = _relative(there, back) * found
+            row = int(np.argmax(off))
+            text = f"carries {there[row].mean():.4g} of the power one way and {back[row].mean():.4g} the other"
+            yield _worst(off, text, o, i)
+
+
+def _fresnel(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """A material that names its index reflects as Fresnel's equations say, or Schlick's curve, times a constant."""
+    index = _named_index(subject)
+    if index is None or abs(index - 1.0) < FLAT or not power.through(wo).any():
+        return
+    cos = np.abs(wo[:, 2])
+    ratio = np.where(wo[:, 2] > 0.0, index, 1.0 / index)
+    exact, schlick = _dielectric(cos, ratio), _schlick(cos, ratio)
+    same = power.found & ~power.through(wo)
+    reflected = np.sum(power.carried * same[..., None], axis=1)
+    rest = np.sum(power.carried * power.through(wo)[..., None], axis=1)
+    for curve in (exact, schlick):
+        off = np.maximum(_off_constant(reflected, curve), _off_constant(rest, 1.0 - curve))
+        if curve is exact:
+            answer = off
+        if off.max() < 1e-4 if subject.best == "float64" else off.max() < 5e-3:
+            return
+    row = int(np.argmax(answer))
+    wi = wo[row] * [-1.0, -1.0, 1.0]
+    text = f"reflects {reflected[row].mean():.4g} where Fresnel's equations for eta = {index:.4g} give {exact[row]:.4g}"
+    yield Miss(float(answer[row]), text, wo[row], wi)
+
+
+def _off_constant(value: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    """How far values (N, channels) are from a multiple of a curve (N,), relative to the largest, (N,)."""
+    size = float(np.sum(curve**2))
+    scale = value.T @ curve / size if size > 0.0 else np.zeros(value.shape[1])
+    most = np.maximum(np.abs(value).max(0), 1e-6)
+    return (np.abs(value - curve[:, None] * scale) / most).max(1)
+
+
+def _dielectric(cos: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """Unpolarized reflectance for eta = index beyond over index before: (R_s + R_p) / 2, 1 in total reflection."""
+    sin2 = (1.0 - cos**2) / eta**2
+    inside = np.sqrt(np.maximum(1.0 - sin2, 0.0))
+    s = (cos - eta * inside) / (cos + eta * inside)
+    p = (eta * cos - inside) / (eta * cos + inside)
+    return np.where(sin2 >= 1.0, 1.0, 0.5 * (s**2 + p**2))
+
+
+def _schlick(cos: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """Schlick's curve, in the cosine on the side of the smaller index."""
+    r0 = ((eta - 1.0) / (eta + 1.0)) ** 2
+    sin2 = (1.0 - cos**2) / eta**2
+    outer = np.where(eta < 1.0, np.sqrt(np.maximum(1.0 - sin2, 0.0)), cos)
+    return np.where(sin2 >= 1.0, 1.0, r0 + (1.0 - r0) * (1.0 - outer) ** 5)
+
+
+def _turned(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """Isotropic lobes turn with the view."""
+    if not subject.isotropic:
+        return
+    angle = np.random.default_rng([seed, 92]).uniform(0.0, 2.0 * np.pi, len(wo))
+    turned = lobes.of(subject, directions.turned(wo, angle), seed)
+    for rows, n in _each(wo, seen):
+        i = seen.wi[rows, n]
+        part = Lobes(*[p[rows] for p in turned])
+        which, found = lobes.matched(part, directions.turned(i, angle[rows]))
+        carried = seen.carried[rows, n]
+        matters = carried.max(1) > FORWARD
+        yield _worst(
+            np.where(found | ~matters, 0.0, np.inf),
+            "declared isotropic, but a turn of the view moves the lobe",
+            wo[rows],
+            i,
+        )
+        if found.any():
+            off = _relative(carried, part.carried[np.arange(len(rows)), which]) * found
+            yield _worst(off, "declared isotropic, but a turn of the view changes what the lobe carries", wo[rows], i)
+
+
+def _tinted(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """What a lobe carries is affine in each albedo."""
+    names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0]
+    for name in names:
+        found = [lobes.of(subject.replace(**{name: v}), wo, seed) for v in (0.125, 0.875, 0.3125)]
+        for rows, n in _each(wo, found[2]):
+            i = found[2].wi[rows, n]
+            low, high = (
+                (
+                    part.carried[np.arange(len(rows)), which] * there[:, None]
+                    for part in (Lobes(*[p[rows] for p in one]) for one in found[:2])
+                    for which, there in [lobes.matched(part, i)]
+                    if part.found.shape[1]
+                )
+                if all(one.found.shape[1] for one in found[:2])
+                else (None, None)
+            )
+            if low is None or high is None:
+                continue
+            off = _relative(found[2].carried[rows, n], 0.75 * low + 0.25 * high)
+            yield _worst(off, f"what the lobe carries is not linear in {name}", wo[rows], i)
+
+
+def _single(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """float32 goes the same way and carries the same; beside the edge of total reflection only."""
+    rough = lobes.of(subject, wo, seed, precision="float32")
+    for rows, n in _each(wo, seen):
+        o, i, carried = wo[rows], seen.wi[rows, n], seen.carried[rows, n]
+        which, found = lobes.matched(Lobes(*[p[rows] for p in rough]), i)
+        away = (np.abs(i[:, 2]) > 0.05) & (carried.max(1) > FORWARD)
+        if not rough.found.shape[1]:
+            yield _worst(np.where(away, np.inf, 0.0), "float32 has no such lobe", o, i)
+            continue
+        single = rough.carried[rows, which]
+        off = np.where(found, _relative(single, carried) * (1e-3 if False else 1.0), np.inf) * away
+        off = np.nan_to_num(off, nan=0.0, posinf=np.inf)
+        yield _worst(np.where(off > SINGLE, off, 0.0), "float32 carries another share of the light than float64", o, i)
+
+
+def _slopes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
+    """d (weight x pdf) / d parameter by autodiff equals differences, at fixed random numbers."""
+    if not isinstance(subject.model, BSDF) or subject.stochastic:
+        return
+    dr = backend.drjit()
+    kind = backend.types("float64")
+    pick = slice(None, None, 3)
+    views = wo[pick]
+    views = views[np.abs(views[:, 2]) > 0.1]
+    u = lobes.chosen(16, seed)
+    many, numbers = np.repeat(views, len(u), axis=0), np.tile(u, (len(views), 1))
+    a, b = (backend.vector_of(w, 3, kind) for w in (many, numbers))
+    for leaf in tree.leaves(subject.model):
+        if not leaf.parameter.numeric or leaf.parameter.kind in ("angle", "alpha") or np.ndim(leaf.value) > 1:
+            continue
+
+        def carried(shift: object, path: str = leaf.path) -> tuple[object, object]:
+            bound = binding.shift(subject.model.bind(kind), path, lambda value: value + shift)
+            s = guarded(subject.model, "sample", lambda: bound.sample(a, b, "radiance"))
+            return kind.vec3(s[1]) * s[2], kind.bool(s[3]) & (s[2] > 0.0)
+
+        delta = dr.opaque(kind.float, 0.0)
+        dr.enable_grad(delta)
+        value, lit = carried(delta)
+        exact = np.zeros((len(many), 3))
+        if dr.grad_enabled(value):
+            dr.forward(delta)
+            exact = backend.to_numpy(dr.grad(value), len(many))
+        size = float(np.max(np.abs(np.asarray(leaf.value, float)))) or 1.0
+        step = 1e-4 * size
+        ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0)]
+        shown = [np.broadcast_to(backend.to_numpy(v, len(many)), (len(many), 3)) for v, _ in ends]
+        there = np.all(
+            [np.broadcast_to(backend.to_numpy(m, len(many)), (len(many),)) for m in [lit, *(m for _, m in ends)]],
+            axis=0,
+        )
+        wide, narrow = (shown[3] - shown[0]) / (2.0 * step), (shown[2] - shown[1]) / step
+        smooth = there & np.all(np.abs(wide - narrow) <= 1e-3 * np.abs(narrow) + 1e-7 / size, axis=1)
+        differences = narrow + (narrow - wide) / 3.0
+        floor = max(1e-3 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-6 / size)
+        off = (np.abs(exact - differences) / np.maximum(np.abs(differences), floor)).max(1) * smooth
+        off = np.where(off > SLOPES, off, 0.0)
+        wi = many * [-1.0, -1.0, 1.0]
+        yield _worst(
+            off, f"the derivative of what the lobe carries by {leaf.path} is not that of differences", many, wi
+        )
+
+
+def _relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Largest difference over channels, relative to the larger brightest channel, (N,)."""
+    size = np.maximum(np.maximum(np.abs(a).max(1), np.abs(b).max(1)), 1e-6)
+    return np.abs(a - b).max(1) / size
+
+
+def _worst(off: np.ndarray, text: str, wo: np.ndarray, wi: np.ndarray) -> Miss:
+    off = np.where(np.isnan(off), np.inf, off)
+    row = int(np.argmax(off)) if len(off) else 0
+    return Miss(float(off[row]) if len(off) else 0.0, text, wo[row], wi[row])
+
+
+def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
+    """Each lobe is chosen as often as its pdf, a probability, says."""
+    angles = [(25.0, 40.0), (70.0, 200.0)] if effort.grazing else [(50.0, 100.0)]
+    wo = np.concatenate(
+        [[directions.at(t if side > 0 else 180.0 - t, p) for t, p in angles] for side in subject.sides or (1,)]
+    )
+    wo = directions.single(wo)
+    count = min(effort.furnace_samples, 1 << 16)
+    known = lobes.of(subject, wo, seed, precision="float32")
+    trials = []
+
+    def p_value(row: int, lobe: int, seed: int) -> float:
+        u = directions.numbers(np.random.default_rng([seed, 21, row]), count)
+        s = subject.sample(np.tile(wo[row], (count, 1)), u, precision="float32")
+        mine = s.delta & (s.pdf > 0.0) & (np.abs(s.wi - known.wi[row, lobe]).max(1) < lobes.NEAR)
+        probability = float(known.pdf[row, lobe])
+        return statistics.binomial_two_sided(int(mine.sum()), count, min(max(probability, 0.0), 1.0))
+
+    for row, lobe in np.argwhere(known.found):
+
+        def again(row: int = int(row), lobe: int = int(lobe)) -> float:
+            return p_value(row, lobe, seed + 7919)
+
+        text = f"how often the lobe toward {_angles(known.wi[row, lobe])} is chosen, seen from {_angles(wo[row])}"
+        trials.append(Trial(p_value(int(row), int(lobe), seed), text, again))
+    return trials
+
+
+__all__ = ["DeltaLobes"]

@@ -1,0 +1,87 @@
+"""The delta lobes of a BSDF, as its own sampling shows them: where they go, what they carry, how often they are chosen.
+
+A delta lobe has no value that could be asked for, but everything about it can be read off `sample`: its direction, its
+probability (`pdf` of a delta sample), and what it carries, weight x pdf, which does not depend on how it is chosen.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..ops import Mode, Precision
+from . import directions
+from .subject import Subject
+
+DRAWN = 256  # samples for each wo, in equal steps of the number that picks the lobe
+ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # and near its ends, where a lobe of small probability is
+MOST = 6  # lobes for each wo
+NEAR = 1e-3  # directions that differ by less are one lobe's
+
+
+class Lobes(NamedTuple):
+    """Of N views, L lobes each.
+
+    found   (N, L) whether there is such a lobe
+    wi      (N, L, 3)
+    weight  (N, L, channels)
+    pdf     (N, L) probability
+    eta     (N, L) index on wi's side over that on wo's, as sampled
+    """
+
+    found: np.ndarray
+    wi: np.ndarray
+    weight: np.ndarray
+    pdf: np.ndarray
+    eta: np.ndarray
+
+    @property
+    def carried(self) -> np.ndarray:
+        """Share of the light that each lobe carries, (N, L, channels)."""
+        return self.weight * self.pdf[..., None]
+
+    def through(self, wo: np.ndarray) -> np.ndarray:
+        """Which lobes go to the other side, (N, L)."""
+        return self.found & (self.wi[..., 2] * wo[:, None, 2] < 0.0)
+
+
+def chosen(count: int, seed: int) -> np.ndarray:
+    """Numbers (n, 3) for one view that meet every lobe: the first in equal steps and near both ends."""
+    first = np.concatenate([(np.arange(count) + 0.5) / count, ENDS, 1.0 - np.array(ENDS)])
+    u = directions.numbers(np.random.default_rng([seed, 31]), len(first))
+    u[:, 0] = np.minimum(first, 0.99999994)
+    return directions.single(u)
+
+
+def of(
+    subject: Subject, wo: np.ndarray, seed: int, mode: Mode = "radiance", precision: Precision | None = None
+) -> Lobes:
+    """The delta lobes of each of the views wo (N, 3)."""
+    u = chosen(DRAWN, seed)
+    n, k = len(wo), len(u)
+    s = subject.sample(np.repeat(wo, k, axis=0), np.tile(u, (n, 1)), mode, precision)
+    wi, weight = s.wi.reshape(n, k, 3), s.weight.reshape(n, k, -1)
+    pdf, eta = s.pdf.reshape(n, k), s.eta.reshape(n, k)
+    left = s.delta.reshape(n, k) & (pdf > 0.0) & np.all(np.isfinite(wi), axis=2)
+    rows = np.arange(n)
+    lobes: list[tuple[np.ndarray, ...]] = []
+    while left.any() and len(lobes) < MOST:
+        first = np.argmax(left, axis=1)
+        there = left[rows, first]
+        direction = wi[rows, first]
+        lobes.append((there, direction, weight[rows, first], pdf[rows, first], eta[rows, first]))
+        left &= (np.abs(wi - direction[:, None]).max(2) > NEAR) & there[:, None]
+    if not lobes:
+        empty = np.zeros((n, 0))
+        return Lobes(empty.astype(bool), np.zeros((n, 0, 3)), np.zeros((n, 0, weight.shape[2])), empty, empty)
+    return Lobes(*[np.stack(part, axis=1) for part in zip(*lobes, strict=True)])
+
+
+def matched(lobes: Lobes, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For each view the number of the lobe that goes along wi (N, 3), and whether there is one, (N,) each."""
+    if not lobes.found.shape[1]:
+        return np.zeros(len(wi), int), np.zeros(len(wi), bool)
+    off = np.where(lobes.found, np.abs(lobes.wi - wi[:, None]).max(2), np.inf)
+    which = np.argmin(off, axis=1)
+    return which, off[np.arange(len(wi)), which] < NEAR
