@@ -7,6 +7,7 @@ wheel has no 64-bit variant; of a Mueller matrix they are what unpolarized light
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from types import ModuleType
 from typing import ClassVar
 
@@ -16,6 +17,7 @@ import mitsuba as mi
 from ..models import BSDF, Sample, binding, method
 from ..models.material import Delta
 from ..ops import Direction, Mode, Scalar, Spectrum, backend
+from . import calls
 from .types import BSDFContext, Mask, MitsubaBSDF, SurfaceInteraction
 
 
@@ -83,6 +85,11 @@ class Native(BSDF):
         return si
 
     # ------------------------------------------------------------------ facts
+
+    def calls(self, seed: int) -> Iterator[tuple[str, str]]:
+        """What else a renderer asks of it: what was asked, and what is wrong with the answer ("" where nothing is)."""
+        front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
+        return calls.answers(self.bsdf, self._interaction(front), seed)
 
     def _has(self, *kinds: str) -> bool:
         return any(int(self.bsdf.flags()) & int(getattr(mi.BSDFFlags, kind)) for kind in kinds)

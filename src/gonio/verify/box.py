@@ -30,6 +30,7 @@ WIDE = 30.0  # a range whose ends differ by more is scanned and drawn from in eq
 OPEN = 100.0  # how far a range without an upper end is followed, in units of its lower end, or of 1
 JUMP = 6.0  # how many times its neighbours' a step must be
 LEAST = 0.004  # and how large, as a share of the value: what is smaller no one sees
+MARGIN = 0.02  # of a range, where its ends are left out
 SMALLEST = 1e-4  # of a range that starts at 0, where equal ratios have no first step
 
 
@@ -45,6 +46,21 @@ class Place:
     values: dict[str, Any]
     why: str
     subject: Subject
+
+    def inside(self) -> Place:
+        """The point moved in from the ends of the ranges, where values may be clamped and slopes break off."""
+        moved = {}
+        for axis in axes(self.subject):
+            value = tree.value_at(self.subject.model, axis.path)
+            margin = MARGIN * (axis.high - axis.low)
+            if axis.path in self.values:
+                moved[axis.path] = float(np.clip(self.values[axis.path], axis.low + margin, axis.high - margin))
+            elif np.ndim(value) == 0 and not isinstance(value, tuple | list) and value == axis.high:
+                moved[axis.path] = axis.high - margin
+        if not moved:
+            return self
+        values = {path: moved[path] for path in self.values}
+        return dataclasses.replace(self, values=values, subject=self.subject.replace(**moved))
 
     @property
     def words(self) -> str:

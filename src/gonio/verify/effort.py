@@ -18,7 +18,7 @@ class Effort:
     accuracy         of integrals
     widths           widths of microfacet distributions that sampling is also tried at
     cells            rows and columns of the chi-square test, a side of the surface
-    grazing          whether views go to 89.9 degrees
+    full             whether these are the given values: views go to 89.9 degrees, and claims are held to
     places           other parameter values that every law is tried at, `gonio.verify.box`
     """
 
@@ -31,7 +31,7 @@ class Effort:
     widths: tuple[float, ...] = ()
     places: int = 0
     cells: tuple[int, int] = histogram.CELLS
-    grazing: bool = True
+    full: bool = True
 
 
 EFFORTS = {
@@ -42,7 +42,7 @@ EFFORTS = {
 # At each of the other places. Not to the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower than the steps
 # between float32 directions.
 ELSEWHERE = {
-    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), grazing=False),
-    "default": Effort("default", 1 << 12, 16, 4, 1 << 14, 3e-4, cells=(30, 60), grazing=False),
-    "deep": Effort("deep", 1 << 14, 18, 8, 1 << 16, 1e-4, cells=(50, 100), grazing=False),
+    "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), full=False),
+    "default": Effort("default", 1 << 12, 16, 4, 1 << 14, 3e-4, cells=(30, 60), full=False),
+    "deep": Effort("deep", 1 << 14, 18, 8, 1 << 16, 1e-4, cells=(50, 100), full=False),
 }

@@ -56,6 +56,9 @@ class Grid(NamedTuple):
         return n, sides, rows, edges - 1
 
 
+FINEST = 3e-5  # of an azimuth: 120 of the steps that float32 directions have
+
+
 class Expectation(NamedTuple):
     """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and how far that may
     be off where cells were still to be divided."""
@@ -98,8 +101,13 @@ def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = 
 
 
 def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
-    """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf claims some."""
+    """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf claims some.
+
+    A wo is left out whose samples lie so close together that float32 directions are a visible raster.
+    """
     sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
+    resolved = [i for i, wi in enumerate(pilot) if _spread(wi) > FINEST]
+    pilot, wo = [pilot[i] for i in resolved], wo[resolved]
     many_rows, many_columns = cells
     rows = np.empty((len(wo), len(sides), many_rows + 1), np.float32)
     columns = np.empty((len(wo), len(sides), many_rows, many_columns + 1), np.float32)
@@ -115,6 +123,14 @@ def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cell
                 more = max(300 - (last - first), 0) // 2  # neighbours say where a row with few samples has its own
                 columns[i, j, r] = _edges(turn[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
     return Grid(wo, sides, rows, columns)
+
+
+def _spread(wi: np.ndarray) -> float:
+    """How far the middle half of directions spreads in azimuth; infinite where there are too few to say."""
+    if len(wi) < 20:
+        return float("inf")
+    first, last = np.percentile(_turn(wi), [25.0, 75.0])
+    return float(last - first)
 
 
 def _claims(pdf: Density, wo: np.ndarray, side: int) -> bool:
@@ -450,7 +466,8 @@ QUADRATURE = 3e-5  # what float32 pdfs summed over thousands of cells may be off
 def _others(total: float, error: float, others: int, drawn: int) -> float:
     """p-value of how many samples lie in no cell, expected 1 - int pdf.
 
-    The integral is known to `QUADRATURE` and its own error: the expectation nearest to what was seen within that counts.
+    The integral is known to `QUADRATURE` and its own error: the expectation nearest to what was seen within that
+    counts.
     """
     known = QUADRATURE + error
     share = float(np.clip(others / drawn, 1.0 - total - known, 1.0 - total + known))

@@ -28,6 +28,7 @@ class Lobes(NamedTuple):
     weight  (N, L, channels)
     pdf     (N, L) probability
     eta     (N, L) index on wi's side over that on wo's, as sampled
+    share   (N, L) of the samples that went there, known to a hundredth or so
     """
 
     found: np.ndarray
@@ -35,6 +36,7 @@ class Lobes(NamedTuple):
     weight: np.ndarray
     pdf: np.ndarray
     eta: np.ndarray
+    share: np.ndarray
 
     @property
     def carried(self) -> np.ndarray:
@@ -63,6 +65,7 @@ def of(
     s = subject.sample(np.repeat(wo, k, axis=0), np.tile(u, (n, 1)), mode, precision)
     wi, weight = s.wi.reshape(n, k, 3), s.weight.reshape(n, k, -1)
     pdf, eta = s.pdf.reshape(n, k), s.eta.reshape(n, k)
+    even = np.arange(k) < DRAWN  # those in equal steps, which can be counted
     left = s.delta.reshape(n, k) & (pdf > 0.0) & np.all(np.isfinite(wi), axis=2)
     rows = np.arange(n)
     lobes: list[tuple[np.ndarray, ...]] = []
@@ -70,18 +73,25 @@ def of(
         first = np.argmax(left, axis=1)
         there = left[rows, first]
         direction = wi[rows, first]
-        lobes.append((there, direction, weight[rows, first], pdf[rows, first], eta[rows, first]))
-        left &= (np.abs(wi - direction[:, None]).max(2) > NEAR) & there[:, None]
+        # two orders of a grating may leave along one direction: their probabilities tell them apart
+        mine = (np.abs(wi - direction[:, None]).max(2) <= NEAR) & (
+            np.abs(pdf - pdf[rows, first][:, None]) <= 1e-5 * pdf[rows, first][:, None]
+        )
+        share = np.mean((mine & left)[:, even], axis=1)
+        lobes.append((there, direction, weight[rows, first], pdf[rows, first], eta[rows, first], share))
+        left &= ~mine & there[:, None]
     if not lobes:
         empty = np.zeros((n, 0))
-        return Lobes(empty.astype(bool), np.zeros((n, 0, 3)), np.zeros((n, 0, weight.shape[2])), empty, empty)
+        return Lobes(empty.astype(bool), np.zeros((n, 0, 3)), np.zeros((n, 0, weight.shape[2])), empty, empty, empty)
     return Lobes(*[np.stack(part, axis=1) for part in zip(*lobes, strict=True)])
 
 
-def matched(lobes: Lobes, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each view the number of the lobe that goes along wi (N, 3), and whether there is one, (N,) each."""
-    if not lobes.found.shape[1]:
-        return np.zeros(len(wi), int), np.zeros(len(wi), bool)
-    off = np.where(lobes.found, np.abs(lobes.wi - wi[:, None]).max(2), np.inf)
-    which = np.argmin(off, axis=1)
-    return which, off[np.arange(len(wi)), which] < NEAR
+def along(lobes: Lobes, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the lobes along wi (N, 3) carry together, (N, channels), and whether there are any, (N,)."""
+    mine = lobes.found & (np.abs(lobes.wi - wi[:, None]).max(2) < NEAR)
+    return np.sum(lobes.carried * mine[..., None], axis=1), mine.any(1)
+
+
+def rows_of(lobes: Lobes, rows: np.ndarray) -> Lobes:
+    """Some of the views."""
+    return Lobes(*[part[rows] for part in lobes])

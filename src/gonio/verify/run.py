@@ -103,6 +103,7 @@ def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: 
     found = []
     for place in [Place({}, "given", one), *(others if law.everywhere else [])]:
         began = time.perf_counter()
+        place = place if law.at_ends else place.inside()
         spend = EFFORTS[effort] if place.why == "given" else ELSEWHERE[effort]
         what = _judge(law, place.subject, spend, seed)
         found.append(Asked(place, what, time.perf_counter() - began))

@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 from ... import ops
 from ...models import Breach, method
+from ...models.microfacet import widths
 from ...ops import Direction, Mode, Scalar, Spectrum, abs, maximum, where
 from ...optics.fresnel.schlick import schlick_average
 from ..compensation import lobe
@@ -57,9 +58,10 @@ class FdezAguera(_Compensated):
         E_ms = self.M(wo)
         surface = self.base.microsurface
         assert surface is not None, "checked when it was made"
+        _, smooth = widths(surface.alpha)  # a mirror loses nothing; the polynomials of E_ms end near 0, not at it
         FssEss = split_sum.reflected(surface, f0, 1.0 - E_ms, wo)
         F_ms = FssEss * f_avg / maximum(1.0 - f_avg * E_ms, 1e-6)
-        return F_ms * where(lobe.above(wo, wi), E_ms * abs(wi.z) * ops.inv_pi, 0.0)
+        return F_ms * where(lobe.above(wo, wi) & ~smooth, E_ms * abs(wi.z) * ops.inv_pi, 0.0)
 
     def derive(self) -> Derived:
         """E_ms by its polynomial, F0 and F_avg = F0 + (1 - F0) / 21."""

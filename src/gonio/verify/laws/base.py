@@ -22,6 +22,7 @@ class Law:
     title    the law as a sentence
     meaning  what its violation means for a picture
     everywhere  whether it is also asked at other values of the parameters
+    at_ends     and at the ends of their ranges
     """
 
     family: ClassVar[Family[Law]]
@@ -30,6 +31,7 @@ class Law:
     title: ClassVar[str] = ""
     meaning: ClassVar[str] = ""
     everywhere: ClassVar[bool] = True
+    at_ends: ClassVar[bool] = True
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         raise NotImplementedError(f"{type(self).__name__} has no judge")

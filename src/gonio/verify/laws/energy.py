@@ -7,7 +7,7 @@ import numpy as np
 from ...energy.albedo import cubature
 from ...errors import InputError
 from ...ops import Mode, backend
-from .. import directions, histogram, statistics
+from .. import directions, histogram, lobes, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..subject import Subject, guarded
@@ -98,14 +98,14 @@ class Energy(Law):
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
     """Equal steps in the cosine, and grazing ones, from each side that answers."""
     mu = (np.arange(effort.furnace) + 0.5) / effort.furnace
-    theta = np.concatenate([np.degrees(np.arccos(mu)), GRAZING if effort.grazing else ()])
+    theta = np.concatenate([np.degrees(np.arccos(mu)), GRAZING if effort.full else ()])
     found = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
     return directions.single(np.concatenate(found))
 
 
 def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """int eval dwi of power plus the delta lobes' share, and the error of both, (N, channels)."""
-    ideal = _deltas(subject, wo, seed)
+    ideal = _deltas(subject, wo, seed, effort.full)
     if not subject.has_density:
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
@@ -114,19 +114,14 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
     return integral.value + ideal, integral.error + effort.accuracy
 
 
-def _deltas(subject: Subject, wo: np.ndarray, seed: int) -> np.ndarray:
-    """Sum over the delta directions that sampling finds of weight times probability, (N, channels)."""
-    count = 512
-    u = directions.numbers(np.random.default_rng([seed, 31]), count)
-    u[:, 0] = (np.arange(count) + 0.5) / count  # the lobe's number: no lobe of 1 / 512 is missed
-    s = subject.sample(np.repeat(wo, count, axis=0), np.tile(u, (len(wo), 1)), "importance")
-    result = np.zeros((len(wo), s.weight.shape[1]))
-    chosen = (s.delta & (s.pdf > 0.0)).reshape(len(wo), count)
-    for i in np.flatnonzero(chosen.any(1)):
-        rows = i * count + np.flatnonzero(chosen[i])
-        _, first = np.unique(np.round(s.wi[rows], 4), axis=0, return_index=True)
-        result[i] = np.sum(s.weight[rows[first]] * s.pdf[rows[first], None], axis=0)
-    return result
+def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
+    """What all delta lobes carry, (N, channels)."""
+    seen = lobes.of(subject, wo, seed, "importance")
+    carried = seen.carried
+    if not full and carried.size:
+        # where parameters make two lobes one, each says its own probability and both together are met twice as often
+        carried = carried * np.maximum(np.round(seen.share / np.maximum(seen.pdf, 1e-3)), 1.0)[..., None]
+    return np.sum(carried * seen.found[..., None], axis=1)
 
 
 def _uniformly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

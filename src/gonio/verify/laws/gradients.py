@@ -23,6 +23,7 @@ class Gradients(Law):
 
     number = 8
     name = "gradients"
+    at_ends = False
     title = "autodiff equals finite differences for every parameter"
     meaning = "Fitting and inverse rendering walk the wrong way, or stop where nothing is solved."
 

@@ -26,6 +26,7 @@ ABOVE = (
 BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
 EXCESS = 1e-3
 SUPPORT = 1e-4
+LEAST = 1e-3
 
 
 class Pdf(Law):
@@ -113,22 +114,22 @@ class _Tested(NamedTuple):
 
 def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[_Tested]:
     if wo is None:
-        above, below = (ABOVE, BELOW) if effort.grazing else (ABOVE[:6:2], BELOW[1:4])
+        above, below = (ABOVE, BELOW) if effort.full else (ABOVE[:6:2], BELOW[1:4])
         grid_of = [*(above if 1 in subject.sides else ()), *(below if -1 in subject.sides else ())]
         wo = directions.single(np.array([directions.at(*angles) for angles in grid_of]).reshape(-1, 3))
     if not len(wo):
         return []
     grid = histogram.place(subject, wo, seed, effort.cells)
-    if grid is None:
+    if grid is None or not len(grid.wo):
         return []
     expected = histogram.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
     counts = histogram.count(subject, grid, effort.log_samples, seed)
     tested = []
-    for i in range(len(wo)):
+    for i in range(len(grid.wo)):
         expectation = expected.cells[i] * counts.drawn
         cells = SampleCells(expectation, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn)
         outcome = histogram.compare(expected, counts, i)
-        tested.append(_Tested(wo[i], outcome, float(expected.total[i]), cells, grid.sides))
+        tested.append(_Tested(grid.wo[i], outcome, float(expected.total[i]), cells, grid.sides))
     return tested
 
 
@@ -140,7 +141,9 @@ def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> N
     value, pdf = subject.eval(wo, wi, precision=subject.best).max(1), subject.pdf(wo, wi, precision=subject.best)
     wanting = (value > 0.0) & ~(pdf > 0.0)
     total = float(np.sum(value[np.isfinite(value)]))
-    share = float(np.sum(value[wanting & np.isfinite(value)])) / total if total > 0.0 else 0.0
+    # beside a delta lobe, which carries the light, a density of a millionth is nothing
+    total = max(total, LEAST * len(value))
+    share = float(np.sum(value[wanting & np.isfinite(value)])) / total
     if np.any(pdf < 0.0):
         row = int(np.argmin(pdf))
         finding.problems.append(f"pdf is negative: {pdf[row]:.3g} with {pair_in_words(wo[row], wi[row])}")

@@ -1,0 +1,241 @@
+"""What Mitsuba's integrators call of a BSDF besides eval, pdf and sample, held against those three.
+
+Path tracers call `eval_pdf` and `eval_pdf_sample`, switch lanes off by `active`, ask for single components and types,
+read flags before they ask for anything, and denoisers take `eval_diffuse_reflectance`. A plugin that writes one of them
+anew can be right in every test of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from .types import BSDFContext, MitsubaBSDF, SurfaceInteraction
+
+Answer = tuple[str, str]  # what was asked; what is wrong with it, "" where nothing is
+COUNT = 4096
+SAME = 1e-4  # relative: float32, and kernels that are fused otherwise
+FEW = 0.002  # share of rows that rounding may carry over an edge
+
+
+def answers(bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
+    """Every way of asking, at the given surface interaction (COUNT wide), whose wi is replaced."""
+    trial = _Trial(bsdf, si, seed)
+    yield "eval_pdf", trial.eval_pdf()
+    yield "eval_pdf_sample", trial.eval_pdf_sample()
+    yield "active", trial.active()
+    yield "flags", trial.flags()
+    yield "components", trial.components()
+    yield "types", trial.types()
+    yield "eval_diffuse_reflectance", trial.diffuse_reflectance()
+
+
+class _Trial:
+    """A plugin, and what it answers at COUNT pairs of directions."""
+
+    def __init__(self, bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> None:
+        self.bsdf, self.si, self.ctx = bsdf, si, mi.BSDFContext()
+        rng = np.random.default_rng([seed, 111])
+        wi, wo = _uniform(rng), _uniform(rng)
+        half = COUNT // 2
+        wo[:half, 2] = np.copysign(wo[:half, 2], wi[:half, 2])
+        u = rng.random((3, COUNT), dtype=np.float32)
+        self.wo, self.u = _vector(wo), (mi.Float(u[0]), mi.Point2f(u[1], u[2]))
+        si.wi = _vector(wi)
+        # half of the pairs where the plugin itself goes: narrow lobes
+        drawn, _ = bsdf.sample(self.ctx, si, *self.u)
+        usable = (np.arange(COUNT) % 2 == 0) & (np.abs(np.linalg.norm(_rows(drawn.wo), axis=1) - 1.0) < 1e-3)
+        self.wo = _vector(np.where(usable[:, None], _rows(drawn.wo), wo))
+        self.value = self.color(bsdf.eval(self.ctx, si, self.wo))
+        self.pdf = _rows(bsdf.pdf(self.ctx, si, self.wo))
+        self.drawn, weight = bsdf.sample(self.ctx, si, *self.u)
+        self.weight = self.color(weight)
+        self.lit = np.any(self.weight > 0.0, axis=1)
+        sampled = np.asarray(self.drawn.sampled_type.numpy())
+        self.delta = (np.broadcast_to(sampled, COUNT) & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0
+        self.noisy = not np.array_equal(self.value, self.color(bsdf.eval(self.ctx, si, self.wo)))
+
+    @staticmethod
+    def color(value: object) -> np.ndarray:
+        return _rows(mi.unpolarized_spectrum(value))
+
+    # ------------------------------------------------------------------ the calls
+
+    def eval_pdf(self) -> str:
+        value, pdf = self.bsdf.eval_pdf(self.ctx, self.si, self.wo)
+        return self.unlike("eval_pdf's value", "eval", self.color(value), self.value) or self.unlike(
+            "eval_pdf's pdf", "pdf", _rows(pdf), self.pdf
+        )
+
+    def eval_pdf_sample(self) -> str:
+        value, pdf, bs, weight = self.bsdf.eval_pdf_sample(self.ctx, self.si, self.wo, *self.u)
+        pairs = {
+            "its value": ("eval", self.color(value), self.value),
+            "its pdf": ("pdf", _rows(pdf), self.pdf),
+            "its weight": ("sample's", self.color(weight), self.weight),
+            "its wo": ("sample's", _rows(bs.wo)[self.lit], _rows(self.drawn.wo)[self.lit]),
+            "its sampled pdf": ("sample's", _rows(bs.pdf)[self.lit], _rows(self.drawn.pdf)[self.lit]),
+        }
+        return next((w for k, (of, a, b) in pairs.items() if (w := self.unlike(k, of, a, b))), "")
+
+    def active(self) -> str:
+        live = np.arange(COUNT) % 2 == 0
+        mask = mi.Bool(live)
+        value, pdf = self.bsdf.eval(self.ctx, self.si, self.wo, mask), self.bsdf.pdf(self.ctx, self.si, self.wo, mask)
+        both = self.bsdf.eval_pdf(self.ctx, self.si, self.wo, mask)
+        _, weight = self.bsdf.sample(self.ctx, self.si, *self.u, mask)
+        asked = {
+            "eval": (self.color(value), self.value),
+            "pdf": (_rows(pdf), self.pdf),
+            "eval_pdf's value": (self.color(both[0]), self.value),
+            "eval_pdf's pdf": (_rows(both[1]), self.pdf),
+            "sample's weight": (self.color(weight), self.weight),
+        }
+        for name, (got, whole) in asked.items():
+            # many of Mitsuba's own leave pdf and weight as they are in lanes that are off: integrators drop them
+            if name.startswith("eval") and "pdf's pdf" not in name and np.any(got[~live] != 0.0):
+                return f"{name} of lanes that are switched off is {np.abs(got[~live]).max():.4g}, 0 expected"
+            wrong = self.unlike(f"{name} of the other lanes", "what it is with all lanes on", got[live], whole[live])
+            if wrong:
+                return wrong
+        return ""
+
+    def flags(self) -> str:
+        flags, all_ = mi.BSDFFlags, int(self.bsdf.flags())
+        count = self.bsdf.component_count()
+        parts = [int(self.bsdf.flags(k)) for k in range(count)]
+        kinds = int(flags.All) if hasattr(flags, "All") else 0x1FF
+        together = 0
+        for part in parts:
+            together |= part
+        if count and (together & kinds) != (all_ & kinds):
+            return f"flags() names {_names(all_)}, its components {_names(together)}"
+        sampled = np.broadcast_to(np.asarray(self.drawn.sampled_type.numpy()), COUNT)
+        strange = self.lit & ((sampled & (kinds & ~all_)) != 0)
+        if strange.any():
+            return f"samples of type {_names(int(sampled[strange][0]) & ~all_)}, which flags() does not name"
+        if np.any(self.lit & (sampled == 0)):
+            return "samples that carry light and name no type"
+        component = np.broadcast_to(np.asarray(self.drawn.sampled_component.numpy()), COUNT)
+        if count and np.any(self.lit & (component >= count)):
+            return f"samples of component {int(component[self.lit].max())}, of {count}"
+        wi = np.broadcast_to(_rows(self.si.wi)[:, 2], COUNT)
+        across = wi * _rows(self.wo)[:, 2] < 0.0
+        transmits = all_ & (int(flags.Transmission) | int(flags.Null))
+        lit = np.any(self.value > 1e-6 * max(float(self.value.max(initial=0.0)), 1e-6), axis=1)
+        if not transmits and np.any(lit & across):
+            return "light goes through, and no flag says that it transmits"
+        beyond = wi * _rows(self.drawn.wo)[:, 2] < 0.0
+        said = (sampled & (int(flags.Transmission) | int(flags.Null))) > 0
+        if np.any(self.lit & (said != beyond) & (np.abs(wi) > 1e-3)):
+            row = int(np.argmax(self.lit & (said != beyond) & (np.abs(wi) > 1e-3)))
+            where = "goes through" if beyond[row] else "stays on its side"
+            return f"a sample of type {_names(int(sampled[row]))} {where}"
+        smooth = self.lit & ~self.delta
+        found = self.bsdf.pdf(self.ctx, self.si, self.drawn.wo)
+        if smooth.sum() > 20 and np.mean(_rows(found)[smooth] > 0.0) < 0.5:
+            return "samples whose type is no delta, where pdf is 0"
+        if self.delta.any() and (self.delta & self.lit).sum() > 20 and not all_ & (int(flags.Delta) | int(flags.Null)):
+            return "delta samples, and no flag says so"
+        if not self.delta.any() and not (self.value > 0.0).any() and all_ & int(flags.Smooth) and self.lit.any():
+            return "a flag says that it is smooth, and it has no value anywhere"
+        return ""
+
+    def components(self) -> str:
+        count = self.bsdf.component_count()
+        if count == 0:
+            return "no component is declared"
+        contexts = []
+        for k in range(count):
+            ctx = mi.BSDFContext()
+            ctx.component = k
+            contexts.append((f"component {k}", ctx, k))
+        return self.parts(contexts, "the components")
+
+    def types(self) -> str:
+        contexts = []
+        flags = mi.BSDFFlags
+        for name in ("Reflection", "Transmission"):
+            ctx = mi.BSDFContext()
+            ctx.type_mask = int(getattr(flags, name))
+            contexts.append((name.lower(), ctx, None))
+        if int(self.bsdf.flags()) & int(flags.Null):
+            return ""  # null interactions are of neither
+        return self.parts(contexts, "reflection and transmission")
+
+    def parts(self, contexts: list[tuple[str, BSDFContext, int | None]], words: str) -> str:
+        """Asked one by one, parts add up to the whole, and what is sampled from one is of that one."""
+        total = np.zeros_like(self.value)
+        for name, ctx, number in contexts:
+            value = self.color(self.bsdf.eval(ctx, self.si, self.wo))
+            both = self.color(self.bsdf.eval_pdf(ctx, self.si, self.wo)[0])
+            wrong = self.unlike(f"eval_pdf's value of {name}", "eval's", both, value)
+            if wrong:
+                return wrong
+            total += value
+            bs, weight = self.bsdf.sample(ctx, self.si, *self.u)
+            lit = np.any(self.color(weight) > 0.0, axis=1)
+            component = np.broadcast_to(np.asarray(bs.sampled_component.numpy()), COUNT)
+            if number is not None and np.any(lit & (component != number)):
+                return f"asked for {name}, sample gives component {int(component[lit & (component != number)][0])}"
+        if np.any(self.value > 0.0) or np.any(total > 0.0):
+            return self.unlike(f"the sum over {words}", "eval", total, self.value)
+        return ""
+
+    def diffuse_reflectance(self) -> str:
+        value = _rows(mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self.si)))
+        if not np.all(np.isfinite(value)):
+            return "not finite"
+        if np.any(value < -1e-6) or np.any(value > 1.0 + 1e-3):
+            return f"from {value.min():.4g} to {value.max():.4g}, a share of the light expected"
+        flags = mi.BSDFFlags
+        if int(self.bsdf.flags()) & int(flags.All) == int(flags.DiffuseReflection) and not self.noisy:
+            wi, wo = _rows(self.si.wi)[:, 2], _rows(self.wo)[:, 2]
+            front = (wi > 0.1) & (wo > 0.1)
+            f = np.pi * self.value[front] / wo[front, None]
+            if front.sum() > 20 and np.ptp(f, axis=0).max() < 1e-3:
+                return self.unlike("it", "pi times the diffuse lobe", value[front], f)
+        return ""
+
+    def unlike(self, name: str, other: str, got: np.ndarray, whole: np.ndarray) -> str:
+        """The worst difference in words, "" where there is none."""
+        if self.noisy:
+            return ""
+        got, whole = np.broadcast_arrays(got, whole)
+        fine = np.isfinite(whole).all(-1)
+        least = 1e-6 * float(np.max(np.abs(whole[fine]), initial=0.0))
+        size = np.maximum(np.maximum(np.abs(got), np.abs(whole)), max(least, 1e-12))
+        off = np.where(fine[:, None], np.abs(got - whole) / size, 0.0)
+        off = np.where(np.isnan(off), np.inf, off).max(-1)
+        wrong = off > SAME
+        if wrong.mean() <= FEW if len(wrong) else True:
+            return ""
+        ratio = got[wrong].sum() / max(whole[wrong].sum(), 1e-30)
+        return f"{name} is not {other}: {ratio:.4g} times as much where they differ, in {wrong.mean():.1%} of the pairs"
+
+
+def _uniform(rng: np.random.Generator) -> np.ndarray:
+    w = rng.normal(size=(COUNT, 3))
+    return w / np.linalg.norm(w, axis=1, keepdims=True)
+
+
+def _vector(rows: np.ndarray) -> mi.Vector3f:
+    return mi.Vector3f(*[mi.Float(np.ascontiguousarray(c, dtype=np.float32)) for c in rows.T])
+
+
+def _rows(value: object) -> np.ndarray:
+    """(COUNT, k) in float64."""
+    parts = (
+        [np.asarray(c.numpy(), float) for c in value]
+        if dr.is_vector_v(value)
+        else [np.asarray(mi.Float(value).numpy(), float)]
+    )
+    return np.stack([np.broadcast_to(part, (COUNT,)) for part in parts], -1)
+
+
+def _names(flags: int) -> str:
+    kinds = ("Null", *(kind + way for kind in ("Diffuse", "Glossy", "Delta") for way in ("Reflection", "Transmission")))
+    return " | ".join(k for k in kinds if flags & int(getattr(mi.BSDFFlags, k))) or "nothing"

@@ -1,0 +1,169 @@
+"""Calls: the answers do not depend on how a renderer asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...ops import Mode, Precision, backend
+from .. import directions
+from ..effort import Effort
+from ..subject import Subject, guarded
+from ..verdict import Finding
+from .base import Law, pair_in_words, pairs
+
+SAME = {"float64": 1e-10, "float32": 1e-4}
+LARGE = 1 << 20
+SMALL = 1e-6  # of the largest value: less than that is as good as nothing
+
+
+class Calls(Law):
+    """One row says what a million say; rows that a renderer has switched off change no others; the same question has
+    the same answer; only transmission knows of `mode`. Of a plugin: eval_pdf, eval_pdf_sample, masks of lanes, of
+    components and of types, and its flags, say what eval, pdf and sample say."""
+
+    number = 11
+    name = "calls"
+    title = "the same answers however a renderer asks"
+    everywhere = False  # what it is about does not depend on the values
+    meaning = "Right in a test, wrong in a picture: integrators use calls, batches and masks that nothing else tries."
+
+    def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
+        finding = Finding(0.0, 0.0, "one wrong answer is one too many", shown="agree")
+        asked = []
+        checks = subject.model.calls(seed) if hasattr(subject.model, "calls") else ()
+        for what, wrong in [*_checks(subject, effort, seed), *checks]:
+            asked.append(what)
+            if wrong:
+                finding.problems.append(f"{what}: {wrong}")
+        finding.notes.append(f"asked: {', '.join(dict.fromkeys(asked))}")
+        finding.figure = float(len(finding.problems))
+        if finding.problems:
+            finding.shown = f"{len(finding.problems)} differ"
+        return finding
+
+
+Check = tuple[str, str]  # what was asked, and what is wrong with it ("" where nothing is)
+
+
+def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Check]:
+    """What holds of any BSDF."""
+    wo, wi = pairs(subject, min(effort.pairs // 8, 4096), seed)
+    u = directions.numbers(np.random.default_rng([seed, 101]), len(wo))
+    for precision in subject.precisions:
+        yield from _batches(subject, wo, wi, u, precision)
+    if subject.transmits and not subject.stochastic:
+        yield "mode", _mode(subject, wo, wi)
+
+
+def _answers(
+    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision, mode: Mode = "radiance"
+) -> dict[str, np.ndarray]:
+    """eval, pdf and all of sample, rows (N, ...), asked as a renderer does: of Dr.Jit vectors, rows may be anything."""
+    types = backend.types(precision)
+    model = subject.bound(precision)
+    a, b, c = (backend.vector_of(w, 3, types) for w in (wo, wi, u))
+    s = guarded(subject.model, "sample", lambda: model.sample(a, c, mode))
+    asked: dict[str, Any] = {
+        "eval": guarded(subject.model, "eval", lambda: model.eval(a, b, mode)),
+        "pdf": guarded(subject.model, "pdf", lambda: model.pdf(a, b)),
+        "sample's weight": s[1],
+        "sample's pdf": s[2],
+        "sample's wi": s[0],
+        "sample's eta": s[4],
+    }
+    return {name: _rows(value, len(wo)) for name, value in asked.items()}
+
+
+def _rows(value: Any, count: int) -> np.ndarray:
+    array = np.asarray(backend.to_numpy(value, count), float)
+    return array[:count].reshape(count, -1)
+
+
+def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision) -> Iterator[Check]:
+    whole = _answers(subject, wo, wi, u, precision)
+    if not subject.stochastic:
+        yield "asked twice", _unlike(whole, _answers(subject, wo, wi, u, precision), wo, wi, 0.0)
+    same = SAME[precision]
+    few = slice(0, 5)
+    if not subject.stochastic:
+        for row in range(*few.indices(len(wo))):
+            one = slice(row, row + 1)
+            alone = _answers(subject, wo[one], wi[one], u[one], precision)
+            wrong = _unlike({k: v[one] for k, v in whole.items()}, alone, wo[one], wi[one], same)
+            if wrong:
+                break
+        yield "one row at a time", wrong
+        if precision == "float32":
+            times = LARGE // len(wo)
+            many = _answers(subject, *(np.tile(w, (times, 1)) for w in (wo, wi, u)), precision)
+            yield "a million rows", _unlike(whole, {k: v[-len(wo) :] for k, v in many.items()}, wo, wi, same)
+        order = np.random.default_rng(5).permutation(len(wo))
+        mixed = _answers(subject, wo[order], wi[order], u[order], precision)
+        yield (
+            "rows in another order",
+            _unlike({k: v[order] for k, v in whole.items()}, mixed, wo[order], wi[order], same),
+        )
+        off = np.arange(len(wo)) % 2 == 1
+        gone = [np.where(off[:, None], np.nan, w) for w in (wo, wi, u)]
+        half = _answers(subject, *gone, precision)
+        live = ~off
+        wrong = _unlike(
+            {k: v[live] for k, v in whole.items()}, {k: v[live] for k, v in half.items()}, wo[live], wi[live], same
+        )
+        yield "half the rows dead", wrong
+
+
+def _unlike(
+    first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
+) -> str:
+    """The worst difference in words; "" where there is none beyond `same`, relative to the larger."""
+    lit = first["sample's pdf"][:, 0] > 0.0
+    for name, a in first.items():
+        b = second[name]
+        if a.shape != b.shape:
+            return f"{name} has shape {b.shape}, and {a.shape} otherwise"
+        keep = np.isfinite(a).all(1)
+        if name in ("sample's wi", "sample's eta"):
+            keep &= lit
+        largest = float(np.max(np.abs(a[keep]), initial=0.0))
+        size = np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * largest)
+        off = np.where(keep[:, None], np.abs(a - b), 0.0) / np.where(size > 0.0, size, 1.0)
+        off = np.where(np.isnan(off), np.inf, off).max(1)
+        # rounding differs where kernels are fused otherwise; a lobe of width 1e-4 magnifies it, in few rows
+        wrong = off > same
+        if wrong.sum() > (0 if same == 0.0 else 0.002 * len(off)) or np.any(off > 0.1):
+            row = int(np.argmax(off))
+            return f"{name} is {_short(b[row])} instead of {_short(a[row])}, {pair_in_words(wo[row], wi[row])}"
+    return ""
+
+
+def _short(values: np.ndarray) -> str:
+    return ", ".join(f"{v:.4g}" for v in values)
+
+
+def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
+    """Reflection does not depend on the mode; transmission by one and the same factor each way."""
+    radiance, power = (subject.eval(wo, wi, mode) for mode in ("radiance", "importance"))
+    through = wo[:, 2] * wi[:, 2] < 0.0
+    same = SAME[subject.best]
+    size = np.maximum(np.abs(radiance), np.abs(power)).max(1)
+    lit = size > SMALL * float(size.max(initial=0.0))
+    off = np.abs(radiance - power).max(1) / np.where(lit, size, 1.0) * (lit & ~through)
+    if off.max(initial=0.0) > same:
+        row = int(np.argmax(off))
+        return f"reflection changes by {off[row]:.2g} with the mode, {pair_in_words(wo[row], wi[row])}"
+    for side in (1.0, -1.0):
+        rows = lit & through & (wo[:, 2] * side > 0.0) & (power.min(1) > 0.0)
+        if rows.sum() < 8:
+            continue
+        ratio = radiance[rows].sum(1) / power[rows].sum(1)
+        if np.ptp(ratio) > max(10.0 * same, 1e-3) * np.median(ratio):
+            ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
+            return f"radiance over power in transmission runs {ends}: one index, one factor"
+    return ""
+
+
+__all__ = ["Calls"]
