@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .types import BSDFContext, MitsubaBSDF, SurfaceInteraction
+from .types import BSDFContext, BSDFSample, MitsubaBSDF, SurfaceInteraction
 
 Answer = tuple[str, str]  # what was asked; what is wrong with it, "" where nothing is
 COUNT = 4096
@@ -30,6 +30,7 @@ def answers(bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> Iterator[An
     yield "flags", trial.flags()
     yield "components", trial.components()
     yield "types", trial.types()
+    yield "shading frame", trial.turned_frame()
     yield "eval_diffuse_reflectance", trial.diffuse_reflectance()
 
 
@@ -119,6 +120,9 @@ class _Trial:
             return f"samples of type {_names(int(sampled[strange][0]) & ~all_)}, which flags() does not name"
         if np.any(self.lit & (sampled == 0)):
             return "samples that carry light and name no type"
+        eta = np.broadcast_to(np.asarray(self.drawn.eta.numpy()), COUNT)
+        if np.any(self.lit & ~(np.isfinite(eta) & (eta > 0.0))):
+            return f"a sample's eta is {eta[self.lit].min():.4g}: path tracers multiply by its square"
         component = np.broadcast_to(np.asarray(self.drawn.sampled_component.numpy()), COUNT)
         if count and np.any(self.lit & (component >= count)):
             return f"samples of component {int(component[self.lit].max())}, of {count}"
@@ -130,8 +134,10 @@ class _Trial:
             return "light goes through, and no flag says that it transmits"
         beyond = wi * _rows(self.drawn.wo)[:, 2] < 0.0
         said = (sampled & (int(flags.Transmission) | int(flags.Null))) > 0
-        if np.any(self.lit & (said != beyond) & (np.abs(wi) > 1e-3)):
-            row = int(np.argmax(self.lit & (said != beyond) & (np.abs(wi) > 1e-3)))
+        either = (sampled & int(flags.Reflection)) > 0  # hair's lobes go anywhere
+        strange = self.lit & (said != beyond) & (np.abs(wi) > 1e-3) & ~(said & either)
+        if strange.any():
+            row = int(np.argmax(strange))
             where = "goes through" if beyond[row] else "stays on its side"
             return f"a sample of type {_names(int(sampled[row]))} {where}"
         smooth = self.lit & ~self.delta
@@ -166,6 +172,16 @@ class _Trial:
             return ""  # null interactions are of neither
         return self.parts(contexts, "reflection and transmission")
 
+    def turned_frame(self) -> str:
+        """Directions are local: a surface that is turned in space, its tangents with it, looks the same."""
+        frame = mi.Frame3f(mi.Vector3f(0.48, 0.6, 0.64), mi.Vector3f(-0.8, 0.6, 0.0), mi.Vector3f(-0.36, -0.48, 0.8))
+        frame = mi.Frame3f(dr.normalize(dr.cross(frame.t, frame.n)), frame.t, frame.n)
+        si = mi.SurfaceInteraction3f(self.si)
+        si.n, si.sh_frame, si.dp_du, si.dp_dv = mi.Normal3f(frame.n), frame, frame.s, frame.t
+        return self.unlike(
+            "eval on a tilted surface", "eval", self.color(self.bsdf.eval(self.ctx, si, self.wo)), self.value
+        )
+
     def parts(self, contexts: list[tuple[str, BSDFContext, int | None]], words: str) -> str:
         """Asked one by one, parts add up to the whole, and what is sampled from one is of that one."""
         total = np.zeros_like(self.value)
@@ -181,15 +197,32 @@ class _Trial:
             component = np.broadcast_to(np.asarray(bs.sampled_component.numpy()), COUNT)
             if number is not None and np.any(lit & (component != number)):
                 return f"asked for {name}, sample gives component {int(component[lit & (component != number)][0])}"
+            wrong = self.shares(name, bs, self.color(weight))
+            if wrong:
+                return wrong
         if np.any(self.value > 0.0) or np.any(total > 0.0):
             return self.unlike(f"the sum over {words}", "eval", total, self.value)
         return ""
+
+    def shares(self, name: str, bs: BSDFSample, weight: np.ndarray) -> str:
+        """A delta lobe carries weight x pdf, whether it is asked for alone or chosen among others."""
+        type_ = np.broadcast_to(np.asarray(bs.sampled_type.numpy()), COUNT)
+        delta = (type_ & (int(mi.BSDFFlags.Delta) | int(mi.BSDFFlags.Null))) > 0
+        same = np.abs(_rows(bs.wo) - _rows(self.drawn.wo)).max(1) < 1e-3
+        both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
+        if both.sum() < 20:
+            return ""
+        alone, among = (weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both]
+        return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", alone, among)
 
     def diffuse_reflectance(self) -> str:
         value = _rows(mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self.si)))
         if not np.all(np.isfinite(value)):
             return "not finite"
-        if np.any(value < -1e-6) or np.any(value > 1.0 + 1e-3):
+        up = mi.Vector3f(0.0, 0.0, 1.0)
+        default = np.pi * self.color(self.bsdf.eval(self.ctx, self.si, up))  # the base class's, of glossy ones no share
+        own = not np.allclose(value, default, rtol=1e-3, atol=1e-6)
+        if own and (np.any(value < -1e-6) or np.any(value > 1.0 + 1e-3)):
             return f"from {value.min():.4g} to {value.max():.4g}, a share of the light expected"
         flags = mi.BSDFFlags
         if int(self.bsdf.flags()) & int(flags.All) == int(flags.DiffuseReflection) and not self.noisy:

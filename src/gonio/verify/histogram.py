@@ -213,9 +213,10 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         # Where a step runs through the middle, two and four agree by chance, and three does not.
         off = np.maximum(0.3 * np.abs(four - two), np.abs(four - three))
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
-        divide = (off > allowed) | _has_a_step_aside(look(*place, *_RIM), box, low, high, allowed)
+        aside = _step_aside(look(*place, *_RIM), box, low, high)
+        divide = (off > allowed) | (aside > allowed) | ((high <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
-        np.add.at(unsettled, row[owner[~divide]], np.abs(four - three)[~divide])
+        np.add.at(unsettled, row[owner[~divide]], np.maximum(np.abs(four - three), aside)[~divide])
         np.add.at(cells, owner[~divide], four[~divide])
         if not divide.any():
             break
@@ -251,17 +252,14 @@ _NEAR = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.999
 _RIM = _Nodes(_NEAR[:, 0], _NEAR[:, 1], np.zeros(len(_NEAR)))
 
 
-def _has_a_step_aside(rim: Seen, box: np.ndarray, low: np.ndarray, high: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """Whether the pdf on the rim of cells is quite another than at all their nodes, whose values span [low, high].
-
-    Total reflection and the horizon end a density with a step; what lies between a cell's rim and its nodes would be
-    lost, or taken for lit. A dark cell is divided at any light; others where what may be wrong is not allowed.
-    """
+def _step_aside(rim: Seen, box: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """What is lost, or taken for lit, between a cell's rim and its nodes, whose values span [low, high], where the pdf
+    on the rim is quite another: total reflection and the horizon end a density with a step."""
     a, b, c, d = box.T
     strip = _OUTSIDE * (b - a) * (d - c)
-    above, below = rim.most > 4.0 * high, 4.0 * rim.least < low
-    matters = (above & (strip * (rim.most - high) > allowed)) | (below & (strip * (low - rim.least) > allowed))
-    return np.where(high <= 0.0, rim.most > 0.0, matters)
+    more = np.where(rim.most > 4.0 * high, rim.most - high, 0.0)
+    less = np.where(4.0 * rim.least < low, low - rim.least, 0.0)
+    return strip * np.maximum(more, less)
 
 
 class Seen(NamedTuple):

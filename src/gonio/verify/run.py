@@ -151,7 +151,7 @@ def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdi
             return law.judge(one, effort, seed)
     except DoesNotApply as reason:
         return verdict(NOT_APPLICABLE, str(reason))
-    except (Fault, TimeoutError) as fault:
+    except (Fault, TimeoutError, InputError) as fault:  # a direction of no unit length is refused as bad input
         return verdict(FAIL, str(fault))
 
 

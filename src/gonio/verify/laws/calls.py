@@ -56,6 +56,7 @@ def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Check]:
         yield from _batches(subject, wo, wi, u, precision)
     if subject.transmits and not subject.stochastic:
         yield "mode", _mode(subject, wo, wi)
+    yield "declared facts", _facts(subject, wo, wi, u)
 
 
 def _answers(
@@ -163,6 +164,45 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
         if np.ptp(ratio) > max(10.0 * same, 1e-3) * np.median(ratio):
             ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
             return f"radiance over power in transmission runs {ends}: one index, one factor"
+    return ""
+
+
+def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
+    """What it declares about itself is what it does: `transmits`, `two_sided`, `delta`, and a sample's eta."""
+    model = subject.model
+    # every pair of sides, whether it declares to answer there or not
+    sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))
+    o, i = (np.concatenate([w[:, :2], np.abs(w[:, 2:]) * sides[:, k, None]], 1) for k, w in enumerate((wo, wi)))
+    value = subject.eval(o, i).max(1)
+    drawn = subject.sample(o, u)
+    lit = (drawn.pdf > 0.0) & np.any(drawn.weight > 0.0, axis=1) & np.all(np.isfinite(drawn.wi), axis=1)
+    seen = value > SMALL * max(float(np.max(value, initial=0.0)), 1e-3)
+    across, sampled_across = o[:, 2] * i[:, 2] < 0.0, o[:, 2] * drawn.wi[:, 2] < 0.0
+    if not subject.transmits:
+        if np.any(seen & across) or np.any(lit & sampled_across):
+            return "light goes through, and `transmits` says that none does"
+        below = np.any(seen & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
+        declared = bool(getattr(model, "two_sided", True))
+        if below and not declared and subject.best == "float64":
+            return "it answers from below, and neither `transmits` nor `two_sided` says so"
+        if declared and subject.best == "float64" and 1 in subject.sides:
+            flip = np.array([1.0, 1.0, -1.0])
+            up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
+            over, under = subject.eval(*up), subject.eval(up[0] * flip, up[1] * flip)
+            off = np.abs(over - under).max(1)
+            if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
+                return "`two_sided` says that it looks from below as from above, and its values differ"
+    fact = getattr(model, "delta", "maybe")
+    if fact == "never" and np.any(lit & drawn.delta):
+        return 'delta samples, and `delta` says "never"'
+    if fact == "always" and (np.any(lit & ~drawn.delta) or seen.any()):
+        return 'light that is in no delta lobe, and `delta` says "always"'
+    if np.any(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))):
+        row = int(np.argmax(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))))
+        return f"a sample's eta is {drawn.eta[row]:.4g}: the index on wi's side over that on wo's expected"
+    wrong = lit & ~sampled_across & (np.abs(drawn.eta - 1.0) > 1e-6)
+    if wrong.any():
+        return f"a reflected sample's eta is {drawn.eta[int(np.argmax(wrong))]:.4g}, 1 expected"
     return ""
 
 

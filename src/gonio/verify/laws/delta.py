@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -219,9 +221,10 @@ def _back(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int
 def _fresnel(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
     """A material that names its index reflects as Fresnel's equations say, or Schlick's curve, times a constant."""
     index = _named_index(subject)
-    bends = power.through(wo) & (np.abs(power.eta - 1.0) > FLAT)  # a thin slab lets light through straight
-    if index is None or abs(index - 1.0) < FLAT or not bends.any():
-        return
+    through = power.through(wo)
+    bends = through & (np.abs(power.eta - 1.0) > FLAT)
+    if index is None or abs(index - 1.0) < FLAT or (through.any() and not bends.any()):
+        return  # a thin slab lets light through straight, and is another curve
     cos = np.abs(wo[:, 2])
     ratio = np.where(wo[:, 2] > 0.0, index, 1.0 / index)
     exact, schlick = _dielectric(cos, ratio), _schlick(cos, ratio)
@@ -325,10 +328,7 @@ def _slopes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: i
             continue
 
         def carried(shift: object, path: str = leaf.path) -> tuple[object, object]:
-            def moved(value: Any, shift: object = shift) -> Any:
-                return value + shift
-
-            bound = binding.shift(subject.model.bind(kind), path, moved)
+            bound = binding.shift(subject.model.bind(kind), path, functools.partial(operator.add, shift))
             s = guarded(subject.model, "sample", lambda: bound.sample(a, b, "radiance"))
             return kind.vec3(s[1]) * s[2], kind.bool(s[3]) & (s[2] > 0.0)
 
@@ -380,13 +380,18 @@ def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
     wo = directions.single(wo)
     count = min(effort.furnace_samples, 1 << 16)
     known = lobes.of(subject, wo, seed, precision="float32")
+    # where parameters make two lobes one, both together are met twice as often as each says
+    times = np.ones(known.pdf.shape)
+    if not effort.full:
+        times = np.maximum(np.round(known.share / np.maximum(known.pdf, 1e-3)), 1.0)
     trials = []
 
     def p_value(row: int, lobe: int, seed: int) -> float:
         u = directions.numbers(np.random.default_rng([seed, 21, row]), count)
         s = subject.sample(np.tile(wo[row], (count, 1)), u, precision="float32")
         mine = s.delta & (s.pdf > 0.0) & (np.abs(s.wi - known.wi[row, lobe]).max(1) < lobes.NEAR)
-        probability = float(known.pdf[row, lobe])
+        here = known.found[row] & (np.abs(known.wi[row] - known.wi[row, lobe]).max(1) < lobes.NEAR)
+        probability = float(np.sum(known.pdf[row] * times[row] * here))
         return statistics.binomial_two_sided(int(mine.sum()), count, min(max(probability, 0.0), 1.0))
 
     for row, lobe in np.argwhere(known.found):

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...energy.albedo import cubature
 from ...errors import InputError
+from ...models import BSDF
 from ...ops import Mode, backend
 from .. import directions, histogram, lobes, statistics
 from ..effort import Effort
@@ -57,6 +58,7 @@ class Energy(Law):
 
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, again))
+        self._known(subject, wo, value, error, finding)
         white = _white(subject)
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
@@ -64,6 +66,26 @@ class Energy(Law):
             finding.shown = f"gain {finding.figure:.4f}"
         finding.evidence = curves
         return finding
+
+    def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
+        """The closed form that a material gives of its albedo is what its values integrate to."""
+        if not isinstance(subject.model, BSDF) or subject.stochastic:
+            return
+
+        def inner(material: BSDF, mu: np.ndarray, phi: np.ndarray) -> np.ndarray | None:
+            return material.known_albedo(mu, phi, inner, None)
+
+        told = subject.model.known_albedo(wo[:, 2], np.arctan2(wo[:, 1], wo[:, 0]), inner, None)
+        if told is None:
+            return
+        off = np.abs(told - value).max(1) - error.max(1)
+        row = int(np.argmax(off))
+        if off[row] > GAIN:
+            theta = directions.angles(wo)[row, 0]
+            finding.problems.append(
+                f"known_albedo says {told[row].max():.5f} at {theta:.4g} degrees, the values integrate to "
+                f"{value[row].max():.5f}"
+            )
 
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves

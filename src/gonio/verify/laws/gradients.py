@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...models import BSDF, Parameter, binding, tree
 from ...ops import backend
 from ..effort import Effort
@@ -37,9 +38,12 @@ class Gradients(Law):
         wo, wi = pairs(subject, effort.pairs // 8, seed)
         worst, place, name, tried = -1.0, 0, "", []
         skipped = 0.0
+        problems: list[str] = []
         for label, parameter in _numeric(subject.model):
             exact, differences, smooth, least = _derivatives(subject.model, label, parameter, wo, wi)
             if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
+                if _steps(subject, label, parameter, wo, wi):
+                    problems.append(f"the derivative by {label} is 0 everywhere, and the values follow it in steps")
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
@@ -47,7 +51,7 @@ class Gradients(Law):
             row, size = worst_of(relative(exact, differences, 0.0, floor) * smooth[:, None])
             if size > worst:
                 worst, place, name = size, row, label
-        if not tried:
+        if not tried and not problems:
             raise DoesNotApply("no parameter changes a value")
         return Finding(
             figure=worst,
@@ -55,8 +59,24 @@ class Gradients(Law):
             reason="float64 differences are good to about 1e-6 here; edges, where two steps disagree, are left out",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
+            problems=problems,
             notes=[f"tried: {', '.join(tried)}; {skipped:.2%} of the pairs lie on edges"],
         )
+
+
+def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
+    """Whether a parameter without derivative changes nearly all values when it is moved by a third."""
+    value = tree.value_at(subject.model, path)
+    if parameter.kind not in ("float", "alpha") or np.ndim(value) or isinstance(value, tuple):
+        return False
+    moved = float(value) * 1.3 if float(value) * 1.3 <= parameter.high else float(value) * 0.7
+    try:
+        before, after = subject.eval(wo, wi), subject.replace(**{path: moved}).eval(wo, wi)
+    except InputError:
+        return False
+    lit = before.max(1) > 0.0
+    changed = np.abs(after - before).max(1) > 1e-3 * before.max(1)
+    return bool(lit.any() and np.mean(changed[lit]) > 0.9)
 
 
 def _numeric(model: BSDF) -> list[tuple[str, Parameter]]:

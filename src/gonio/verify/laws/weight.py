@@ -13,6 +13,7 @@ from .base import Law, pair_in_words, relative, rounding, worst_of
 
 EXACT = 1e-10
 SINGLE = 2e-3
+ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
 
 
 class Weight(Law):
@@ -58,18 +59,20 @@ class Weight(Law):
         for mode in modes:
             s = subject.sample(wo, u, mode, precision)
             _conventions(s, problems, precision)
-            density = (s.pdf > 0.0) & ~s.delta & np.all(np.isfinite(s.wi), axis=1)
+            unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-2  # no other direction can be asked for a value
+            s = s._replace(wi=np.where(unit[:, None], s.wi, [0.0, 0.0, 1.0]))
+            density = (s.pdf > 0.0) & ~s.delta & unit
             value = subject.eval(wo, s.wi, mode, precision)
             pdf = subject.pdf(wo, s.wi, precision)
-            delta = s.delta & (s.pdf > 0.0) & (np.abs(s.wi[:, 2]) > 0.1)
+            delta = s.delta & (s.pdf > 0.0) & (np.abs(s.wi[:, 2]) > 0.1) & unit
             if delta.any():
-                aside = s.wi[delta] + 0.01 * np.roll(s.wi[delta], 1, axis=1)
+                aside = s.wi[delta] + ASIDE * np.roll(s.wi[delta], 1, axis=1)
                 aside /= np.linalg.norm(aside, axis=1, keepdims=True)
                 peak = np.maximum(value[delta].max(1), pdf[delta])
                 beside = np.maximum(
                     subject.eval(wo[delta], aside, mode, precision).max(1), subject.pdf(wo[delta], aside, precision)
                 )
-                # a rough lobe beside it is as bright a hundredth of a radian away; the delta itself must not show
+                # a narrow lobe about it is as bright so close beside it; the delta itself must not show
                 alone = getattr(subject.model, "delta", "maybe") == "always"
                 if np.any(peak > (0.0 if alone else 1e-3 + 3.0 * beside)):
                     problems.append(f"{precision}: a delta sample's direction has a finite value or pdf")
