@@ -23,7 +23,26 @@ from .native import Native
 from .types import MitsubaBSDF, OfVariant, PluginDict
 
 # Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are read from the plugin as they are
+SMALLEST_ALPHA = 1e-3  # Mitsuba's pages: "smooth" below, and another plugin; its float32 code ends near here
 ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")
+
+
+# Ranges and defaults of the numbers among the properties of Mitsuba's own plugins, (default, low, high), from their
+# pages in Mitsuba's documentation (version 3.9, "BSDFs"). A property that is not here has no range that is known, and is
+# judged at the value that it has.
+_SHARE = (0.0, 0.0, 1.0)
+_PRINCIPLED = {"roughness": (0.5, 0.0, 1.0)} | dict.fromkeys(
+    ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness"), _SHARE
+)
+RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
+    "blendbsdf": {"weight": (0.5, 0.0, 1.0)},
+    "mask": {"opacity": (0.5, 0.0, 1.0)},
+    "principled": {**_PRINCIPLED, "metallic": _SHARE, "clearcoat": _SHARE, "clearcoat_gloss": _SHARE},
+    "principledthin": {**_PRINCIPLED, "diff_trans": (0.0, 0.0, 2.0)},
+    "roughconductor": {"alpha": (0.1, 0.0, 1.0)},
+    "roughdielectric": {"alpha": (0.1, 0.0, 1.0)},
+    "roughplastic": {"alpha": (0.1, 0.0, 1.0)},
+}
 
 
 class _Described(Native):
@@ -48,12 +67,18 @@ def load(description: PluginDict) -> Native:
     """The BSDF of a dictionary as `mi.load_dict` takes it; InputError where Mitsuba refuses it."""
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
-    for name, value in {**_colours(_built(description)), **description}.items():
+    known = RANGES.get(kind, {})
+    if any(name.startswith("alpha_") for name in description):
+        known = {name: ends for name, ends in known.items() if name != "alpha"}  # one width, or two
+    given = {**{name: ends[0] for name, ends in known.items()}, **_colours(_built(description)), **description}
+    for name, value in given.items():
         if name in ALBEDOS and isinstance(value, int | float | tuple):
-            fields[name] = spectrum(value, "a property of the plugin", low=0.0, high=1.0)
+            low, high = (0.0, 1.0) if kind in _NESTS else (-np.inf, np.inf)
+            fields[name] = spectrum(value, "a property of the plugin", low=low, high=high)
         elif isinstance(value, int | float) and not isinstance(value, bool):
-            # widths of 0 are refused or are another plugin
-            low, high = (0.0, 1.0) if name.startswith("alpha") else (-np.inf, np.inf)
+            _, low, high = known.get(name, (0.0, -np.inf, np.inf))
+            if name.startswith("alpha") and kind in _NESTS:
+                low, high = SMALLEST_ALPHA, 1.0
             fields[name] = number(value, "a property of the plugin", low=low, high=high)
     space = {**fields, "description": description, "__annotations__": dict.fromkeys(fields, "object")}
     return type(f"Mitsuba{kind.title()}", (_Described,), space)()

@@ -178,8 +178,9 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
     """
     found: list[tuple[float, dict[str, Any]]] = []
     for axis in along:
-        share = np.linspace(0.0, 1.0, SCAN)
-        values = np.asarray(axis.at(share), float)
+        # not from 0 where the steps are in ratio: the first is of another size than all others
+        first = 1.0 / SCAN if axis.ratio and axis.low <= 0.0 else 0.0
+        values = np.asarray(axis.at(np.linspace(first, 1.0, SCAN)), float)
         try:
             curves = _curves(subject, axis.path, values, seed)
         except (Fault, InputError):
@@ -199,17 +200,15 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
 def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
     """Sizes of the jumps of curves (SCAN, N) along the first axis, and the value behind each.
 
-    The median over the N curves of the absolute step in their logarithm, so that a factor over all directions shows
-    however small it is, and the largest tenth, so that one that a few directions have does.
+    The median over the N curves of the bend relative to the value, so that a factor over all directions shows however
+    small it is, and the largest tenth, so that one that a few directions have does. What is linear has no bend.
     """
     least = 1e-6 * float(np.max(np.abs(curve), initial=0.0, where=np.isfinite(curve)))
     if least <= 0.0:
         return []
-    lit = np.abs(curve) > least
-    logs = np.log(np.maximum(np.abs(curve), least))
-    step = np.where(lit[1:] & lit[:-1], np.diff(logs, axis=0), 0.0)
-    # a smooth curve's steps follow from their neighbours: what does not is a jump or a kink
-    bend = np.abs(np.diff(step, axis=0))
+    size_of = np.maximum(np.maximum(np.abs(curve[:-2]), np.abs(curve[2:])), np.abs(curve[1:-1]))
+    lit = np.minimum(np.abs(curve[:-2]), np.abs(curve[2:])) > least
+    bend = np.where(lit, np.abs(curve[2:] - 2.0 * curve[1:-1] + curve[:-2]) / np.maximum(size_of, least), 0.0)
     found = []
     for share in (50.0, 90.0):
         size = np.percentile(bend, share, axis=1)
