@@ -50,9 +50,10 @@ class Place:
     def inside(self) -> Place:
         """The point moved in from the ends of the ranges, where values may be clamped and slopes break off."""
         moved = {}
-        for axis in axes(self.subject):
+        for number, axis in enumerate(axes(self.subject)):
             value = tree.value_at(self.subject.model, axis.path)
-            margin = MARGIN * (axis.high - axis.low)
+            # not all by the same: eta = k is a place where a conductor's formula has a kink
+            margin = MARGIN * (1.0 + 0.1 * number) * (axis.high - axis.low)
             if axis.path in self.values:
                 moved[axis.path] = float(np.clip(self.values[axis.path], axis.low + margin, axis.high - margin))
             elif np.ndim(value) == 0 and not isinstance(value, tuple | list) and value == axis.high:

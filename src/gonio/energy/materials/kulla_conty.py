@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
+import numpy as np
+
 from ...models import Breach, choice, method
-from ...ops import Direction, Mode, Scalar, Spectrum, abs, function
+from ...ops import Direction, Mode, Scalar, Spectrum, abs, backend, function
 from ...optics.fresnel.artist import AVERAGES
 from ..compensation.lobe import MissingEnergy
 from ..compensation.missing import missing_energy
@@ -39,6 +41,16 @@ def returned(lost: MissingEnergy, color: str) -> Spectrum:
     return (f_add * F_avg if color == "bounce" else f_add) * lost.factor
 
 
+def _off(model: KullaConty) -> float:
+    """How far a white furnace is off at most: measured over 21 indices from .2 to 5, eight widths and 18 views. Within
+    6 % of the same index on both sides the lobe is narrower than the table's steps."""
+    if not model.base.transmits:
+        return 0.008 if model.two_widths else 0.0
+    surface = model.base.microsurface
+    near = surface is not None and not backend.is_drjit(surface.eta) and np.any(np.abs(np.log(surface.eta)) < 0.06)
+    return 0.02 if near else 0.007
+
+
 class KullaConty(_Compensated):
     """f_base + f_add f_ms: the light that single scattering forgets, given back as a broad lobe (Kulla2017).
 
@@ -67,7 +79,7 @@ class KullaConty(_Compensated):
         ),
         "energy": Breach(
             "tables of rough glass, and of two widths, are met to so much (benchmarks/energy.py)",
-            lambda model: 0.007 if model.base.transmits else 0.008 if model.two_widths else 0.0,
+            _off,
             certain=False,
         ),
     }

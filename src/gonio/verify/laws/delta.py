@@ -383,7 +383,8 @@ def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
     # where parameters make two lobes one, both together are met twice as often as each says
     times = np.ones(known.pdf.shape)
     if not effort.full:
-        times = np.maximum(np.round(known.share / np.maximum(known.pdf, 1e-3)), 1.0)
+        times = np.where(known.share > 0.05, np.round(known.share / np.maximum(known.pdf, 0.01)), 1.0)
+        times = np.maximum(times, 1.0)
     trials = []
 
     def p_value(row: int, lobe: int, seed: int) -> float:

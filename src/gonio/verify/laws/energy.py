@@ -142,7 +142,8 @@ def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarr
     carried = seen.carried
     if not full and carried.size:
         # where parameters make two lobes one, each says its own probability and both together are met twice as often
-        carried = carried * np.maximum(np.round(seen.share / np.maximum(seen.pdf, 1e-3)), 1.0)[..., None]
+        often = np.where(seen.share > 0.05, np.round(seen.share / np.maximum(seen.pdf, 0.01)), 1.0)
+        carried = carried * np.maximum(often, 1.0)[..., None]
     return np.sum(carried * seen.found[..., None], axis=1)
 
 
