@@ -10,12 +10,7 @@ from .simplify import Kind, Record, Routine, Value, check_single, stem_of
 from .source import module_constant
 from .syntax import literal
 
-CONSTANTS = {
-    "PI": math.pi,
-    "TWO_PI": 2.0 * math.pi,
-    "INV_PI": 1.0 / math.pi,
-    "INV_TWO_PI": 0.5 / math.pi,
-}
+CONSTANTS = {"PI": math.pi, "TWO_PI": 2.0 * math.pi, "INV_PI": 1.0 / math.pi, "INV_TWO_PI": 0.5 / math.pi}
 
 
 class Names:

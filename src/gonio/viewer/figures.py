@@ -21,15 +21,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".pdf", ".svg")
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
 CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of even weight on white
-PALETTE = (
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#cc79a7",
-    "#a6761d",
-    "#56b4e9",
-    "#1d2530",
-)  # for the colour-blind too
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a6761d", "#56b4e9", "#1d2530")  # for the colour-blind too
 DASHES = (0, (4, 2))
 STYLE: Any = {  # Matplotlib types its keys one by one
     "font.family": "sans-serif",

@@ -340,10 +340,7 @@ class Mesh(ShapePart):
     """Texture coordinates are taken as they stand, v = 0 is the top of a texture; without normals it is faceted."""
 
 
-Shape = Annotated[
-    Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh,
-    Field(discriminator="type"),
-]
+Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh, Field(discriminator="type")]
 
 
 class AreaLight(Part):
