@@ -18,7 +18,8 @@ from typing import Protocol, TypeVar, overload
 from . import graph
 from .backend import drjit, get_precision, is_drjit, set_precision, types_like
 from .graph import Graph, Node, RecordingError, record
-from .table import Table, inset, lookup
+from .interpolation import inset, lookup
+from .table import Table
 from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Value, Vector, Vector3
 
 __all__ = [
