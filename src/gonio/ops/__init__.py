@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar, overload
 
 from . import graph
-from .backend import drjit, get_precision, is_drjit, set_precision, types_like
+from .backend import drjit, get_precision, in_formula, is_drjit, set_precision, types_like
 from .graph import Graph, Node, RecordingError, record
 from .interpolation import inset, lookup
 from .table import Table
@@ -115,13 +115,14 @@ def where(mask: Mask | bool, a: Scalar | float, b: Scalar | float) -> Scalar: ..
 @overload
 def where(mask: Mask | bool, a: Mask, b: Mask) -> Mask: ...
 def where(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where `mask` holds, else `b`; both are computed."""
+    """`a` where `mask` holds, else `b`; both are computed. Plain numbers are as exact as the formula's values."""
     if isinstance(mask, Node) or isinstance(a, Node) or isinstance(b, Node):
         if isinstance(mask, bool):
             return a if mask else b
         return graph.emit("where", graph.widest(a, b), mask, a, b)
     if is_drjit(mask):
-        return drjit().select(mask, a, b)
+        plain = type(a) in (int, float) and type(b) in (int, float) and float in (type(a), type(b))
+        return drjit().select(mask, in_formula(a) if plain else a, b)
     return a if mask else b
 
 
