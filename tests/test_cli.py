@@ -355,6 +355,13 @@ def test_settings_are_shared_by_the_materials_that_have_them(
     assert "give ward.py:CLASS" in failure(capsys, "plot", "ward.py")
 
 
+def test_plots_of_classes_of_one_name_get_files_of_their_own() -> None:
+    from gonio.cli.verbs.plot import _file_name
+
+    heads = ("conductor", "ward.py:Ward", "mine/velvet.py:Ward", "gloss.py:Ward")
+    assert [*map(_file_name, heads)] == ["conductor", "ward", "velvet-ward", "gloss-ward"]
+
+
 def test_a_new_material_works_and_its_test_passes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -59,28 +59,7 @@ if TYPE_CHECKING:
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
     from .members import register
-    from .models import (
-        BSDF,
-        Angle,
-        Breach,
-        Colour,
-        Number,
-        Parameter,
-        Preset,
-        Sample,
-        Width,
-        angle,
-        bsdf,
-        choice,
-        flag,
-        method,
-        model,
-        models,
-        never,
-        number,
-        spectrum,
-        width,
-    )
+    from .models import BSDF, Breach, Parameter, Preset, Sample, method, model, models, never
     from .models.blinn_phong import BlinnPhong
     from .models.conductor import Conductor
     from .models.dielectric import Dielectric
@@ -89,6 +68,7 @@ if TYPE_CHECKING:
     from .models.mix import Mix
     from .models.mix import Mix as mix
     from .models.oren_nayar import OrenNayar
+    from .models.parameters import Angle, Colour, Number, Width, angle, bsdf, choice, flag, number, spectrum, width
     from .models.phong import Phong
     from .models.two_sided import TwoSided
     from .models.two_sided import TwoSided as two_sided

@@ -55,11 +55,8 @@ class Family(Generic[Member]):
     def all(self) -> dict[str, Member]:
         """Every member by name, in alphabetical order."""
         if self._found is None:
-            found: dict[str, Member] = {}
-            for folder in self._folders() if callable(self._folders) else self._folders:
-                for name, member in self._in_package(folder):
-                    found[name] = member
-            self._found = found
+            folders = self._folders() if callable(self._folders) else self._folders
+            self._found = dict(pair for folder in folders for pair in self._in_package(folder))
             for point in _entry_points(self.group):
                 self._announced(point)
         return dict(sorted({**self._found, **self._added}.items()))

@@ -144,3 +144,24 @@ def test_a_graph_is_printed_a_value_a_line() -> None:
         "return %5",
     ]
     assert graph._repr_html_().startswith("<pre>&lt;lambda&gt;(")
+
+
+class Half(go.BSDF):
+    """Half a white surface, chosen from two plain numbers."""
+
+    albedo: Any = go.spectrum(1.0, "share of light that is reflected", high=1.0)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        """1 / (2 pi) above."""
+        return self.albedo * ops.where(wi.z > 0.0, 0.5 / ops.pi, 0.0)
+
+
+def test_a_choice_between_plain_numbers_is_as_exact_as_the_formula() -> None:
+    up = np.array([[0.0, 0.0, 1.0]])
+    types = ops.backend.types("float64")
+    on_bound = Half().bind(types).eval(*[ops.backend.vector_of(up, 3, types)] * 2)
+    for value in (Half().eval(up, up, precision="float64"), ops.backend.to_numpy(on_bound, 1)):
+        assert value.dtype == np.float64
+        assert np.all(np.abs(value - 0.5 / np.pi) <= 1e-16)
+    assert Half().eval(up, up).dtype == np.float32
+    assert go.Mix(a=Half(), b=Half()).eval(up, up, precision="float64")[0, 0] == 0.5 / np.pi

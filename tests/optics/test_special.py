@@ -163,7 +163,7 @@ def test_schlicks_masking_has_the_homeworks_k() -> None:
 
 def test_metals_have_their_colours() -> None:
     def colour(name: str) -> np.ndarray:
-        metal = indices.metal(name)
+        metal = go.Conductor.preset(name)
         return np.array(
             [((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k) for n, k in zip(metal.eta, metal.k, strict=True)]
         )
@@ -180,10 +180,11 @@ def test_metals_have_their_colours() -> None:
 def test_every_index_names_its_source_and_is_found_by_symbol_or_name() -> None:
     for symbol, metal in indices.METALS.items():
         assert metal.source and len(metal.eta) == len(metal.k) == 3
-        assert indices.metal(symbol.lower()) is indices.metal(metal.name) is metal
-    assert indices.medium("Water").eta == pytest.approx(1.333)
+        gold = [go.Conductor.preset(called) for called in (symbol.lower(), metal.name)]
+        assert all((c.eta, c.k) == (metal.eta, metal.k) for c in gold)
+    assert go.Dielectric.preset("Water").eta == pytest.approx(1.333)
     with pytest.raises(InputError, match="unknown metal 'goldd'"):
-        indices.metal("goldd")
+        go.Conductor.preset("goldd")
     with pytest.raises(InputError, match="did you mean 'gold'"):
         go.Conductor.preset("goldd")
     with pytest.raises(InputError, match="did you mean 'water'"):

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from ..render.run import Request
 
 Model = Annotated[
-    str,
-    Argument(metavar="MODEL", help="A material's name; see `gonio models`.", autocompletion=completion.materials),
+    str, Argument(metavar="MODEL", help="A material's name; see `gonio models`.", autocompletion=completion.materials)
 ]
 Parameters = Annotated[list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")]
 SceneFile = Annotated[
@@ -37,8 +36,7 @@ class Material:
 
     param: Parameters = None
     preset: Annotated[
-        str,
-        Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets),
+        str, Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets)
     ] = ""
 
     def texts(self, models: Sequence[str]) -> list[str]:

@@ -193,7 +193,7 @@ def _struct(record: Record, names: Names) -> list[str]:
         fields = [(names.language.type("float"), "nothing")]
     lines = names.language.struct(names.language.word(record.name), fields)
     for place, (name, _) in zip(range(len(lines) - 2, 0, -1), reversed(record.fields), strict=False):
-        about = record.docs.get(name) or (_term_doc(name) if record.name.endswith("Terms") else "")
+        about = record.docs.get(name) or (TERMS.get(name, "") if record.name.endswith("Terms") else "")
         if about and len(lines[place]) + len(about) + 5 <= COLUMNS + 10:
             lines[place] += f"  // {about}"
         elif about:
@@ -241,7 +241,7 @@ def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str
         },
         "functions": {method: names.routines[routine] for method, routine in made.entries.items()},
         "terms": [
-            {"name": name, "type": type_, "doc": _term_doc(name)}
+            {"name": name, "type": type_, "doc": TERMS.get(name, "")}
             for name, type_ in (terms.record.fields if terms and terms.record else [])
         ],
         "parameters": list(_parameters(model, set(struct.paths))),
@@ -281,10 +281,6 @@ TERMS = {
     "single": "light scattered once: the base alone, times |cos theta_i|",
     "multi": "what is added for light scattered more than once, times |cos theta_i|",
 }
-
-
-def _term_doc(name: str) -> str:
-    return TERMS.get(name, "")
 
 
 def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:

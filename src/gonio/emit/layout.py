@@ -6,37 +6,25 @@ INDENT = "    "
 COLUMNS = 100
 
 
-def comment(doc: str, indent: str = "") -> list[str]:
+def comment(doc: str) -> list[str]:
     """A docstring as a comment."""
-    return [f"{indent}// {line}".rstrip() for line in doc.strip().splitlines()]
+    return [f"// {line}".rstrip() for line in doc.strip().splitlines()]
 
 
-def wrap(line: str, indent: str) -> list[str]:
-    """A statement in lines of at most `COLUMNS` characters, broken where the least is torn apart."""
+def wrap(line: str, indent: str, hang: str = INDENT) -> list[str]:
+    """A statement in lines of at most `COLUMNS` characters, broken where the least is torn apart.
+
+    hang  what all lines but the first are indented by besides
+    """
     text = indent + line
-    if len(text) <= COLUMNS:
-        return [text]
-    cut = _break(text, COLUMNS)
-    if cut is None:
-        return [text]
-    first, rest = text[:cut].rstrip(), text[cut:].lstrip()
-    return [first, *_continued(rest, indent + INDENT)]
+    cut = _break(text) if len(text) > COLUMNS else None
+    return [text] if cut is None else [text[:cut].rstrip(), *wrap(text[cut:].lstrip(), indent + hang, "")]
 
 
-def _continued(rest: str, indent: str) -> list[str]:
-    text = indent + rest
-    if len(text) <= COLUMNS:
-        return [text]
-    cut = _break(text, COLUMNS)
-    if cut is None:
-        return [text]
-    return [text[:cut].rstrip(), *_continued(text[cut:].lstrip(), indent)]
-
-
-def _break(text: str, limit: int) -> int | None:
-    """Where to break: at the shallowest operator or comma before the limit, the last of those."""
+def _break(text: str) -> int | None:
+    """Where to break: at the shallowest operator or comma before the last column, the last of those."""
     depth, best = 0, None
-    for i, c in enumerate(text[: limit + 1]):
+    for i, c in enumerate(text[: COLUMNS + 1]):
         if c in "([{":
             depth += 1
         elif c in ")]}":
@@ -44,7 +32,7 @@ def _break(text: str, limit: int) -> int | None:
         if i < len(text) - len(text.lstrip()) + 8:
             continue
         place_ = None
-        if c == "," and i < limit:
+        if c == "," and i < COLUMNS:
             place_ = i + 1
         elif c == " " and text[i + 1 : i + 3] in ("+ ", "- ", "? ", ": ", "* ", "/ ", "&&", "||"):
             place_ = i

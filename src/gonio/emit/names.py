@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 
+from ..ops.graph import first_free
 from .languages import Language
 from .program import Program
 from .simplify import Kind, Record, Routine, Value, check_single, stem_of
 from .source import module_constant
 from .syntax import literal
 
-CONSTANTS = {
-    "PI": math.pi,
-    "TWO_PI": 2.0 * math.pi,
-    "INV_PI": 1.0 / math.pi,
-    "INV_TWO_PI": 0.5 / math.pi,
-}
+CONSTANTS = {"PI": math.pi, "TWO_PI": 2.0 * math.pi, "INV_PI": 1.0 / math.pi, "INV_TWO_PI": 0.5 / math.pi}
 
 
 class Names:
@@ -50,11 +46,7 @@ class Names:
             if self.signatures.setdefault((name, types), routine) is routine and self._same_doc(name, routine):
                 return name
         name = self._told_apart(name, routine) if name in taken else name
-        found, number = name, 1
-        while found in taken:
-            number += 1
-            found = f"{name}_{number}"
-        return found
+        return first_free(name, taken)
 
     def _told_apart(self, name: str, routine: Routine) -> str:
         """The name with what a copy was recorded for, where that is a flag or a word: "masking_shadowing_transmits"."""

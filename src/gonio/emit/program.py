@@ -70,7 +70,7 @@ class Program:
         fields = tuple(field_list(value))
         key = (type(value).__name__, fields)
         if key not in self._parameters:
-            name = _free(type(value).__name__, [s.record.name for s in self._parameters.values()])
+            name = graph.first_free(type(value).__name__, [s.record.name for s in self._parameters.values()])
             doc = (type(value).__doc__ or "").strip().splitlines()[0]
             self._parameters[key] = Struct(name, list(fields), doc, dict(parameter_docs(value)))
         return self._parameters[key]
@@ -99,7 +99,7 @@ class Program:
         for key, paths in used.items():
             fields = [(path, type_) for path, type_ in key if path in paths]
             if fields and key in owner:
-                name = _free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
+                name = graph.first_free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
                 by = f"{type(self.model).__name__}_derive"
                 doc = f"What follows from the parameters alone: {by} computes it, once a draw."
                 self._derived[key] = Struct(name, fields, doc)
@@ -169,10 +169,7 @@ def _record(bound: BSDF, functions: tuple[str, ...]) -> graph.Graph:
         """The driver of a recording; no part of the shader."""
         if any(inner.derives for _, inner in tree.walk(self)):
             self = settle(self, derive(self))
-        results = []
-        for method in functions:
-            results.append(getattr(self, method)(wo, u if method == "sample" else wi))
-        return tuple(results)
+        return tuple(getattr(self, method)(wo, u if method == "sample" else wi) for method in functions)
 
     into = graph.Graph(POLYFILLS, single=True)
     return ops.record(every, types={"wo": "vec3", "wi": "vec3", "u": "vec3"}, name="every", into=into, self=bound)
@@ -255,14 +252,6 @@ def listed(doc: str) -> Iterator[tuple[str, str]]:
             said += " " + line.strip()
     if name:
         yield name, said
-
-
-def _free(name: str, taken: list[str]) -> str:
-    found, count = name, 1
-    while found in taken:
-        count += 1
-        found = f"{name}_{count}"
-    return found
 
 
 def check(model: object, functions: str | Sequence[str], where: str) -> tuple[str, ...]:

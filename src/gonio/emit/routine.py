@@ -7,7 +7,7 @@ import re
 from .layout import INDENT, comment, common_head, wrap
 from .names import Names
 from .program import Struct, flat, place
-from .simplify import Routine, Value, needed, stem_of
+from .simplify import ELEMENTWISE, Routine, Value, needed, stem_of
 from .source import returned_by
 from .syntax import AND, ATOM, CHOICE, OPERATORS, OR, SIGN, SUM
 
@@ -15,6 +15,7 @@ INLINE = 88  # characters: a longer part of an expression gets a line of its own
 
 # what is there already, and only picked: never worth a line of its own
 SELECTED = ("parameter", "constant", "component", "swizzle", "element")
+COMPUTED = ELEMENTWISE | {"call", "where", "texel"}  # worth a line where a component of it is picked
 
 
 class RoutineWriter:
@@ -153,19 +154,7 @@ class RoutineWriter:
         for value in values:
             sizes[value.order] = _size(value, sizes)
             if value.op in SELECTED:
-                if value.op in ("component", "swizzle") and value.args[0].op in (
-                    "call",
-                    "where",
-                    "add",
-                    "sub",
-                    "mul",
-                    "div",
-                    "minimum",
-                    "maximum",
-                    "neg",
-                    "abs",
-                    "texel",
-                ):
+                if value.op in ("component", "swizzle") and value.args[0].op in COMPUTED:
                     self.named.add(value.args[0].order)
                 if value.op == "element":
                     self.named.add(value.args[0].order)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -413,39 +412,17 @@ def _key(static: Static) -> object:
     return (type(static).__name__, static if isinstance(static, bool | int | str | None) else id(static))
 
 
-_FOLD: dict[str, Callable] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "sqrt": math.sqrt,
-    "exp": math.exp,
-    "log": math.log,
-    "sin": math.sin,
-    "cos": math.cos,
-    "abs": abs,
-    "floor": math.floor,
-    "minimum": min,
-    "maximum": max,
-    "lt": lambda a, b: a < b,
-    "le": lambda a, b: a <= b,
-    "gt": lambda a, b: a > b,
-    "ge": lambda a, b: a >= b,
-    "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b,
-    "and": lambda a, b: a and b,
-    "or": lambda a, b: a or b,
-    "not": lambda a: not a,
-}
+# what is computed here where all arguments are numbers
+_FOLD = COMPARE | LOGIC | ELEMENTWISE | {"sqrt", "exp", "log", "sin", "cos", "floor"}
 
 
 def _compute(op: str, numbers: list) -> Static:
     if op not in _FOLD:
         return None
     try:
-        return _FOLD[op](*numbers)
-    except (ValueError, ZeroDivisionError, OverflowError):  # left for the shader, as the source has it
+        with np.errstate(all="raise", under="ignore"):
+            return graph.NUMPY[op](*numbers)
+    except FloatingPointError:  # left for the shader, as the source has it
         return None
 
 

@@ -23,7 +23,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import GonioWarning
+from .. import files
+from ..errors import GonioError, GonioWarning
 from ..members import Family
 from ..optics.fresnel import Fresnel
 from ..optics.masking import Masking
@@ -65,12 +66,15 @@ def _formulas() -> str:
         if known == state and len(hashed) == 64:
             return hashed
     hashed = hashlib.sha256("\n".join(_meaning(p.read_text(encoding="utf-8")) for p in files).encode()).hexdigest()
-    with contextlib.suppress(OSError):  # a read-only home costs time, not correctness
-        note.parent.mkdir(parents=True, exist_ok=True)
-        part = note.with_name(f".{note.name}.{os.getpid()}.part")
-        part.write_text(f"{state} {hashed}")
-        os.replace(part, note)
+    _store(note, f"{state} {hashed}".encode())
     return hashed
+
+
+def _store(path: Path, content: bytes) -> None:
+    """Write a file of the cache where that can be done: a read-only home costs time, not correctness."""
+    with contextlib.suppress(OSError, GonioError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.write_whole(path, content)
 
 
 def _meaning(source: str) -> str:
@@ -129,16 +133,7 @@ def keep(key: tuple, build: Callable[[], Kept], write: Callable[[Kept], bytes], 
         except ValueError as error:
             warnings.warn(f"{path}: {error}; it is built again", GonioWarning, stacklevel=3)
     made = build()
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(write(made))
-        os.replace(part, path)
-    except OSError:
-        pass  # a read-only home costs time, not correctness
-    finally:
-        if part.exists():
-            part.unlink(missing_ok=True)
+    _store(path, write(made))
     return made
 
 

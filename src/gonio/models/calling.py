@@ -100,12 +100,13 @@ def method(formula: Callable[..., object], /) -> object:
     ) -> object:
         args = (mode,) if takes_mode else ()
         if self.is_bound:
-            return inner(self, wo, other, *args)
+            with backend.formula_of(wo):
+                return inner(self, wo, other, *args)
         if mode not in MODES:
             raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{formula.__name__}", " or ".join(MODES))
         if backend.is_drjit(wo):
-            return inner(binding.bind_to(self, backend.types_like(type(wo))), wo, other, *args)
-        return _on_numpy(self, formula.__name__, inner, wo, other, args, precision)
+            return enter(binding.bind_to(self, backend.types_like(type(wo))), wo, other, mode)
+        return _on_numpy(self, formula.__name__, enter, wo, other, mode, precision)
 
     return enter
 
@@ -128,10 +129,10 @@ if TYPE_CHECKING:
 def _on_numpy(
     material: Material,
     name: str,
-    inner: Callable[..., object],
+    enter: Callable[..., object],
     wo: Given,
     other: Given,
-    args: tuple[Mode, ...],
+    mode: Mode,
     precision: Precision | None,
 ) -> object:
     types = backend.types(precision)
@@ -140,7 +141,7 @@ def _on_numpy(
     if count == 0:  # Dr.Jit joins no array of no entries with one of one entry
         first = second = np.array([0.0, 0.0, 1.0])
     bound = binding.bind_to(material, types)
-    result = inner(bound, backend.vector_of(first, 3, types), backend.vector_of(second, 3, types), *args)
+    result = enter(bound, backend.vector_of(first, 3, types), backend.vector_of(second, 3, types), mode)
 
     def out(value: object) -> np.ndarray:
         return backend.to_numpy(value, count) if count else backend.to_numpy(value, 1)[:0]

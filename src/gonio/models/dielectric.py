@@ -8,24 +8,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ops import (
-    Direction,
-    Mask,
-    Mode,
-    Pair,
-    Scalar,
-    Spectrum,
-    abs,
-    backend,
-    dot,
-    fma,
-    function,
-    maximum,
-    rsqrt,
-    safe_div,
-    sqr,
-    where,
-)
+from ..ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
+from ..ops.types import Direction, Mask, Mode, Pair, Scalar, Spectrum
 from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet

@@ -32,15 +32,7 @@ from ..ops import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, back
 from ..optics import warp
 from . import binding, recording, tree
 from .calling import V3, Given, method
-from .parameters import (
-    Floats,
-    Material,
-    Parameter,
-    Value,
-    bsdf,
-    declared,
-    pair_of,
-)
+from .parameters import Floats, Material, Parameter, Value, bsdf, declared, pair_of
 from .sample import Sample
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
@@ -366,13 +358,7 @@ def _folders() -> list[str]:
     return [__package__ or "", *sorted(rooms)]
 
 
-BSDF.family = Family(
-    "material",
-    "gonio.models",
-    _folders,
-    subclasses_of(BSDF),
-    where="model",
-)
+BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), where="model")
 
 
 def never(like: Scalar) -> Mask:

@@ -35,7 +35,7 @@ class OrenNayar(BSDF):
             "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
             certain=False,  # below sigma = 0.04 it is under a thousandth
-        ),
+        )
     }
 
     @function

@@ -237,12 +237,7 @@ def _recorded(material: BSDF, formula: str, path: Path) -> bool:
     return True
 
 
-KINDS = {
-    "eval": ("spectrum", "vec3"),
-    "weight": ("spectrum", "vec3"),
-    "pdf": ("float",),
-    "wi": ("vec3",),
-}
+KINDS = {"eval": ("spectrum", "vec3"), "weight": ("spectrum", "vec3"), "pdf": ("float",), "wi": ("vec3",)}
 
 
 def _run(material: BSDF, formula: str, path: Path) -> None:

@@ -323,12 +323,7 @@ def _declare(kind: type[Parameter], default: object, doc: str, **more: object) -
 
 
 def number(
-    default: PlainNumber | None = None,
-    doc: str = "",
-    *,
-    low: float = -math.inf,
-    high: float = math.inf,
-    unit: str = "",
+    default: PlainNumber | None = None, doc: str = "", *, low: float = -math.inf, high: float = math.inf, unit: str = ""
 ) -> Number:
     """Declare a number with its closed range and unit."""
     return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit)

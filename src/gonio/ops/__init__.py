@@ -16,70 +16,19 @@ from collections.abc import Callable
 from typing import Protocol, TypeVar, overload
 
 from . import graph
-from .backend import (
-    drjit,
-    get_precision,
-    is_drjit,
-    set_precision,
-    types_like,
-)
+from .backend import drjit, get_precision, in_formula, is_drjit, set_precision, types_like
 from .graph import Graph, Node, RecordingError, record
-from .table import Table, inset, lookup
+from .interpolation import inset, lookup
+from .table import Table
 from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Value, Vector, Vector3
 
 __all__ = [
-    "Direction",
-    "Graph",
-    "Mask",
-    "Mode",
-    "Node",
-    "Pair",
-    "Precision",
-    "RecordingError",
-    "Scalar",
-    "Spectrum",
-    "Table",
-    "Vector",
-    "Vector3",
-    "abs",
-    "atan2",
-    "clamp",
-    "copysign",
-    "cos",
-    "dot",
-    "erf",
-    "exp",
-    "floor",
-    "fma",
-    "function",
-    "get_precision",
-    "inset",
-    "is_short",
-    "is_single",
-    "isfinite",
-    "log",
-    "lookup",
-    "max_component",
-    "maximum",
-    "mean",
-    "minimum",
-    "norm",
-    "normalize",
-    "pi",
-    "pow",
-    "record",
-    "rsqrt",
-    "safe_div",
-    "safe_sqrt",
-    "set_precision",
-    "sin",
-    "sincos",
-    "sqr",
-    "sqrt",
-    "vec2",
-    "vec3",
-    "where",
-]
+    "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum",
+    "Table", "Vector", "Vector3", "abs", "atan2", "clamp", "copysign", "cos", "dot", "erf", "exp", "floor", "fma",
+    "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log", "lookup", "max_component",
+    "maximum", "mean", "minimum", "norm", "normalize", "pi", "pow", "record", "rsqrt", "safe_div", "safe_sqrt",
+    "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3", "where",
+]  # fmt: skip
 
 pi = math.pi
 inv_pi = 1.0 / math.pi
@@ -166,13 +115,14 @@ def where(mask: Mask | bool, a: Scalar | float, b: Scalar | float) -> Scalar: ..
 @overload
 def where(mask: Mask | bool, a: Mask, b: Mask) -> Mask: ...
 def where(mask: Value, a: Value, b: Value) -> Value:
-    """`a` where `mask` holds, else `b`; both are computed."""
+    """`a` where `mask` holds, else `b`; both are computed. Plain numbers are as exact as the formula's values."""
     if isinstance(mask, Node) or isinstance(a, Node) or isinstance(b, Node):
         if isinstance(mask, bool):
             return a if mask else b
         return graph.emit("where", graph.widest(a, b), mask, a, b)
     if is_drjit(mask):
-        return drjit().select(mask, a, b)
+        plain = type(a) in (int, float) and type(b) in (int, float) and float in (type(a), type(b))
+        return drjit().select(mask, in_formula(a) if plain else a, b)
     return a if mask else b
 
 

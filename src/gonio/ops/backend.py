@@ -5,7 +5,10 @@ Dr.Jit starts here and nowhere else outside `render`.
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
+from contextvars import ContextVar
 from functools import lru_cache
 from types import ModuleType
 from typing import NamedTuple, TypeAlias, TypeGuard, get_args
@@ -90,6 +93,25 @@ def is_drjit(value: object) -> TypeGuard[Array]:
     """Whether a value is a Dr.Jit array (asked without loading Dr.Jit)."""
     dr = sys.modules.get("drjit")
     return dr is not None and dr.is_array_v(value)
+
+
+_formula: ContextVar[type | None] = ContextVar("formula", default=None)  # type of the directions it runs on
+
+
+@contextlib.contextmanager
+def formula_of(directions: object) -> Iterator[None]:
+    """A formula runs on these directions meanwhile."""
+    before = _formula.set(type(directions))
+    try:
+        yield
+    finally:
+        _formula.reset(before)
+
+
+def in_formula(number: float) -> Array:
+    """A plain number with as many bits as the formula that is running has; itself where none is."""
+    kind = _formula.get()
+    return number if kind is None or not drjit().is_array_v(kind) else types_like(kind).float(number)
 
 
 def float_of(value: object, kind: Types) -> Array:

@@ -13,12 +13,12 @@ others. A spectrum has as many channels as whoever evaluates the graph gives it.
 
 from __future__ import annotations
 
-import functools
 import html
 import inspect
+import itertools
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from pathlib import Path
 from types import FrameType
 from typing import Protocol, TypeAlias, runtime_checkable
@@ -26,7 +26,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from ..errors import GonioError
-from .interpolation import read_in_numpy
+from .table import read_in_numpy
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
@@ -64,6 +64,11 @@ def _name_locals(function: Function) -> None:
             for path, node in _flatten(value, name) if isinstance(value, Node | tuple | list | dict) else ():
                 if node.function is function and node.depth > depth:
                     node.name, node.depth = path.strip("_"), depth
+
+
+def _logical(op: str) -> Callable[[Node, object], Node]:
+    """An operator whose result is true or false."""
+    return lambda self, other: emit(op, "bool", self, other)
 
 
 class Node:
@@ -126,33 +131,10 @@ class Node:
     def __rtruediv__(self, other: Operand) -> Node:
         return arithmetic("div", other, self)
 
-    def __lt__(self, other: Operand) -> Node:
-        return emit("lt", "bool", self, other)
-
-    def __le__(self, other: Operand) -> Node:
-        return emit("le", "bool", self, other)
-
-    def __gt__(self, other: Operand) -> Node:
-        return emit("gt", "bool", self, other)
-
-    def __ge__(self, other: Operand) -> Node:
-        return emit("ge", "bool", self, other)
-
-    def __eq__(self, other: object) -> Node:  # type: ignore[override]
-        return emit("eq", "bool", self, other)
-
-    def __ne__(self, other: object) -> Node:  # type: ignore[override]
-        return emit("ne", "bool", self, other)
-
-    def __and__(self, other: Operand) -> Node:
-        return emit("and", "bool", self, other)
-
-    __rand__ = __and__
-
-    def __or__(self, other: Operand) -> Node:
-        return emit("or", "bool", self, other)
-
-    __ror__ = __or__
+    __lt__, __le__, __gt__, __ge__ = map(_logical, ("lt", "le", "gt", "ge"))
+    __eq__, __ne__ = map(_logical, ("eq", "ne"))  # type: ignore[assignment]
+    __and__, __or__ = map(_logical, ("and", "or"))
+    __rand__, __ror__ = __and__, __or__
     __hash__ = object.__hash__
 
 
@@ -313,17 +295,17 @@ class Composite(Protocol):
         """A copy with other parts."""
 
 
-def _rebuild(value: Value, replace: Callable[[Node], object]) -> Value:
-    """The same structure with each node replaced."""
-    if isinstance(value, Node):
+def _rebuild(value: Value, replace: Callable[[Value], object], kind: type | tuple[type, ...] = Node) -> Value:
+    """The same structure with each node, or whatever is of another kind, replaced."""
+    if isinstance(value, kind):
         return replace(value)
     if isinstance(value, tuple | list):
-        items = [_rebuild(item, replace) for item in value]
+        items = [_rebuild(item, replace, kind) for item in value]
         return type(value)(*items) if hasattr(value, "_fields") else type(value)(items)
     if isinstance(value, dict):
-        return {key: _rebuild(item, replace) for key, item in value.items()}
+        return {key: _rebuild(item, replace, kind) for key, item in value.items()}
     if isinstance(value, Composite) and not isinstance(value, type):
-        return value.__with_parts__({name: _rebuild(part, replace) for name, part in value.__parts__().items()})
+        return value.__with_parts__({name: _rebuild(part, replace, kind) for name, part in value.__parts__().items()})
     return value
 
 
@@ -350,32 +332,26 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value]
     function = Function(name, inspect.getdoc(python_function) or "", source)
     _stack.append((graph, function))
     try:
-        inner = {}
-        for argument, value in arguments.items():
-            replacements = iter([function.parameter(path, node.type) for path, node in _flatten(value, argument)])
-            inner[argument] = _rebuild(value, functools.partial(_next, replacements))
+        given = [pair for argument, value in arguments.items() for pair in _flatten(value, argument)]
+        parameters = iter([function.parameter(path, node.type) for path, node in given])
+        inner = {argument: _rebuild(value, lambda _: next(parameters)) for argument, value in arguments.items()}
         function.arguments = dict(inner)
-        function.result = _rebuild_constants(python_function(**inner))
+        # numbers that a function returns as they stand become nodes, so that a result is nodes only
+        function.result = _rebuild(python_function(**inner), _constant, (bool, int, float, np.number))
     finally:
         _stack.pop()
     graph.functions.append(function)
     return function
 
 
-def _next(replacements: Iterator[Node], _: Node) -> Node:
-    return next(replacements)
+def _constant(number: float | np.number) -> Node:
+    return emit("constant", type_of(number), static=number)
 
 
-def _rebuild_constants(result: Value) -> Value:
-    """Numbers that a function returns as they stand become nodes, so that a result is nodes only."""
-    if isinstance(result, bool | int | float | np.number):
-        return emit("constant", type_of(result), static=result)
-    if isinstance(result, tuple):
-        items = [_rebuild_constants(item) for item in result]
-        return type(result)(*items) if hasattr(result, "_fields") else tuple(items)
-    if isinstance(result, dict):
-        return {key: _rebuild_constants(item) for key, item in result.items()}
-    return result
+def first_free(name: str, taken: Container[str]) -> str:
+    """The name, or name_2, name_3 and so on: the first that is not taken."""
+    names = itertools.chain([name], (f"{name}_{count}" for count in itertools.count(2)))
+    return next(found for found in names if found not in taken)
 
 
 def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
@@ -396,17 +372,14 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
             stem = f"{type(owner).__name__}_{stem}"
         elif python_function.__qualname__.count(".") == 1:  # a static method
             stem = f"{python_function.__qualname__.split('.')[0]}_{stem}"
-        name, count = stem, 1
-        while name in taken:
-            count += 1
-            name = f"{stem}_{count}"
+        name = first_free(stem, taken)
         function = graph._known[key] = _define(graph, python_function, dict(bound.arguments), name)
     nodes = [node for argument, value in bound.arguments.items() for _, node in _flatten(value, argument)]
     called = emit("call", "tuple", *nodes, static=function)
     if isinstance(function.result, Node):
         called.type = function.result.type
         return called
-    counter = iter(range(10_000))
+    counter = itertools.count()
     return _rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)))
 
 
@@ -455,15 +428,7 @@ def symbol(kind: str) -> Node:
 # --------------------------------------------------------------------------- evaluation in NumPy
 
 
-def _erf(x: Value) -> np.ndarray:
-    return np.vectorize(math.erf, otypes=[float])(x)
-
-
-def _dot(a: Value, b: Value) -> np.ndarray:
-    return sum(a[i] * b[i] for i in range(len(a)))
-
-
-_NUMPY: dict[str, Callable] = {
+NUMPY: dict[str, Callable] = {
     "add": np.add,
     "sub": np.subtract,
     "mul": np.multiply,
@@ -490,10 +455,10 @@ _NUMPY: dict[str, Callable] = {
     "cos": np.cos,
     "atan2": np.arctan2,
     "floor": np.floor,
-    "erf": _erf,
+    "erf": np.vectorize(math.erf, otypes=[float]),
     "copysign": np.copysign,
     "isfinite": np.isfinite,
-    "dot": _dot,
+    "dot": lambda a, b: sum(a[i] * b[i] for i in range(len(a))),
     "mean": lambda a: np.mean(a, axis=0),
     "max_component": lambda a: np.max(a, axis=0),
 }
@@ -524,7 +489,7 @@ def _run(function: Function, arguments: list) -> Value:
             table, channel = node.static
             values.append(read_in_numpy(table, *args)[channel])
         else:
-            values.append(_NUMPY[node.op](*args))
+            values.append(NUMPY[node.op](*args))
     return _rebuild(function.result, get)
 
 

@@ -10,14 +10,12 @@ Dr.Jit and shader agree. To put nodes on both ends of an axis, use `inset`.
 
 from __future__ import annotations
 
+from functools import reduce
 from itertools import product
 
 import numpy as np
 
-from . import graph
-from .backend import Array, Types, drjit, is_drjit, types_like
-from .interpolation import read_in_numpy
-from .types import Scalar
+from .backend import Array, Types, drjit
 
 
 class Table:
@@ -54,43 +52,22 @@ class Table:
         return self._arrays[kind.float]
 
 
-def inset(x: Array, count: int) -> Array:
-    """The coordinate at which an axis of `count` texels has its first node at x = 0 and its last at x = 1."""
-    return x * ((count - 1) / count) + 0.5 / count
-
-
-def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
-    """Every channel of a table at a point, linear between texel centres (see the module)."""
-    if any(isinstance(x, graph.Node) for x in coordinates):
-        symbols: list[Array] = [
-            graph.emit("lookup", "float", *coordinates, static=(table, c)) for c in range(table.channels)
-        ]
-        return tuple(symbols)
-    if not any(is_drjit(x) for x in coordinates):
-        values = read_in_numpy(table, *coordinates)
-        return tuple(values[c] for c in range(table.channels))
-    dr = drjit()
-    kind = types_like(type(next(x for x in coordinates if is_drjit(x))))
-    UInt = kind.module.UInt32
-    array = table.array(kind)
+def read_in_numpy(table: Table, *coordinates: object) -> np.ndarray:
+    """Every channel, channels first: the rule in NumPy float64."""
+    points = np.broadcast_arrays(*[np.asarray(x, dtype=float) for x in coordinates])
     cells, places = [], []
-    for x, count in zip(coordinates, table.shape, strict=True):
-        at = dr.clip(kind.float(x) * float(count) - 0.5, 0.0, count - 1.0)
-        cell = dr.minimum(UInt(at), max(count - 2, 0))
+    for x, count in zip(points, table.shape, strict=True):
+        at = np.clip(x * count - 0.5, 0.0, count - 1.0)
+        cell = np.minimum(at.astype(int), max(count - 2, 0))
         cells.append(cell)
-        places.append(at - kind.float(cell))
-    # four channels come in one fetch
-    width = 4 if table.channels % 4 == 0 else 1
-    fetched = kind.vec4 if width == 4 else kind.float
-    result: list[Array] = [0.0] * table.channels
+        places.append(at - cell)
+    total = np.zeros((*points[0].shape, table.channels))
     for corner in product((0, 1), repeat=len(cells)):
-        weight: Array = 1.0
-        index: Array = UInt(0)
-        for cell, place, step, count in zip(cells, places, corner, table.shape, strict=True):
-            index = index * count + (cell + min(step, count - 1))
-            weight = weight * (place if step else 1.0 - place)
-        for first in range(0, table.channels, width):
-            texel = dr.gather(fetched, array, index * (table.channels // width) + first // width)
-            for c in range(width):
-                result[first + c] = result[first + c] + weight * (texel[c] if width == 4 else texel)
-    return tuple(result)
+        index = tuple(
+            np.minimum(cell + step, count - 1) for cell, step, count in zip(cells, corner, table.shape, strict=True)
+        )
+        weight = reduce(
+            np.multiply, [place if step else 1.0 - place for place, step in zip(places, corner, strict=True)]
+        )
+        total += weight[..., None] * table.values[index]
+    return np.moveaxis(total, -1, 0)

@@ -7,10 +7,7 @@ of Brendel and Bormann's model in Rakic1998.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple, TypeVar
-
-from ..errors import InputError, did_you_mean
+from typing import NamedTuple
 
 RGB_WAVELENGTHS = (650.0, 550.0, 450.0)  # nm
 
@@ -56,24 +53,3 @@ MEDIA = {
     "sapphire": Medium("sapphire", 1.77, "Hecht2017"),
     "diamond": Medium("diamond", 2.42, "course notes, part B"),
 }
-
-
-Entry = TypeVar("Entry", Metal, Medium)
-
-
-def _find(table: Mapping[str, Entry], name: str, what: str) -> Entry:
-    known: dict[str, str] = {symbol.lower(): symbol for symbol in table}
-    known |= {entry.name.lower(): symbol for symbol, entry in table.items()}
-    if name.lower() not in known:
-        raise InputError(f"unknown {what} '{name}'", "preset", did_you_mean(name, [*table, *known]))
-    return table[known[name.lower()]]
-
-
-def metal(name: str) -> Metal:
-    """A metal by its symbol or name ("Au", "gold"); InputError where unknown."""
-    return _find(METALS, name, "metal")
-
-
-def medium(name: str) -> Medium:
-    """A transparent medium by name ("water"); InputError where unknown."""
-    return _find(MEDIA, name, "medium")

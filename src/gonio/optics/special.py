@@ -42,7 +42,7 @@ def erfinv(x: Scalar) -> Scalar:
     w = -log((1.0 - x) * (1.0 + x))
     centre = w < 5.0
     t = where(centre, w - 2.5, sqrt(ops.maximum(w, 5.0)) - 3.0)
-    # a choice between two plain numbers would have 32 bits in any precision, so the sums are chosen from
+    # outside of a material's formula a choice between two plain numbers has 32 bits: the sums are chosen from
     value = where(centre, _CENTRE[0] * t + _CENTRE[1], _TAIL[0] * t + _TAIL[1])
     for a, b in zip(_CENTRE[2:], _TAIL[2:], strict=True):
         value = where(centre, value * t + a, value * t + b)

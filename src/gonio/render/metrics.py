@@ -171,12 +171,7 @@ _SENSITIVITY = (
 )
 
 
-def flip_map(
-    test: Floats,
-    reference: Floats,
-    hdr: bool = True,
-    pixels_per_degree: float = PIXELS_PER_DEGREE,
-) -> Floats:
+def flip_map(test: Floats, reference: Floats, hdr: bool = True, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Floats:
     """FLIP per pixel, (H, W), 0 to 1.
 
     With `hdr` False both pictures are clamped to [0, 1] and compared as a screen shows them. With `hdr` True
@@ -265,9 +260,7 @@ def _colour_distance(test: Floats, reference: Floats, pixels_per_degree: float) 
     largest = float(_hyab(green, blue)) ** _HYAB_POWER
     knee = _KNEE_IN * largest
     return np.where(
-        power < knee,
-        power * (_KNEE_OUT / knee),
-        _KNEE_OUT + (power - knee) / (largest - knee) * (1 - _KNEE_OUT),
+        power < knee, power * (_KNEE_OUT / knee), _KNEE_OUT + (power - knee) / (largest - knee) * (1 - _KNEE_OUT)
     )
 
 

@@ -28,28 +28,24 @@ class MitsubaRender:
     samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
     """
 
-    def __init__(self, mi: ModuleType, scene: Scene, spp: int, seed: int = 0, integrator: Plugin | None = None) -> None:
-        self._mi, self._scene, self._integrator, self._seed = mi, scene, integrator or scene.integrator(), seed
+    def __init__(self, mi: ModuleType, scene: Scene, spp: int, seed: int = 0) -> None:
+        self._mi, self._scene, self._seed = mi, scene, seed
         self._sensor = scene.sensors()[0]
         width, height = self._sensor.film().crop_size()
         self.pass_size = min(spp, power_of_two(max(1, WAVEFRONT // (int(width) * int(height)))))
         self._sum: NDArray[np.float64] | None = None
         self._passes = 0
-        self._done = 0
-
-    @property
-    def done(self) -> int:
-        return self._done
+        self.done = 0
 
     def advance(self, count: int) -> None:
         seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
-        picture = self._render(self._integrator, count, seed)
+        picture = self._render(self._scene.integrator(), count, seed)
         taken = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * taken
         self._sum = weighted if self._sum is None else self._sum + weighted
         self._passes += 1
-        self._done += taken
+        self.done += taken
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
         tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
@@ -57,7 +53,7 @@ class MitsubaRender:
 
     def image(self) -> NDArray[np.float32]:
         assert self._sum is not None, "advance() comes first"
-        mean = (self._sum / self._done).astype(np.float32)
+        mean = (self._sum / self.done).astype(np.float32)
         return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
 
     def aov(self) -> dict[str, NDArray[np.float32]]:

@@ -84,10 +84,7 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
         description = scene.of_material(request.material, overrides)
     else:
         description = scene.read(
-            request.scene,
-            allow_outside=request.allow_outside,
-            allow_code=request.allow_code,
-            overrides=overrides,
+            request.scene, allow_outside=request.allow_outside, allow_code=request.allow_code, overrides=overrides
         )
     of_scene = integrators.Settings(
         integrator=description.integrator.type,

@@ -50,12 +50,6 @@ class Variation:
         return self.path
 
 
-class _FullyNamed(Variation):
-    @property
-    def name(self) -> str:
-        return self.path
-
-
 @dataclass(frozen=True)
 class Sheet:
     """What came of a study; `cells` are the values of each picture, in the order of `itertools.product`.
@@ -225,14 +219,14 @@ def draw(pictures: Sequence[Pixels], variations: Sequence[Variation], title: str
 def _blocks(pictures: Sequence[Pixels], variations: Sequence[Variation]) -> list[_Block]:
     names = [variation.name for variation in variations]
     if len(set(names)) < len(names):  # p of one shape and p of another
-        variations = [_FullyNamed(variation.path, variation.values) for variation in variations]
+        names = [variation.path for variation in variations]
     if len(variations) == 1:
-        (only,) = variations
-        labels = [f"{only.name} = {figures.show_value(value)}" for value in only.values]
+        (only,), (name,) = variations, names
+        labels = [f"{name} = {figures.show_value(value)}" for value in only.values]
         across = _columns_of_a_row(len(pictures), pictures[0].shape[1] / pictures[0].shape[0])
         if across == 1:
             rows = [figures.show_value(value) for value in only.values]
-            return [_Block("", rows, [""], [[picture] for picture in pictures], only.name)]
+            return [_Block("", rows, [""], [[picture] for picture in pictures], name)]
         return [
             _Block("", [], labels[at : at + across], [pictures[at : at + across]])
             for at in range(0, len(pictures), across)
@@ -244,9 +238,9 @@ def _blocks(pictures: Sequence[Pixels], variations: Sequence[Variation]) -> list
     for index, values in enumerate(itertools.product(*(variation.values for variation in outer))):
         of_block = pictures[index * each : (index + 1) * each]
         grid = [of_block[at : at + len(columns)] for at in range(0, each, len(columns))]
-        named = zip(outer, values, strict=True)
-        heading = ",   ".join(f"{variation.name} = {figures.show_value(value)}" for variation, value in named)
-        blocks.append(_Block(heading, rows, columns, grid, down.name, across_.name))
+        named = zip(names, values, strict=False)
+        heading = ",   ".join(f"{name} = {figures.show_value(value)}" for name, value in named)
+        blocks.append(_Block(heading, rows, columns, grid, *names[-2:]))
     return blocks
 
 

@@ -21,15 +21,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".pdf", ".svg")
 INK, SOFT, FAINT = "#1d2530", "#6b7683", "#d9dee4"
 CHANNELS = ("#c8354a", "#2f9457", "#2f62b5")  # red, green, blue, of even weight on white
-PALETTE = (
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#cc79a7",
-    "#a6761d",
-    "#56b4e9",
-    "#1d2530",
-)  # for the colour-blind too
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a6761d", "#56b4e9", "#1d2530")  # for the colour-blind too
 DASHES = (0, (4, 2))
 STYLE: Any = {  # Matplotlib types its keys one by one
     "font.family": "sans-serif",
@@ -62,15 +54,20 @@ class Drawing:
 
     def save(self, path: str | Path) -> Drawing:
         """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
-        return replace(self, path=save(self.figure, check_output(Path(path)), self.dpi, self.about))
+        target = check_output(Path(path))
+        return replace(self, path=files.write_whole(target, lambda part: self._fill(part, target.suffix.lower()[1:])))
 
     def _repr_png_(self) -> bytes:
-        return self._as("png")
-
-    def _as(self, kind: str) -> bytes:
         stream = io.BytesIO()
-        _fill(self.figure, stream, kind, self.dpi, self.about)
+        self._fill(stream, "png")
         return stream.getvalue()
+
+    def _fill(self, file: Path | BinaryIO, kind: str) -> None:
+        import matplotlib
+
+        name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
+        with matplotlib.rc_context(STYLE):
+            self.figure.savefig(file, format=kind, dpi=self.dpi, metadata={name: self.about}, facecolor="white")
 
 
 def check_output(path: Path) -> Path:
@@ -80,19 +77,6 @@ def check_output(path: Path) -> Path:
         raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
     files.check_file(path)
     return path
-
-
-def save(figure: Figure, path: Path, dpi: float, about: str) -> Path:
-    """Write a figure, whole or not at all."""
-    return files.write_whole(path, lambda temporary: _fill(figure, temporary, path.suffix.lower()[1:], dpi, about))
-
-
-def _fill(figure: Figure, file: Path | BinaryIO, kind: str, dpi: float, about: str) -> None:
-    import matplotlib
-
-    name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(file, format=kind, dpi=dpi, metadata={name: about}, facecolor="white")
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:

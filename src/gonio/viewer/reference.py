@@ -129,12 +129,7 @@ class Reference:
                 "near_clip": 1e-3,  # the clips are literals of the kernel: values that moved would compile one
                 "far_clip": 1e8,
                 "to_world": mi.ScalarTransform4f().look_at(list(eye), list(target), up),
-                "film": {
-                    "type": "hdrfilm",
-                    "width": scene.width,
-                    "height": scene.height,
-                    "rfilter": {"type": "box"},
-                },
+                "film": {"type": "hdrfilm", "width": scene.width, "height": scene.height, "rfilter": {"type": "box"}},
             }
         )
 

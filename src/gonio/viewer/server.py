@@ -409,13 +409,7 @@ def _open(url: str) -> None:
         webbrowser.open(url)
 
 
-def serve(
-    what: Stage,
-    host: str = LOOPBACK,
-    port: int = 0,
-    browser: bool = True,
-    device: str = "cpu",
-) -> None:
+def serve(what: Stage, host: str = LOOPBACK, port: int = 0, browser: bool = True, device: str = "cpu") -> None:
     """Show a stage until Ctrl-C.
 
     host     where to listen; anything but a loopback address opens it to the network, and a line says so

@@ -57,12 +57,8 @@ class Session:
 
         stall_seconds  for a first wish to come, and for a frame to be acknowledged
         """
-        tasks = [
-            asyncio.create_task(self._read()),
-            asyncio.create_task(self._write()),
-            asyncio.create_task(self._watch(stall_seconds)),
-            asyncio.create_task(self._ended.wait()),
-        ]
+        work = (self._read(), self._write(), self._watch(stall_seconds), self._ended.wait())
+        tasks = [asyncio.create_task(coroutine) for coroutine in work]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,30 @@ from .. import completion
 from ..options import Json, Material
 from ..output import print_tables
 from .base import MATERIALS, verb
+
+
+@dataclass(frozen=True)
+class Baking:
+    """What is baked, and how."""
+
+    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,prefiltered", help="Which tables.")] = ""
+    size: Annotated[int, Option(metavar="N", help="Texels along each axis.")] = 128
+    method: Annotated[str, Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature"
+    masking: Annotated[str | None, Option(metavar="NAME", help="Of a distribution: smith-correlated, ...")] = None
+    spp: Annotated[int, Option(metavar="N", help="Samples a texel, where sampled.")] = 1024
+    points: Annotated[str, Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley"
+    seed: Annotated[int, Option(metavar="N", help="Of independent points.")] = 0
+    layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear"
+    aspect: Annotated[
+        float | None, Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds the axis phi.")
+    ] = None
+    azimuths: Annotated[int, Option(metavar="N", help="Slices along phi, with two widths.")] = 24
+    store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E"
+    flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True
+    ndf: Annotated[
+        str | None, Option(metavar="NAME", help="Of an environment: the distribution it is blurred by; ggx.")
+    ] = None
+    levels: Annotated[int | None, Option(metavar="N", help="Of an environment: maps from roughness 0 to 1; 6.")] = None
 
 
 @verb(MATERIALS, place=6)
@@ -26,24 +51,7 @@ def bake(
     *,
     output: Annotated[Path, Option("-o", "--output", metavar="DIR", help="Folder to write.")] = Path("tables"),
     made: Material,
-    lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,prefiltered", help="Which tables.")] = "",
-    size: Annotated[int, Option(metavar="N", help="Texels along each axis.")] = 128,
-    method: Annotated[str, Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature",
-    masking: Annotated[str | None, Option(metavar="NAME", help="Of a distribution: smith-correlated, ...")] = None,
-    spp: Annotated[int, Option(metavar="N", help="Samples a texel, where sampled.")] = 1024,
-    points: Annotated[str, Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley",
-    seed: Annotated[int, Option(metavar="N", help="Of independent points.")] = 0,
-    layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear",
-    aspect: Annotated[
-        float | None, Option(metavar="A", help="alpha_y / alpha_x of a distribution: adds the axis phi.")
-    ] = None,
-    azimuths: Annotated[int, Option(metavar="N", help="Slices along phi, with two widths.")] = 24,
-    store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E",
-    flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True,
-    ndf: Annotated[
-        str | None, Option(metavar="NAME", help="Of an environment: the distribution it is blurred by; ggx.")
-    ] = None,
-    levels: Annotated[int | None, Option(metavar="N", help="Of an environment: maps from roughness 0 to 1; 6.")] = None,
+    how: Baking,
     as_json: Json = False,
 ) -> None:
     """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
@@ -62,22 +70,6 @@ def bake(
     """
     from ...render import tables
 
-    baked = tables.bake(
-        made.text(target),
-        output,
-        lut=lut.split(",") if lut else None,
-        size=size,
-        method=method,
-        masking=masking,
-        spp=spp,
-        points=points,
-        seed=seed,
-        layout=layout,
-        aspect=aspect,
-        azimuths=azimuths,
-        store=store,
-        flip=flip,
-        ndf=ndf,
-        levels=levels,
-    )
+    options = {**vars(how), "lut": how.lut.split(",") if how.lut else None}
+    baked = tables.bake(made.text(target), output, **options)
     print_tables(baked.manifest, output, as_json)

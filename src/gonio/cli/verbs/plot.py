@@ -48,7 +48,13 @@ def plot(
         print(plots.plot(model[0], output=output).path)
         return
     texts = made.texts(model)
-    # of FILE.py:CLASS the class
-    names = dict.fromkeys(text.partition("(")[0].rpartition(".py:")[2].lower() for text in texts)
-    output = output or Path(f"{'-'.join(names)}-{kind}.png")
+    heads = dict.fromkeys(text.partition("(")[0] for text in texts)
+    output = output or Path(f"{'-'.join(map(_file_name, heads))}-{kind}.png")
     print(plots.plot(*texts, kind=kind, angles=views, output=output).path)
+
+
+def _file_name(head: str) -> str:
+    """A material's name in that of a file: of FILE.py:CLASS the class, behind the file where that differs."""
+    file, _, name = head.lower().rpartition(".py:")
+    stem = Path(file).name
+    return name if stem in ("", name) else f"{stem}-{name}"

@@ -16,8 +16,8 @@ two axes, see `anisotropic`.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -250,16 +250,8 @@ def turn(found: tuple[Array, ...], along: Array, across: Array) -> tuple[Array, 
     return tuple(_weigh(found[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
 
 
-class Harmonics(NamedTuple):
-    """along^j across^(6 - j)."""
-
-    h0: Array
-    h1: Array
-    h2: Array
-    h3: Array
-    h4: Array
-    h5: Array
-    h6: Array
+Harmonics = namedtuple("Harmonics", "h0 h1 h2 h3 h4 h5 h6")
+Harmonics.__doc__ = "along^j across^(6 - j)."
 
 
 @ops.function

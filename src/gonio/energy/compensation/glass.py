@@ -15,22 +15,7 @@ from typing import NamedTuple
 
 from ...models import BSDF, Microsurface
 from ...models.microfacet import widths
-from ...ops import (
-    Direction,
-    Mask,
-    Mode,
-    Scalar,
-    Spectrum,
-    abs,
-    inset,
-    inv_pi,
-    lookup,
-    maximum,
-    sqr,
-    sqrt,
-    vec3,
-    where,
-)
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, inset, inv_pi, lookup, maximum, sqr, sqrt, vec3, where
 from ...ops.backend import Array
 from ..bend import form_of, knee
 from . import curves, lobe

@@ -21,12 +21,8 @@ import numpy as np
 from ...errors import InputError
 from ...models import BSDF, Parameter, binding
 from ...ops import (
-    Direction,
-    Mode,
     Node,
     RecordingError,
-    Scalar,
-    Spectrum,
     atan2,
     backend,
     clamp,
@@ -40,6 +36,7 @@ from ...ops import (
 )
 from ...ops import pi as PI
 from ...ops.backend import Array
+from ...ops.types import Direction, Mode, Scalar, Spectrum
 from ...optics.special import gauss
 from . import lobe
 

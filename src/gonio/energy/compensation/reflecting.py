@@ -7,23 +7,9 @@ from typing import NamedTuple
 from ...models import BSDF, Microsurface
 from ...models.microfacet import SMOOTH, widths
 from ...models.parameters import pair_of
-from ...ops import (
-    Direction,
-    Mode,
-    Pair,
-    Scalar,
-    Spectrum,
-    backend,
-    function,
-    inset,
-    lookup,
-    maximum,
-    minimum,
-    sqr,
-    sqrt,
-    where,
-)
+from ...ops import backend, function, inset, lookup, maximum, minimum, sqr, sqrt, where
 from ...ops.backend import Array
+from ...ops.types import Direction, Mode, Pair, Scalar, Spectrum
 from ...optics import frame
 from ..bend import form_of, knee
 from . import curves, lobe

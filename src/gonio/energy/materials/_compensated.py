@@ -40,11 +40,8 @@ class AllParts(NamedTuple):
     multi: Spectrum
 
 
-class _Compensated(BSDF):
-    """base + what it misses, sampled by a mixture of the base and of the lobe that is missing.
-
-    A subclass writes `derive`, which gives `missing` and `ratio` among others, `added`, and `eval` with it.
-    """
+class _OnBase(BSDF):
+    """A material that compensates another, and is otherwise as that is."""
 
     base: BSDF = bsdf("the material to be compensated")
     _takes_glass: ClassVar[bool] = True  # whether the base may transmit
@@ -72,6 +69,13 @@ class _Compensated(BSDF):
     def tint(self, wo: Direction) -> Spectrum:
         """The base's."""
         return self.base.tint(wo)
+
+
+class _Compensated(_OnBase):
+    """base + what it misses, sampled by a mixture of the base and of the lobe that is missing.
+
+    A subclass writes `derive`, which gives `missing` and `ratio` among others, `added`, and `eval` with it.
+    """
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...models import BSDF, Breach, Sample, bsdf, method
-from ...models.material import Delta, InnerAlbedo
+from ...models.material import InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
-from ..compensation import missing, reflecting
 from ..compensation.lobe import MissingEnergy
-from ._compensated import AllParts, Parts, with_terms
+from ..compensation.missing import missing_energy
+from ._compensated import AllParts, Parts, _OnBase, with_terms
 
 
 class Derived(NamedTuple):
@@ -24,7 +24,7 @@ class Derived(NamedTuple):
     f0: Spectrum
 
 
-class Turquin(BSDF):
+class Turquin(_OnBase):
     """f_base (1 + F0 (1 - E(mu_o)) / E(mu_o)): the lobe of single scattering, scaled up (Turquin2019, eq. 16).
 
     E(mu) is the albedo of the base at F = 1 and F0 the reflectance at normal incidence. At F = 1 nothing is lost; the
@@ -36,24 +36,13 @@ class Turquin(BSDF):
         "reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)
     }
     lossless: ClassVar[float | None] = 2e-3
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        missing.check_base(self.base, "Turquin.base", transmitting=False)
-
-    @property
-    def delta(self) -> Delta:
-        return self.base.delta
-
-    def tint(self, wo: Direction) -> Spectrum:
-        """The base's."""
-        return self.base.tint(wo)
+    _takes_glass: ClassVar[bool] = False
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
         """The base's, times the factor."""
-        of_base = None if nodes is None or reflecting.has_two_widths(self.base) else inner(self.base, mu, phi)
+        of_base = None if nodes is None or self.two_widths else inner(self.base, mu, phi)
         if of_base is None:
             return None
         types = backend.types("float64")
@@ -65,7 +54,7 @@ class Turquin(BSDF):
         """E by its polynomial, and F0."""
         f0 = self.base.normal_reflectance()
         assert f0 is not None, "checked when it was made"
-        return Derived(missing.missing_energy(self.base), f0)
+        return Derived(missing_energy(self.base), f0)
 
     def _factor(self, wo: Direction) -> Spectrum:
         """1 + F0 (1 - E(mu_o)) / E(mu_o), E held above .05."""

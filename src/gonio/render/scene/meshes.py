@@ -85,9 +85,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 def disk(radius: float, inner_radius: float, phi_max: float) -> Triangles:
     """In z = 0 with normal +z; u = phi / phi_max, v = 0 at the rim and 1 at the centre."""
     return _revolved(
-        phi_max,
-        rings=[(radius, 0.0, 0.0), (inner_radius, 0.0, 1.0 - inner_radius / radius)],
-        slope=(0.0, 1.0),
+        phi_max, rings=[(radius, 0.0, 0.0), (inner_radius, 0.0, 1.0 - inner_radius / radius)], slope=(0.0, 1.0)
     )
 
 

@@ -41,13 +41,6 @@ class Output(Part):
         return self
 
 
-def samplers() -> list[str]:
-    """The sampler names the integrators know."""
-    from ..sampler import SAMPLERS
-
-    return list(SAMPLERS)
-
-
 class Sampler(Part):
     """How many samples a pixel gets, and from which point set. Give xSamples and ySamples, or samples."""
 
@@ -77,9 +70,10 @@ class Sampler(Part):
     @model_validator(mode="after")
     def _known_type(self) -> Sampler:
         if self.type not in ("independent", "default"):
-            known = samplers()
-            if self.type not in known:
-                raise invalid(f"unknown sampler '{self.type}'", did_you_mean(self.type, known), "type")
+            from ..sampler import SAMPLERS
+
+            if self.type not in SAMPLERS:
+                raise invalid(f"unknown sampler '{self.type}'", did_you_mean(self.type, list(SAMPLERS)), "type")
         return self
 
     @property
@@ -340,10 +334,7 @@ class Mesh(ShapePart):
     """Texture coordinates are taken as they stand, v = 0 is the top of a texture; without normals it is faceted."""
 
 
-Shape = Annotated[
-    Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh,
-    Field(discriminator="type"),
-]
+Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh, Field(discriminator="type")]
 
 
 class AreaLight(Part):

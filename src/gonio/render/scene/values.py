@@ -136,8 +136,7 @@ def _either(expected: str) -> Discriminator:
 
 Texture = Annotated[ImageTexture, Tag("<texture>")]
 Scalar = Annotated[
-    Annotated[Number, Tag("<number>")] | Texture,
-    _either("a number or a texture {type: imageTex, file}"),
+    Annotated[Number, Tag("<number>")] | Texture, _either("a number or a texture {type: imageTex, file}")
 ]
 Colour = Annotated[
     Annotated[Number, Tag("<number>")] | Annotated[Rgb, Tag("<list>")] | Texture,
@@ -150,8 +149,7 @@ Width = Annotated[
     _either("a number, two numbers [along x, along y] or a texture {type: imageTex, file}"),
 ]
 Radiance = Annotated[
-    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")],
-    _either("[r, g, b] or a number (grey)"),
+    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")], _either("[r, g, b] or a number (grey)")
 ]
 Sky = Annotated[
     Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Texture,
