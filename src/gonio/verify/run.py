@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from .. import files
+from .. import files, members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import box, directions, page, statistics, subject
+from . import box, directions, page, quality, statistics, subject
 from .box import Place
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .laws import Law, chosen
@@ -21,8 +21,10 @@ from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, F
 from .watch import limited
 
 DEFAULT_SEED = 1
+PLACES, QUALITY = "other values", "sampling quality"  # what is asked of a subject besides the laws
 CONFIRMATION = 0.001  # of the second seed's test: a real error shows there as well, chance does not
 Target = BSDF | Subject | str
+Begin = Callable[[str], None]
 
 
 def verify(
@@ -35,6 +37,10 @@ def verify(
     law: str | Sequence[str] | None = None,
     report: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    isolated: bool | None = None,
+    jobs: int = 1,
+    limit: float | None = None,
+    memory: float | None = None,
 ) -> Report:
     """Put a BSDF, or several, on trial.
 
@@ -48,6 +54,11 @@ def verify(
     law       a law's name, or several; all where None
     report    folder for report.html and report.json; None writes nothing
     progress  called with steps done, steps in all, and what is next
+    isolated  whether the BSDF is judged in a process of its own, which it may bring down or keep for ever: that fails
+              the law, and the next one is asked. Names are, and objects are not, unless this says otherwise
+    jobs      such processes at a time; the report is the same
+    limit     seconds that a law may take there, 300 if not given
+    memory    GB that such a process may take, half of the machine's if not given
     Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; printed, it is the terminal's table.
     Raises InputError for unknown laws and targets. A failing BSDF raises nothing: the law fails.
     """
@@ -56,28 +67,95 @@ def verify(
     if report is not None:
         files.check_folder(report)
     effort = "quick" if quick else "deep" if deep else "default"
-    asked = chosen([law] if isinstance(law, str) else law)
-    subjects = _subjects(target, sweep)
-    started = time.perf_counter()
-    steps = len(subjects) * len(asked)
-    held: list[tuple[Subject, list[Place], Law, list[Asked]]] = []
-    for one in subjects:
-        others = _places(one, effort, seed)
-        for each in asked:
-            if progress:
-                progress(len(held), steps, f"{one.title}: {each.name}")
-            held.append((one, others, each, _everywhere(each, one, others, effort, seed)))
-    tests = sum(len(it.what.trials) for _, _, _, all_ in held for it in all_ if isinstance(it.what, Finding))
-    threshold = statistics.sidak(SIGNIFICANCE, tests)
-    cards: dict[int, Card] = {}
-    for one, others, each, all_ in held:
-        verdict = _joined([_verdict(each, it, threshold, seed) for it in all_], all_)
-        card = cards.setdefault(id(one), Card(one, [], box.covered(one, others)))
-        card.verdicts.append(verdict)
-    made = Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
+    names = None if law is None else [law] if isinstance(law, str) else list(law)
+    all_ = list(target) if isinstance(target, list | tuple) else [target]
+    if isolated is None:
+        # what a program has registered, it alone knows
+        isolated = all(isinstance(one, str) for one in all_) and not members.registered
+    if isolated:
+        from . import child
+
+        asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.object_(one) for one in all_]
+        task = child.Task(asked_of, effort, seed, names)
+        made = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+    else:
+        made = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
     if report is not None:
         page.write(made, Path(report))
     return made
+
+
+def _here(
+    subjects: list[Subject],
+    laws: list[Law],
+    effort: str,
+    seed: int,
+    progress: Callable[[int, int, str], None] | None,
+) -> Report:
+    """The trial in this process."""
+    started = time.perf_counter()
+    steps, done = len(subjects) * len(laws), 0
+    held = []
+    for one in subjects:
+
+        def begin(what: str, title: str = one.title) -> None:
+            nonlocal done
+            if progress:
+                progress(min(done, steps), steps, f"{title}: {what}")
+            done += what not in (PLACES, QUALITY)
+
+        held.append(judged(one, laws, effort, seed, begin))
+    tests = sum(one.tests for one in held)
+    threshold = statistics.sidak(SIGNIFICANCE, tests)
+    cards = [one.card(threshold, seed) for one in held]
+    return Report(cards, seed, effort, tests, threshold, time.perf_counter() - started)
+
+
+class Held(NamedTuple):
+    """All that was found on a subject, before it is known how many tests the whole report holds."""
+
+    subject: Subject
+    others: list[Place]
+    laws: list[tuple[Law, list[Asked]]]
+    quality: quality.Quality | None
+
+    @property
+    def tests(self) -> int:
+        return sum(len(it.what.trials) for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding))
+
+    def card(self, threshold: float, seed: int, begin: Begin = lambda what: None) -> Card:
+        """The verdicts; a rejected test is repeated here, so the BSDF is asked again."""
+        verdicts = []
+        for law, all_ in self.laws:
+            begin(law.name)
+            verdicts.append(_joined([_verdict(law, it, threshold, seed) for it in all_], all_))
+        return Card(self.subject, verdicts, box.covered(self.subject, self.others), quality=self.quality)
+
+
+def judged(
+    one: Subject,
+    laws: list[Law],
+    effort: str,
+    seed: int,
+    begin: Begin = lambda what: None,
+    skip: Mapping[str, str] = {},  # noqa: B006  # read only
+) -> Held:
+    """What the laws find on a subject.
+
+    begin  called with a law's name, or what else is next
+    skip   what must not be asked again, and why: the BSDF ended the process, or kept it for ever
+    """
+    begin(PLACES)
+    others = [] if PLACES in skip else _places(one, effort, seed)
+    found: list[tuple[Law, list[Asked]]] = []
+    for law in laws:
+        if law.name in skip:
+            found.append((law, [Asked(Place({}, "given", one), _failed(law, one, skip[law.name]), 0.0)]))
+            continue
+        begin(law.name)
+        found.append((law, _everywhere(law, one, others, effort, seed)))
+    begin(QUALITY)
+    return Held(one, others, found, None if QUALITY in skip else quality.of(one, seed))
 
 
 class Asked(NamedTuple):
@@ -139,19 +217,20 @@ def _joined(verdicts: list[Verdict], all_: list[Asked]) -> Verdict:
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
     """A law's finding; what goes wrong inside the BSDF is a failure of the law, and of this law only."""
-
-    def verdict(status: str, why: str) -> Verdict:
-        command = one.command("--law", law.name)
-        return Verdict(law.number, law.name, law.title, status, why=[why], command=command, meaning=law.meaning)
-
     try:
         with warnings.catch_warnings(), limited(law.name):
             warnings.simplefilter("ignore", GonioWarning)  # variants go to the ends of the ranges on purpose
             return law.judge(one, effort, seed)
     except DoesNotApply as reason:
-        return verdict(NOT_APPLICABLE, str(reason))
+        return _failed(law, one, str(reason), NOT_APPLICABLE)
     except (Fault, TimeoutError) as fault:
-        return verdict(FAIL, str(fault))
+        return _failed(law, one, str(fault))
+
+
+def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
+    """A verdict without a figure."""
+    command = one.command("--law", law.name)
+    return Verdict(law.number, law.name, law.title, status, why=[why], command=command, meaning=law.meaning)
 
 
 def decide(
@@ -211,13 +290,15 @@ def decide(
     )
 
 
-def _subjects(target: Target | Sequence[Target], sweep: str) -> list[Subject]:
-    if isinstance(target, list | tuple):
-        return [one for item in target for one in _subjects(item, sweep)]
-    if isinstance(target, str):
-        from .targets import resolve
+def _subjects(targets: Sequence[Target], sweep: str) -> list[Subject]:
+    found: list[Subject] = []
+    for target in targets:
+        if isinstance(target, str):
+            from .targets import resolve
 
-        return resolve(target, sweep=sweep)
-    if sweep:
-        raise InputError("a sweep of an object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
-    return [subject.of(target)]
+            found += resolve(target, sweep=sweep)
+        elif sweep:
+            raise InputError("a sweep of an object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
+        else:
+            found.append(subject.of(target))
+    return found

@@ -190,18 +190,34 @@ class Subject:
         return array.astype(np.float64)
 
 
+@dataclasses.dataclass(frozen=True)
+class Described(Subject):
+    """A subject that was judged in another process: its names, and no model."""
+
+    heading: str = ""
+
+    @property
+    def title(self) -> str:
+        return self.heading
+
+    @classmethod
+    def of(cls, subject: Subject) -> Described:
+        settings = {name: str(value) for name, value in subject.settings.items()}
+        return cls(None, subject.target, settings, subject.title)
+
+
 def guarded(model: Any, method: str, run: Any) -> Any:
     """What `run` returns; an exception inside the model comes out as a Fault that names its line."""
     try:
         return run()
     except (Fault, GonioError, KeyboardInterrupt, TimeoutError):
         raise
-    except Exception as error:
+    except (Exception, SystemExit, GeneratorExit) as error:
         text = str(error).strip().splitlines()
         raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from error
 
 
-def _line(model: Any, error: Exception) -> str:
+def _line(model: Any, error: BaseException) -> str:
     """file:line of the innermost frame inside the model's own file, else of the innermost frame at all."""
     frames = traceback.extract_tb(error.__traceback__)
     try:
