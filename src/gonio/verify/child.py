@@ -4,7 +4,8 @@ report.
     trial(Task((Item("glass.py:Glass"),), "quick", seed=1), jobs=2)
 
 A process judges one card after the other and says what it begins (`gonio.verify.worker`). When it dies, or takes too
-long or too much, the law that it was at fails, and a new process judges the card again without that law. Only once all
+long or too much, a new process judges the card again without the call that it was in, which fails the laws that need
+it; or, where it was in none, without the law. Only once all
 cards are judged is it known how many statistical tests the report holds; each process then gives its verdicts. So the
 report is the same however many processes there are.
 
@@ -17,6 +18,7 @@ import contextlib
 import os
 import pickle
 import queue
+import shutil
 import signal
 import subprocess
 import sys
@@ -37,11 +39,13 @@ if TYPE_CHECKING:
     from .verdict import Card
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
+PRINTED, CALLING = "printed", "calling"  # files of a process: its standard output and error, and which method it is in
+ANY = "*"  # all values of the parameters
 GRACE = 1.0  # seconds over the limit: a loop in Python is stopped by the alarm inside, which spares a new process
 LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take some
 LOOK = 0.05  # seconds between two looks at time and memory
-PRINTED = 256 << 20  # bytes; what prints more is stopped before it fills the disk
-STRIKES = 3  # deaths while nothing was asked, after which a card is given up
+MOST_PRINTED = 256 << 20  # bytes; what prints more is stopped before it fills the disk
+STRIKES = 3  # deaths of a method, or while nothing was asked, after which it is not called again
 
 Progress = Callable[[int, int, str], None]
 
@@ -114,10 +118,13 @@ class _Worker:
     """One process, and what it is at: `doing`, a card and a step, since when."""
 
     def __init__(self, task: Task, limit: float, answers: queue.Queue[tuple[_Worker, Any]]) -> None:
-        handle, self.log = tempfile.mkstemp(prefix="gonio-verify-", suffix=".log")
-        code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.verify import worker; worker.main({self.log!r})"
+        self.folder = Path(tempfile.mkdtemp(prefix="gonio-verify-"))
+        self.log = self.folder / PRINTED
+        (self.folder / CALLING).write_bytes(b"\n" * 256)
+        handle = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+        code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.verify import worker; worker.main(sys.argv[1])"
         self.process = subprocess.Popen(
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", code, str(self.folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=handle,
@@ -152,8 +159,8 @@ class _Worker:
         if _resident(self.process.pid) > memory:
             return f"more than {memory / 1e9:.3g} GB of memory"
         with contextlib.suppress(OSError):
-            if os.stat(self.log).st_size > PRINTED:
-                return f"it printed more than {PRINTED >> 20} MB"
+            if os.stat(self.log).st_size > MOST_PRINTED:
+                return f"it printed more than {MOST_PRINTED >> 20} MB"
         return ""
 
     def end(self, reason: str = "") -> None:
@@ -185,9 +192,16 @@ class _Worker:
     def last_words(self) -> str:
         """The last line that it printed."""
         with contextlib.suppress(OSError):
-            lines = Path(self.log).read_bytes()[-4096:].decode(errors="replace").strip().splitlines()
+            lines = self.log.read_bytes()[-4096:].decode(errors="replace").strip().splitlines()
             return lines[-1].strip()[:200] if lines else ""
         return ""
+
+    def call(self) -> tuple[str, str] | None:
+        """The method that it is in, and a key of the material's values; None where in none."""
+        with contextlib.suppress(OSError, ValueError):
+            method, key = (self.folder / CALLING).read_bytes().split(b"\n")[0].decode().split(" ")
+            return method, key
+        return None
 
     def forget(self) -> None:
         self.end()
@@ -195,8 +209,7 @@ class _Worker:
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
-        with contextlib.suppress(OSError):
-            os.unlink(self.log)
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def _read(self, answers: queue.Queue[tuple[_Worker, Any]]) -> None:
         assert self.process.stdout is not None
@@ -220,7 +233,8 @@ class _Pool:
         self.waiting: list[int] = []  # cards that are to be judged
         self.holder: dict[int, _Worker] = {}
         self.tests: dict[int, int] = {}
-        self.skip: dict[int, dict[str, str]] = {}
+        self.skip: dict[int, dict[str, str]] = {}  # by law, why it must not be asked again
+        self.forbidden: dict[int, dict[tuple[str, str], str]] = {}  # by method and values, why it must not be called
         self.notes: dict[int, list[str]] = {}
         self.strikes: dict[int, int] = {}
         self.begun: set[tuple[int, str]] = set()
@@ -275,7 +289,7 @@ class _Pool:
                 card = self.waiting.pop(0)
                 worker.busy = True
                 worker.begins(card, BETWEEN)
-                worker.order("judge", card, self.skip.get(card, {}))
+                worker.order("judge", card, self.skip.get(card, {}), self.forbidden.get(card, {}))
         idle = sum(not worker.busy or not worker.ready for worker in self.workers)
         for _ in range(min(len(self.waiting) - idle, self.jobs - len(self.workers))):
             self._new()
@@ -349,7 +363,7 @@ class _Pool:
     def _lost(self, worker: _Worker, reason: str) -> None:
         """A process is gone: what it was at fails, and all that it held is judged again without that."""
         card, step = worker.doing
-        last = worker.last_words()
+        last, call = worker.last_words(), worker.call()
         worker.forget()
         self.workers.remove(worker)
         words = f"{reason}; the last line that it printed: {last}" if last else reason
@@ -358,19 +372,8 @@ class _Pool:
         if step == LOADING:
             raise InputError(f"{LOADING}: {words}", _names(self.task), "a BSDF must load before it can be judged")
         assert self.titles is not None
-        skip = self.skip.setdefault(card, {})
-        if step == BETWEEN:
-            self.strikes[card] = self.strikes.get(card, 0) + 1
-        if step in skip or self.strikes.get(card, 0) >= STRIKES:
-            if all(law in skip for law in self.laws):
-                raise MachineError(f"the process that judges dies whatever is asked: {words}", self.titles[card])
-            skip.update({law: reason for law in self.laws if law not in skip})
-        elif step != BETWEEN:
-            skip[step] = reason
-            if step not in self.laws:
-                self.notes.setdefault(card, []).append(f"{step}: {reason}")
-        if last:
-            self.notes.setdefault(card, []).append(f"{step}: the last line that it printed: {last}")
+        self._note(card, f"the last line that it printed before it ended: {last}" if last else "")
+        self._avoid(card, step, call, reason)
         again = [one for one, holder in self.holder.items() if holder is worker and one not in self.cards]
         for one in again:
             del self.holder[one]
@@ -378,6 +381,32 @@ class _Pool:
         self.waiting = sorted({*self.waiting, *again, *current})
         if not self.workers:
             self._new()
+
+    def _avoid(self, card: int, step: str, call: tuple[str, str] | None, reason: str) -> None:
+        """Note what must not be done again: the call, or the law where that cannot be said."""
+        assert self.titles is not None
+        skip, forbidden = self.skip.setdefault(card, {}), self.forbidden.setdefault(card, {})
+        if call is not None and call not in forbidden and (call[0], ANY) not in forbidden:
+            method = call[0]
+            forbidden[call] = f"{reason} (in {method})"
+            if sum(name == method for name, _ in forbidden) >= STRIKES:
+                forbidden[method, ANY] = f"{reason} (in {method}, at {STRIKES} values of the parameters)"
+            return
+        if step == BETWEEN:
+            self.strikes[card] = self.strikes.get(card, 0) + 1
+        if step in skip or self.strikes.get(card, 0) >= STRIKES:
+            if all(law in skip for law in self.laws):
+                raise MachineError(f"the process that judges dies whatever is asked: {reason}", self.titles[card])
+            skip.update({law: reason for law in self.laws if law not in skip})
+        elif step != BETWEEN:
+            skip[step] = reason
+            if step not in self.laws:
+                self._note(card, f"{step}: {reason}")
+
+    def _note(self, card: int, text: str) -> None:
+        known = self.notes.setdefault(card, [])
+        if text and text not in known:
+            known.append(text)
 
 
 def _names(task: Task) -> str:
@@ -404,7 +433,7 @@ def _resident_on_windows(process: int) -> float:
     import ctypes
 
     kernel = ctypes.windll.kernel32  # type: ignore[attr-defined,unused-ignore]
-    counters = (ctypes.c_size_t * 10)()  # PROCESS_MEMORY_COUNTERS: two DWORDs in the first, the working set in the third
+    counters = (ctypes.c_size_t * 10)()  # PROCESS_MEMORY_COUNTERS: two DWORDs come first, the third is the working set
     counters[0] = ctypes.sizeof(counters) - ctypes.sizeof(ctypes.c_size_t)
     handle = kernel.OpenProcess(0x1000, False, process)  # PROCESS_QUERY_LIMITED_INFORMATION
     try:

@@ -15,12 +15,15 @@ import warnings
 
 import numpy as np
 
-from ..errors import GonioError, GonioWarning
+from ..errors import GonioError, GonioWarning, InputError
+from ..models import BSDF, models, notation
 from . import directions
 from .subject import Fault, Subject
+from .subject import of as subject_of
 
 THETA = (6.0, 17.0, 28.0, 39.0, 51.0, 62.0, 73.0, 84.0)  # of wo, degrees: the middles of eight equal parts
 SAMPLES = 1 << 12  # for each of them: the share of failed samples to half a percent
+INNER = ("conductor", "lambert")  # what a material that is built on others is judged with
 LEAST = 1e-9  # a relative variance below it is rounding
 
 
@@ -30,8 +33,8 @@ class Quality:
 
     failed    share of samples that fail: pdf = 0, nothing to follow
     variance  of the weight, relative to the square of its mean; a failed sample weighs 0
-    cosine    variance of the albedo when wi is drawn by the cosine (over the sphere where light is transmitted), divided
-              by the model's own; None where a delta lobe, which the cosine never finds, or no variance leaves no quotient
+    cosine    variance of the albedo when wi is drawn by the cosine (on both sides where light is transmitted), divided
+              by the model's own; None where there is a delta lobe, which the cosine never finds, or no variance at all
     ideal     how much a sample tells of the albedo, against a sampling without variance: mean^2 / (mean^2 + variance)
     """
 
@@ -78,6 +81,23 @@ def of(subject: Subject, seed: int = 1) -> Quality | None:
         return None  # which the laws report
 
 
+def of_models() -> dict[str, tuple[str, Quality | None]]:
+    """Every material at its defaults, by name: which it was, and its quality."""
+    return {name: (one.title, of(one)) for name, cls in models().items() for one in [_default(cls)]}
+
+
+def _default(cls: type[BSDF]) -> Subject:
+    """A material at its defaults; inner materials that it requires are the first of INNER that it takes."""
+    required = [name for name, parameter in cls.parameters().items() if parameter.required]
+    for turn in range(len(INNER)):
+        inner = {name: INNER[(turn + i) % len(INNER)] for i, name in enumerate(required)}
+        try:
+            return subject_of(cls(**{name: notation.named(text)[0] for name, text in inner.items()}))
+        except GonioError:
+            continue
+    raise InputError(f"{cls.name} takes none of {', '.join(INNER)}", "quality")
+
+
 def _measured(subject: Subject, seed: int) -> Quality | None:
     rng = np.random.default_rng([seed, 91])
     wo = np.concatenate([side * directions.at(np.array(THETA), 20.0) for side in subject.sides])
@@ -91,8 +111,8 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     if not lit.any():
         return None
     spread = np.where(lit, weight.var(1) / np.square(mean), 0.0)
-    # The second moment of eval / p_cos under cosine sampling is that of eval^2 / (p_cos pdf) under the model's own, which
-    # finds the narrow lobes that a few thousand samples by the cosine would miss.
+    # The second moment of eval / p_cos under cosine sampling is the mean of eval^2 / (p_cos pdf) under the model's own,
+    # which finds the narrow lobes that a few thousand samples by the cosine would miss.
     eval_ = s.weight.mean(1) * s.pdf
     if subject.stochastic:  # the weight is another random number than eval's
         eval_ = subject.eval(rows, s.wi, precision="float32").mean(1)
@@ -100,7 +120,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     second = np.where(s.pdf > 0.0, np.square(eval_) / (by_cosine * s.pdf), 0.0).reshape(shape).mean(1)
     delta = (s.delta & (s.pdf > 0.0)).any()
     model, cosine = float(spread[lit].mean()), float((second[lit] / np.square(mean[lit]) - 1.0).mean())
-    if not (math.isfinite(model) and math.isfinite(cosine) or delta):
+    if not ((math.isfinite(model) and math.isfinite(cosine)) or delta):
         return None
     quotient = None
     if not delta and max(model, cosine) < 1e-6:  # both without variance but for rounding: as good as each other
@@ -115,4 +135,4 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     )
 
 
-__all__ = ["Quality", "of"]
+__all__ = ["Quality", "of", "of_models"]

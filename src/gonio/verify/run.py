@@ -6,12 +6,13 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from .. import files, members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import box, directions, page, quality, statistics, subject
+from . import box, directions, page, quality, statistics, steady, subject
 from .box import Place
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .laws import Law, chosen
@@ -21,7 +22,8 @@ from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, F
 from .watch import limited
 
 DEFAULT_SEED = 1
-PLACES, QUALITY = "other values", "sampling quality"  # what is asked of a subject besides the laws
+# what is asked of a subject besides the laws
+STEADY, PLACES, QUALITY = "the same question twice", "other values", "sampling quality"
 CONFIRMATION = 0.001  # of the second seed's test: a real error shows there as well, chance does not
 Target = BSDF | Subject | str
 Begin = Callable[[str], None]
@@ -68,7 +70,7 @@ def verify(
         files.check_folder(report)
     effort = "quick" if quick else "deep" if deep else "default"
     names = None if law is None else [law] if isinstance(law, str) else list(law)
-    all_ = list(target) if isinstance(target, list | tuple) else [target]
+    all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
     if isolated is None:
         # what a program has registered, it alone knows
         isolated = all(isinstance(one, str) for one in all_) and not members.registered
@@ -102,7 +104,7 @@ def _here(
             nonlocal done
             if progress:
                 progress(min(done, steps), steps, f"{title}: {what}")
-            done += what not in (PLACES, QUALITY)
+            done += what not in (STEADY, PLACES, QUALITY)
 
         held.append(judged(one, laws, effort, seed, begin))
     tests = sum(one.tests for one in held)
@@ -118,6 +120,7 @@ class Held(NamedTuple):
     others: list[Place]
     laws: list[tuple[Law, list[Asked]]]
     quality: quality.Quality | None
+    changes: str
 
     @property
     def tests(self) -> int:
@@ -129,6 +132,10 @@ class Held(NamedTuple):
         for law, all_ in self.laws:
             begin(law.name)
             verdicts.append(_joined([_verdict(law, it, threshold, seed) for it in all_], all_))
+        asked = [verdict for verdict in verdicts if verdict.status != NOT_APPLICABLE]
+        if self.changes and asked:  # no law forbids it, and none can be judged: the first says so
+            asked[0].status = FAIL
+            asked[0].why.insert(0, self.changes)
         return Card(self.subject, verdicts, box.covered(self.subject, self.others), quality=self.quality)
 
 
@@ -138,13 +145,15 @@ def judged(
     effort: str,
     seed: int,
     begin: Begin = lambda what: None,
-    skip: Mapping[str, str] = {},  # noqa: B006  # read only
+    skip: Mapping[str, str] = MappingProxyType({}),
 ) -> Held:
     """What the laws find on a subject.
 
     begin  called with a law's name, or what else is next
     skip   what must not be asked again, and why: the BSDF ended the process, or kept it for ever
     """
+    begin(STEADY)
+    changes = "" if STEADY in skip else steady.changes(one)
     begin(PLACES)
     others = [] if PLACES in skip else _places(one, effort, seed)
     found: list[tuple[Law, list[Asked]]] = []
@@ -155,7 +164,7 @@ def judged(
         begin(law.name)
         found.append((law, _everywhere(law, one, others, effort, seed)))
     begin(QUALITY)
-    return Held(one, others, found, None if QUALITY in skip else quality.of(one, seed))
+    return Held(one, others, found, None if QUALITY in skip else quality.of(one, seed), changes)
 
 
 class Asked(NamedTuple):

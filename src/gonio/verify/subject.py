@@ -22,7 +22,7 @@ from ..errors import GonioError, InputError
 from ..models import BSDF, Breach, Parameter, Sample, notation, tree
 from ..models.sample import SampleArrays
 from ..ops import Precision, backend
-from . import directions
+from . import directions, watch
 
 
 class Fault(Exception):
@@ -209,7 +209,8 @@ class Described(Subject):
 def guarded(model: Any, method: str, run: Any) -> Any:
     """What `run` returns; an exception inside the model comes out as a Fault that names its line."""
     try:
-        return run()
+        with watch.calling(model, method) if watch.calling else contextlib.nullcontext():
+            return run()
     except (Fault, GonioError, KeyboardInterrupt, TimeoutError):
         raise
     except (Exception, SystemExit, GeneratorExit) as error:

@@ -7,12 +7,15 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import Any
 
 LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds a law; the slowest takes some ten
 GRACE = 20.0  # a loop inside a kernel does not hear the signal; after this the process ends
 watched = False  # whether a parent watches this process, and ends it where the signal is not heard
+# around each call of a BSDF, given the model and the method; the process that is watched says there where it is
+calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = None
 
 
 def words(seconds: float) -> str:

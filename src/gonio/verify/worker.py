@@ -1,13 +1,16 @@
 """The process in which a BSDF is judged, as `gonio.verify.child` starts it: it may loop, crash, print, or eat memory.
 
 Orders come pickled on standard input, answers leave pickled by a copy of standard output; what the BSDF itself prints
-goes to a file. An order is ("judge", card, skip) or ("card", card, threshold); before each step an answer says what is
-next, so that the parent knows what it was that never came back.
+goes to a file. An order is ("judge", card, skip, forbidden) or ("card", card, threshold); before each step an answer
+says what is next, and a file says which method is being called, so that the parent knows what it was that never came
+back.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import mmap
 import os
 import pickle
 import signal
@@ -15,24 +18,27 @@ import sys
 import threading
 import time
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from ..errors import GonioError, GonioWarning
+from ..models import BSDF, notation
 from . import run, targets, watch
-from .child import LOADING, Item, Task
+from .child import ANY, CALLING, LOADING, PRINTED, Item
 from .laws import chosen
-from .subject import Described, Subject, of
+from .subject import Described, Fault, Subject, of
 from .verdict import Card
 
 
-def main(log: str) -> None:
-    """Judge what the parent orders until it closes the pipe; what is printed goes to the file `log`."""
+def main(folder: str) -> None:
+    """Judge what the parent orders until it closes the pipe. The folder is for what is printed, and what is called."""
     orders, answers = _pipes()
     _end_with(os.getppid())
-    printed = _Printed(log)
+    printed = _Printed(Path(folder, PRINTED))
+    calls = _Calls(Path(folder, CALLING))
     task, limit = pickle.load(orders)
-    watch.watched, watch.LIMIT = True, limit
+    watch.watched, watch.LIMIT, watch.calling = True, limit, calls
     say = _Answers(answers)
     warnings.showwarning = say.warning
     warnings.simplefilter("always", GonioWarning)
@@ -45,7 +51,7 @@ def main(log: str) -> None:
         lines: dict[int, int] = {}
         while True:
             try:
-                order, card, what = pickle.load(orders)
+                order, card, *what = pickle.load(orders)
             except EOFError:
                 break
             before = printed.size()
@@ -54,14 +60,17 @@ def main(log: str) -> None:
                 say("begin", card, step)
 
             if order == "judge":
-                held[card] = run.judged(subjects[card], laws, task.effort, task.seed, begin, what)
+                skip, calls.forbidden = what
+                held[card] = run.judged(subjects[card], laws, task.effort, task.seed, begin, skip)
                 lines[card] = printed.since(before)
                 say("judged", card, held[card].tests)
             else:
-                made = held[card].card(what, task.seed, begin)
+                made = held[card].card(what[0], task.seed, begin)
                 say("card", card, _plain(made), lines[card] + printed.since(before))
     except GonioError as error:
         say("error", error)
+    except (_Stuck, Fault) as error:  # a fault here is that of a test's repetition
+        say("lost", str(error))
     except (KeyboardInterrupt, SystemExit, GeneratorExit, TimeoutError, MemoryError, RecursionError) as error:
         # Ctrl-C does not come here: this is the BSDF's doing, outside of what `guarded` sees
         say("lost", f"{type(error).__name__} ended the thread that judges it")
@@ -102,8 +111,8 @@ def _pipes() -> tuple[IO[bytes], IO[bytes]]:
 class _Printed:
     """Standard output and error, which end in a file from here on."""
 
-    def __init__(self, log: str) -> None:
-        self._log = Path(log)
+    def __init__(self, log: Path) -> None:
+        self._log = log
         file = os.open(log, os.O_WRONLY | os.O_APPEND)
         for stream in (1, 2):
             os.dup2(file, stream)
@@ -124,6 +133,53 @@ class _Printed:
             file.seek(before)
             text = file.read()
         return text.count(b"\n") + (not text.endswith(b"\n"))
+
+
+class _Stuck(BaseException):
+    """A call that did not end in time. Past every law: the parent starts anew, and that call is not made again."""
+
+
+class _Calls:
+    """Which method of which material is being called, kept in a file that outlives this process.
+
+    forbidden   by method and material, why it must not be called again
+    """
+
+    def __init__(self, file: Path) -> None:
+        with file.open("r+b") as opened:
+            self._memory = mmap.mmap(opened.fileno(), 0)
+        self.forbidden: dict[tuple[str, str], str] = {}
+        self._keys: dict[int, tuple[Any, str]] = {}
+
+    @contextlib.contextmanager
+    def __call__(self, model: Any, method: str) -> Iterator[None]:
+        key = self._key(model)
+        why = self.forbidden.get((method, key)) or self.forbidden.get((method, ANY))
+        if why:
+            raise Fault(why)
+        text = f"{method} {key}\n".encode()
+        self._memory[: len(text)] = text
+        try:
+            yield
+        except TimeoutError as error:
+            raise _Stuck(str(error)) from error  # and the file still says what was called
+        except BaseException as error:
+            self._memory[:1] = b"\n"
+            if isinstance(error, KeyboardInterrupt):  # the BSDF's doing: Ctrl-C does not come here
+                raise Fault(f"KeyboardInterrupt in {method}") from error
+            raise
+        self._memory[:1] = b"\n"
+
+    def _key(self, model: Any) -> str:
+        """The same for the same values, in every process."""
+        known = self._keys.get(id(model))
+        if known is None or known[0] is not model:  # the model is kept, so that no other gets its id
+            known = model, ""
+            if isinstance(model, BSDF):
+                with contextlib.suppress(Exception):
+                    known = model, hashlib.sha256(repr(notation.settings(model)).encode()).hexdigest()[:16]
+            self._keys[id(model)] = known
+        return known[1]
 
 
 def _end_with(parent: int) -> None:

@@ -37,7 +37,7 @@ class Outputs:
         Path | None, Option("--baseline", metavar="FILE", help="Fail only on what is not in it; a report.json will do.")
     ] = None
     write_baseline: Annotated[
-        Path | None, Option("--write-baseline", metavar="FILE", help="Write what fails there; it is known from then on.")
+        Path | None, Option("--write-baseline", metavar="FILE", help="Write what fails; it is known from then on.")
     ] = None
 
     def check(self) -> None:

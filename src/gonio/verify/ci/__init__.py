@@ -1,4 +1,4 @@
-"""A report for the machines of continuous integration: JUnit, SARIF, GitHub's annotations, a baseline of known failures.
+"""A report for continuous integration: JUnit, SARIF, GitHub's annotations, a baseline of known failures.
 
     gonio verify glass.py:Glass --junit laws.xml --sarif laws.sarif --baseline laws.json
 

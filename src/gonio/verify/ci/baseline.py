@@ -1,7 +1,7 @@
 """A baseline: what fails already and is not to stop anybody. Only what is new fails.
 
-A law of a card is known where it failed when the baseline was written, and its figure is no more than a tenth worse now.
-Any report.json is a baseline; `text` writes the short form, to be kept beside the code.
+A law of a card is known where it failed when the baseline was written, and its figure is at most a tenth worse now. Any
+report.json is a baseline; `text` writes the short form, to be kept beside the code.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ def apply(report: Report, known: Known) -> list[str]:
             elif _no_worse(verdict, known[key]):
                 verdict.status = KNOWN
             else:
-                verdict.notes.append(f"worse than in the baseline: {verdict.shown or 'no figure'}, {_words(known[key])}")
+                now = verdict.shown or "no figure"
+                verdict.notes.append(f"worse than in the baseline: {now}, {_words(known[key])}")
     return mended
 
 

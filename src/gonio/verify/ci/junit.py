@@ -14,10 +14,12 @@ _FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 
 def text(report: Report) -> str:
     """The file's text."""
-    root = xml.Element("testsuites", name="gonio verify", **_counts(report.cards), time=f"{report.seconds:.3f}")
+    root = xml.Element("testsuites", {"name": "gonio verify", **_counts(report.cards), "time": f"{report.seconds:.3f}"})
     for card in report.cards:
         time = sum(verdict.seconds for verdict in card.verdicts)
-        suite = xml.SubElement(root, "testsuite", name=_clean(card.title), **_counts([card]), time=f"{time:.3f}")
+        suite = xml.SubElement(
+            root, "testsuite", {"name": _clean(card.title), **_counts([card]), "time": f"{time:.3f}"}
+        )
         for verdict in card.verdicts:
             _case(suite, card, verdict)
         lines = [*card.notes, *([card.quality.words] if card.quality else [])]

@@ -14,6 +14,9 @@ _CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
 _LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
 
 
+_SLIGHT = ("invisible", "noise", "fitting only")  # grades that bias no picture
+
+
 class Place(NamedTuple):
     """A file as the repository names it, "materials/glass.py", and a line of it."""
 
@@ -37,9 +40,9 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
 
 
 def level(verdict: Verdict) -> str:
-    """ "error" for what fails, "warning" for what no picture shows, "note" for what is declared or known, else "none"."""
+    """ "error" for what fails, "warning" where no picture shows it, "note" where declared or known, else "none"."""
     if verdict.status == FAIL:
-        return "warning" if grade(verdict) == "negligible" else "error"
+        return "warning" if grade(verdict) in _SLIGHT else "error"
     return "note" if verdict.status in (DECLARED, KNOWN) else "none"
 
 
