@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
 PRINTED, CALLING = "printed", "calling"  # files of a process: its standard output and error, and which method it is in
+ISOLATED = "isolated"  # what an error about a material that cannot be sent points at
 ANY = "*"  # all values of the parameters
 GRACE = 1.0  # seconds over the limit: a loop in Python is stopped by the alarm inside, which spares a new process
 LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take some
@@ -87,7 +88,7 @@ def object_(material: Any) -> Item:
             if not any(cls.__module__ == "__main__" for cls in classes):
                 return Item(pickle.dumps(material))
     what = f"{type(material).__name__} cannot be sent to another process"
-    raise InputError(what, "isolated", "put the class into a file and name it FILE.py:CLASS")
+    raise InputError(what, ISOLATED, "put the class into a file and name it FILE.py:CLASS")
 
 
 def trial(

@@ -22,10 +22,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import GonioError, GonioWarning
+from ..errors import GonioError, GonioWarning, InputError
 from ..models import BSDF, notation
 from . import run, targets, watch
-from .child import ANY, CALLING, LOADING, PRINTED, Item
+from .child import ANY, CALLING, ISOLATED, LOADING, PRINTED, Item
 from .laws import chosen
 from .subject import Described, Fault, Subject, of
 from .verdict import Card
@@ -200,7 +200,11 @@ def _end_with(parent: int) -> None:
 
 def _subjects(item: Item) -> list[Subject]:
     if isinstance(item.target, bytes):
-        return [of(pickle.loads(item.target))]
+        try:
+            return [of(pickle.loads(item.target))]
+        except Exception as error:  # of a module that can be imported in the other process alone
+            what = f"the material cannot be sent to another process: {error}"
+            raise InputError(what, ISOLATED, "put the class into a file and name it FILE.py:CLASS") from error
     return targets.resolve(item.target, item.settings, item.sweep)
 
 
