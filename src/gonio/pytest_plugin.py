@@ -36,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def gonio_verify() -> Callable[..., Report]:
-    """Fail the test where a material breaks a law: gonio_verify(material or target, law=None, breaks=()); see `check`."""
+    """Fail the test where a material breaks a law: gonio_verify(material or target, ...), as `check`."""
     return check
 
 

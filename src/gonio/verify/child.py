@@ -41,12 +41,12 @@ if TYPE_CHECKING:
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
 PRINTED, CALLING = "printed", "calling"  # files of a process: its standard output and error, and which method it is in
 ISOLATED = "isolated"  # what an error about a material that cannot be sent points at
-ANY = "*"  # all values of the parameters
+OTHERS = "*"  # all values of the parameters but the given ones
 GRACE = 1.0  # seconds over the limit: a loop in Python is stopped by the alarm inside, which spares a new process
 LOAD = 20.0  # seconds at least to start and to load: Mitsuba alone may take some
 LOOK = 0.05  # seconds between two looks at time and memory
 MOST_PRINTED = 256 << 20  # bytes; what prints more is stopped before it fills the disk
-STRIKES = 3  # deaths of a method, or while nothing was asked, after which it is not called again
+STRIKES = 3  # deaths of a method after which it is asked at the given values only; of a card while nothing was asked
 
 Progress = Callable[[int, int, str], None]
 
@@ -121,7 +121,7 @@ class _Worker:
     def __init__(self, task: Task, limit: float, answers: queue.Queue[tuple[_Worker, Any]]) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="gonio-verify-"))
         self.log = self.folder / PRINTED
-        (self.folder / CALLING).write_bytes(b"\n" * 256)
+        (self.folder / CALLING).write_bytes(b"\n" * 512)
         handle = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.verify import worker; worker.main(sys.argv[1])"
         self.process = subprocess.Popen(
@@ -197,11 +197,11 @@ class _Worker:
             return lines[-1].strip()[:200] if lines else ""
         return ""
 
-    def call(self) -> tuple[str, str] | None:
-        """The method that it is in, and a key of the material's values; None where in none."""
+    def call(self) -> tuple[str, str, str] | None:
+        """The method that it is in, and the material's values, as a key and in words; None where in none."""
         with contextlib.suppress(OSError, ValueError):
-            method, key = (self.folder / CALLING).read_bytes().split(b"\n")[0].decode().split(" ")
-            return method, key
+            method, key, values = (self.folder / CALLING).read_bytes().split(b"\n")[0].decode().split("\t")
+            return method, key, values
         return None
 
     def forget(self) -> None:
@@ -383,15 +383,16 @@ class _Pool:
         if not self.workers:
             self._new()
 
-    def _avoid(self, card: int, step: str, call: tuple[str, str] | None, reason: str) -> None:
+    def _avoid(self, card: int, step: str, call: tuple[str, str, str] | None, reason: str) -> None:
         """Note what must not be done again: the call, or the law where that cannot be said."""
         assert self.titles is not None
         skip, forbidden = self.skip.setdefault(card, {}), self.forbidden.setdefault(card, {})
-        if call is not None and call not in forbidden and (call[0], ANY) not in forbidden:
-            method = call[0]
-            forbidden[call] = f"{reason} (in {method})"
+        if call is not None and call[:2] not in forbidden:
+            method, key, values = call
+            forbidden[method, key] = f"{reason} (in {method}{', at ' if values else ''}{values})"
             if sum(name == method for name, _ in forbidden) >= STRIKES:
-                forbidden[method, ANY] = f"{reason} (in {method}, at {STRIKES} values of the parameters)"
+                first = next(text for (name, _), text in forbidden.items() if name == method)
+                forbidden.setdefault((method, OTHERS), f"not asked here, because {first}, and at others")
             return
         if step == BETWEEN:
             self.strikes[card] = self.strikes.get(card, 0) + 1

@@ -24,6 +24,7 @@ from .subject import of as subject_of
 THETA = (6.0, 17.0, 28.0, 39.0, 51.0, 62.0, 73.0, 84.0)  # of wo, degrees: the middles of eight equal parts
 SAMPLES = 1 << 12  # for each of them: the share of failed samples to half a percent
 INNER = ("conductor", "lambert")  # what a material that is built on others is judged with
+POWER = "importance"
 LEAST = 1e-9  # a relative variance below it is rounding
 
 
@@ -99,10 +100,13 @@ def _default(cls: type[BSDF]) -> Subject:
 
 
 def _measured(subject: Subject, seed: int) -> Quality | None:
+    if not subject.sides:
+        return None
     rng = np.random.default_rng([seed, 91])
     wo = np.concatenate([side * directions.at(np.array(THETA), 20.0) for side in subject.sides])
     rows = directions.single(np.repeat(wo, SAMPLES, axis=0))
-    s = subject.sample(rows, directions.numbers(rng, len(rows)), precision="float32")
+    # of power: the factor eta^2 of radiance is undone where light leaves again, and is no noise
+    s = subject.sample(rows, directions.numbers(rng, len(rows)), POWER, "float32")
     shape = (len(wo), SAMPLES)
     found = (s.pdf > 0.0).reshape(shape)
     weight = np.where(found, s.weight.mean(1).reshape(shape), 0.0)
@@ -115,7 +119,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     # which finds the narrow lobes that a few thousand samples by the cosine would miss.
     eval_ = s.weight.mean(1) * s.pdf
     if subject.stochastic:  # the weight is another random number than eval's
-        eval_ = subject.eval(rows, s.wi, precision="float32").mean(1)
+        eval_ = subject.eval(rows, s.wi, POWER, "float32").mean(1)
     by_cosine = np.abs(s.wi[:, 2]) / (np.pi * (2.0 if subject.transmits else 1.0))
     second = np.where(s.pdf > 0.0, np.square(eval_) / (by_cosine * s.pdf), 0.0).reshape(shape).mean(1)
     delta = (s.delta & (s.pdf > 0.0)).any()

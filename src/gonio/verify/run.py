@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -73,7 +74,7 @@ def verify(
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
     if isolated is None:
         # what a program has registered, it alone knows
-        isolated = all(isinstance(one, str) for one in all_) and not members.registered
+        isolated = all(isinstance(one, str) for one in all_) and not members.registered and bool(sys.executable)
     if isolated:
         from . import child
 

@@ -25,7 +25,7 @@ from typing import IO, Any
 from ..errors import GonioError, GonioWarning, InputError
 from ..models import BSDF, notation
 from . import run, targets, watch
-from .child import ANY, CALLING, ISOLATED, LOADING, PRINTED, Item
+from .child import CALLING, ISOLATED, LOADING, OTHERS, PRINTED, Item
 from .laws import chosen
 from .subject import Described, Fault, Subject, of
 from .verdict import Card
@@ -60,7 +60,8 @@ def main(folder: str) -> None:
                 say("begin", card, step)
 
             if order == "judge":
-                skip, calls.forbidden = what
+                skip, forbidden = what
+                calls.judge(subjects[card].model, forbidden)
                 held[card] = run.judged(subjects[card], laws, task.effort, task.seed, begin, skip)
                 lines[card] = printed.since(before)
                 say("judged", card, held[card].tests)
@@ -142,22 +143,27 @@ class _Stuck(BaseException):
 class _Calls:
     """Which method of which material is being called, kept in a file that outlives this process.
 
-    forbidden   by method and material, why it must not be called again
+    forbidden   by method and values, why it must not be called again
+    given       the key of the values that the material was given
     """
 
     def __init__(self, file: Path) -> None:
         with file.open("r+b") as opened:
             self._memory = mmap.mmap(opened.fileno(), 0)
         self.forbidden: dict[tuple[str, str], str] = {}
-        self._keys: dict[int, tuple[Any, str]] = {}
+        self.given = ""
+        self._keys: dict[int, tuple[Any, str, str]] = {}
+
+    def judge(self, model: Any, forbidden: dict[tuple[str, str], str]) -> None:
+        self.given, self.forbidden = self._values(model)[0], forbidden
 
     @contextlib.contextmanager
     def __call__(self, model: Any, method: str) -> Iterator[None]:
-        key = self._key(model)
-        why = self.forbidden.get((method, key)) or self.forbidden.get((method, ANY))
+        key, words = self._values(model)
+        why = self.forbidden.get((method, key)) or (key != self.given and self.forbidden.get((method, OTHERS)))
         if why:
             raise Fault(why)
-        text = f"{method} {key}\n".encode()
+        text = f"{method}\t{key}\t{words}\n".encode()
         self._memory[: len(text)] = text
         try:
             yield
@@ -170,16 +176,18 @@ class _Calls:
             raise
         self._memory[:1] = b"\n"
 
-    def _key(self, model: Any) -> str:
-        """The same for the same values, in every process."""
+    def _values(self, model: Any) -> tuple[str, str]:
+        """The values of a material's parameters as a key, the same in every process, and in words."""
         known = self._keys.get(id(model))
         if known is None or known[0] is not model:  # the model is kept, so that no other gets its id
-            known = model, ""
+            key = words = ""
             if isinstance(model, BSDF):
                 with contextlib.suppress(Exception):
-                    known = model, hashlib.sha256(repr(notation.settings(model)).encode()).hexdigest()[:16]
-            self._keys[id(model)] = known
-        return known[1]
+                    settings = notation.settings(model)
+                    key = hashlib.sha256(repr(settings).encode()).hexdigest()[:16]
+                    words = ", ".join(f"{name} = {notation.written(value)}" for name, value in settings.items())
+            known = self._keys[id(model)] = model, key, " ".join(words.split())[:160]
+        return known[1], known[2]
 
 
 def _end_with(parent: int) -> None:
