@@ -10,11 +10,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from .. import files, members
+from .. import members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import box, directions, page, quality, statistics, steady, subject
+from . import box, directions, quality, statistics, steady, subject
 from .box import Place
+from .ci.outputs import Outputs
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .laws import Law, chosen
 from .report import SIGNIFICANCE, Report
@@ -39,6 +40,10 @@ def verify(
     seed: int = DEFAULT_SEED,
     law: str | Sequence[str] | None = None,
     report: str | Path | None = None,
+    junit: str | Path | None = None,
+    sarif: str | Path | None = None,
+    baseline: str | Path | None = None,
+    write_baseline: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     isolated: bool | None = None,
     jobs: int = 1,
@@ -56,6 +61,8 @@ def verify(
     seed      of all random numbers; same seed, same report
     law       a law's name, or several; all where None
     report    folder for report.html and report.json; None writes nothing
+    junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
+    baseline  file of what is known to fail, and fails no more because of it; `write_baseline` writes one
     progress  called with steps done, steps in all, and what is next
     isolated  whether the BSDF is judged in a process of its own, which it may bring down or keep for ever: that fails
               the law, and the next one is asked. Names are, and objects are not, unless this says otherwise
@@ -67,8 +74,8 @@ def verify(
     """
     if quick and deep:
         raise InputError("quick and deep together", "--quick", "give one of them")
-    if report is not None:
-        files.check_folder(report)
+    outputs = Outputs(report, junit, sarif, baseline, write_baseline)
+    known = outputs.check()
     effort = "quick" if quick else "deep" if deep else "default"
     names = None if law is None else [law] if isinstance(law, str) else list(law)
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
@@ -83,8 +90,7 @@ def verify(
         made = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     else:
         made = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
-    if report is not None:
-        page.write(made, Path(report))
+    outputs.write(made, known)
     return made
 
 

@@ -17,12 +17,11 @@ from ..output import Bar
 from .base import MATERIALS, verb
 
 if TYPE_CHECKING:
-    from ...verify.ci.baseline import Known
     from ...verify.report import Report
 
 
 @dataclass(frozen=True)
-class Outputs:
+class Files:
     """Files for people, and for the machines of continuous integration."""
 
     report: Annotated[
@@ -40,57 +39,18 @@ class Outputs:
         Path | None, Option("--write-baseline", metavar="FILE", help="Write what fails; it is known from then on.")
     ] = None
 
-    def check(self) -> None:
-        """Raise InputError for what cannot be written, before anything is computed."""
-        from ... import files
-
-        if self.report is not None:
-            files.check_folder(self.report)
-        for file in (self.junit, self.sarif, self.write_baseline):
-            if file is not None:
-                files.check_file(file)
-
-    def known(self) -> Known:
-        """What is known to fail; InputError where the baseline is none."""
-        if self.baseline is None:
-            return {}
-        from ...verify.ci import baseline
-
-        return baseline.read(self.baseline)
-
-    def write(self, found: Report, known: Known, as_json: bool) -> None:
-        """Mark what is known in the report, write the files, and print what is for the runner."""
-        from ... import files
-        from ...verify import page
-        from ...verify.ci import baseline, github, junit, sarif
-
-        mended = baseline.apply(found, known)
-        if self.write_baseline is not None:
-            files.write_whole(self.write_baseline, baseline.text(found).encode())
-            baseline.apply(found, baseline.read(self.write_baseline))
-        if self.report is not None:
-            page.write(found, self.report)
-        for file, format_ in ((self.junit, junit), (self.sarif, sarif)):
-            if file is not None:
-                files.write_whole(file, format_.text(found).encode())
-        stream = sys.stderr if as_json else sys.stdout  # the runner reads both
-        if self.github or github.wanted():
-            stream.write(github.text(found))
-        for line in mended:
-            print(f"mended: {line}", file=stream)
-
 
 @verb(MATERIALS, place=2)
 def verify(
     target: Annotated[
         list[str],
         Argument(
-            metavar="TARGET...",
+            metavar="TARGET",
             help="MODEL, FILE.py:CLASS, mitsuba:PLUGIN, or a Mitsuba .xml or .json; several share the options.",
             autocompletion=completion.materials,
         ),
     ],
-    outputs: Outputs,
+    to: Files,
     param: Parameters = None,
     sweep: Annotated[
         str, Option(metavar="NAME=A..B", help="A card for each of five values, or for NAME=V1,V2,...")
@@ -131,11 +91,12 @@ def verify(
     # Nothing heavy before the first process has started: it takes as long as all else together.
     from ...errors import InputError
     from ...verify import child
+    from ...verify.ci.outputs import Outputs
 
     if quick and deep:
         raise InputError("quick and deep together", "--quick", "give one of them")
-    outputs.check()
-    known = outputs.known()
+    wanted = Outputs(**{name: value for name, value in vars(to).items() if name != "github"})
+    known = wanted.check()
     items = [child.Item(one, tuple(param or ()), sweep) for one in target]
     task = child.Task(items, "quick" if quick else "deep" if deep else "default", seed, law)
     with contextlib.ExitStack() as stack:
@@ -148,17 +109,26 @@ def verify(
                 bars[0].step(done, total, state)
 
         found = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
-    outputs.write(found, known, as_json)
+    wanted.write(found, known)
+    _annotate(found, to.github, as_json)
     if as_json:
         print(json.dumps(found.as_dict()))
     else:
         from rich.console import Console
 
         found.show(Console(emoji=False))
-        if outputs.report is not None:
-            print(outputs.report / "report.html")
+        if to.report is not None:
+            print(to.report / "report.html")
     if not found.passed:
         raise Exit(found.exit_code)
+
+
+def _annotate(found: Report, wanted: bool, as_json: bool) -> None:
+    """Print annotations where they are wanted, or where a runner reads them: standard output and error alike."""
+    from ...verify.ci import github
+
+    if wanted or github.wanted():
+        (sys.stderr if as_json else sys.stdout).write(github.text(found))
 
 
 def _show_pairs(target: list[str], param: list[str], sweep: str, at: str, as_json: bool) -> None:
