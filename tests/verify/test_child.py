@@ -76,6 +76,12 @@ class KillsItsThread(Good):
         for _ in range(10_000): pass
         return super().sample(wo, u, mode)
 
+class RaisesAside(Good):
+    """Fails where no method is called."""
+    @property
+    def transmits(self):
+        raise ValueError("which side?")
+
 class Prints(Good):
     """Has much to say."""
     def sample(self, wo, u, mode="radiance"):
@@ -135,6 +141,11 @@ def test_what_is_printed_is_counted_and_does_not_disturb_json(file: Path) -> Non
 def test_an_answer_that_changes_is_a_failure_that_says_so(file: Path) -> None:
     report = judged(file, "Changes")
     assert "eval changed its answer between two calls" in report["reciprocity"].why[0]
+
+
+def test_a_fact_that_raises_fails_the_laws_that_ask_for_it(file: Path) -> None:
+    report = judged(file, "RaisesAside")
+    assert "ValueError: which side? (hostile.py:" in report["reciprocity"].why[0]
 
 
 @pytest.mark.parametrize(("line", "words"), [("os._exit(3)", "exit code 3"), ("raise SystemExit", "SystemExit")])
@@ -210,3 +221,7 @@ def test_the_parent_starts_the_child_before_it_loads_anything() -> None:
         "import sys, gonio.verify.child; print(*{'numpy', 'drjit', 'mitsuba', 'gonio.models', 'rich'} & {*sys.modules})"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == ""
+
+
+def test_no_target_is_an_empty_report() -> None:
+    assert verify([], quick=True).passed

@@ -110,7 +110,8 @@ def trial(
     limit = watch.LIMIT if limit is None else limit
     if limit <= 0.0 or (memory is not None and memory <= 0.0):
         raise InputError("a limit of nothing", "--limit" if limit <= 0.0 else "--memory", "give more than 0")
-    most = 0.5 * _machine_memory() / jobs if memory is None else memory * 1e9
+    jobs = min(jobs, sum(item.cards for item in task.items))
+    most = 0.5 * _machine_memory() / max(jobs, 1) if memory is None else memory * 1e9
     with _Pool(task, jobs, limit, most, progress) as pool:
         return pool.run()
 
@@ -225,8 +226,7 @@ class _Pool:
     """The processes of a trial, and what is known of each card."""
 
     def __init__(self, task: Task, jobs: int, limit: float, memory: float, progress: Progress | None) -> None:
-        self.task, self.limit, self.memory, self.progress = task, limit, memory, progress
-        self.jobs = min(jobs, sum(item.cards for item in task.items))
+        self.task, self.jobs, self.limit, self.memory, self.progress = task, jobs, limit, memory, progress
         self.answers: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
         self.workers: list[_Worker] = []
         self.titles: list[str] | None = None
@@ -259,7 +259,7 @@ class _Pool:
         from .report import SIGNIFICANCE, Report
 
         tests = threshold = None
-        while self.titles is None or len(self.cards) < len(self.titles):
+        while self.workers and (self.titles is None or len(self.cards) < len(self.titles)):
             self._listen()
             if self.titles is None:
                 continue
@@ -269,7 +269,7 @@ class _Pool:
             self._distribute(threshold)
         if tests is None or threshold is None:
             tests, threshold = 0, SIGNIFICANCE
-        cards = [self.cards[i] for i in range(len(self.titles))]
+        cards = [self.cards[i] for i in sorted(self.cards)]
         seconds = time.perf_counter() - self.started
         return Report(cards, self.task.seed, self.task.effort, tests, threshold, seconds)
 
@@ -378,7 +378,7 @@ class _Pool:
         again = [one for one, holder in self.holder.items() if holder is worker and one not in self.cards]
         for one in again:
             del self.holder[one]
-        current = [card] if card not in self.cards and card not in self.holder else []
+        current = [card] if worker.busy and card not in self.cards and card not in self.holder else []
         self.waiting = sorted({*self.waiting, *again, *current})
         if not self.workers:
             self._new()

@@ -17,13 +17,14 @@ import signal
 import sys
 import threading
 import time
+import traceback
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
 from ..errors import GonioError, GonioWarning, InputError
-from ..models import BSDF, notation
+from ..models import BSDF, notation, outside
 from . import run, targets, watch
 from .child import CALLING, ISOLATED, LOADING, OTHERS, PRINTED, Item
 from .laws import chosen
@@ -76,11 +77,20 @@ def main(folder: str) -> None:
         # Ctrl-C does not come here: this is the BSDF's doing, outside of what `guarded` sees
         say("lost", f"{type(error).__name__} ended the thread that judges it")
     except BaseException as error:
-        import traceback
-
-        say("fault", f"{type(error).__name__}: {error}", traceback.format_exc())
+        place = _outside(error)
+        if place:
+            say("lost", f"{type(error).__name__}: {error} ({place})")
+        else:
+            say("fault", f"{type(error).__name__}: {error}", traceback.format_exc())
     sys.stdout.flush()
     os._exit(0)  # whatever threads and handlers the BSDF has left behind
+
+
+def _outside(error: BaseException) -> str:
+    """file:line where an exception came from a file of the user's, in no call that `guarded` sees; else ""."""
+    files = {getattr(module, "__file__", "") for name, module in sys.modules.items() if name.startswith(outside.PREFIX)}
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
+    return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
 
 
 class _Answers:
