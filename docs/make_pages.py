@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import gonio as go
+from gonio.verify import quality
 from gonio.viewer import manual
 
 FOLDER = Path(__file__).parent / "models"
@@ -17,7 +18,11 @@ FOLDER = Path(__file__).parent / "models"
 def main() -> int:
     """Write or check the pages; returns the exit code."""
     check = "--check" in sys.argv[1:]
-    pages = {FOLDER / f"{name}.md": manual.page(model).markdown() for name, model in go.models().items()}
+    sampling = quality.of_models()
+    pages = {
+        FOLDER / f"{name}.md": manual.page(model).markdown() + _sampling(*sampling[name])
+        for name, model in go.models().items()
+    }
     stale = [path for path, text in pages.items() if not path.exists() or path.read_text() != text]
     stale += [path for path in FOLDER.glob("*.md") if path not in pages]
     if check:
@@ -32,6 +37,13 @@ def main() -> int:
             path.unlink()
     print(f"{len(pages)} pages, {len(stale)} written")
     return 0
+
+
+def _sampling(title: str, found: quality.Quality | None) -> str:
+    """A paragraph on how well a material samples itself."""
+    if found is None:
+        return ""
+    return f"\nSampling of `{title}`: {found.words.removeprefix('sampling: ')} ([what that is](../verify.md)).\n"
 
 
 if __name__ == "__main__":

@@ -98,6 +98,8 @@ def page(target: str, report: Report) -> str:
         for v in card.verdicts:
             allowed = "" if v.tolerance is None or v.tolerance == float("inf") else f"{v.tolerance:.0e}"
             lines.append(f"| {v.law} | {MARKS[v.status]} | {v.shown} | {allowed} | {_remark(v)} |")
+        if card.quality is not None:
+            lines += ["", card.quality.words.capitalize() + "."]
         failed = [v for v in card.verdicts if v.failed]
         for v in failed:
             lines += ["", f"**{v.law}**: {'; '.join(_clean(w) for w in v.why)}.", "", f"    {v.command}"]

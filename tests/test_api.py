@@ -24,7 +24,7 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
 }
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
 TEXT = {"param", "preset", "as_json"}
-ONLY_TYPED = {"verify": {"at"}, "emit": {"output", "bundle"}}
+ONLY_TYPED = {"verify": {"at", "github"}, "emit": {"output", "bundle"}}
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
 

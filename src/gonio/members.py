@@ -129,6 +129,7 @@ def _entry_points(group: str) -> Iterable[EntryPoint]:
 
 
 Thing = TypeVar("Thing")
+registered: list[str] = []  # by this program: what another process does not know of
 
 
 def register(thing: Thing) -> Thing:
@@ -140,7 +141,7 @@ def register(thing: Thing) -> Thing:
     It is then known by its name wherever Gonio's own are. Returns the thing itself. InputError where it belongs to no
     family, or takes the name of a member that is another.
     """
-    family_of(thing).add(thing)
+    registered.append(family_of(thing).add(thing))
     return thing
 
 

@@ -4,16 +4,31 @@
     go.verify(go.Conductor(alpha=0.3)).passed
 
 One law a file in `laws`, or in a package of your own. The room knows the BSDF protocol and nothing of any material.
+Names load when first used: `gonio verify` starts the process that judges before it loads anything itself.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from .._callable import make_callable
-from .effort import EFFORTS
-from .report import Report
-from .run import verify
-from .verdict import Card, Verdict
+
+_PLACES = {"EFFORTS": "effort", "Card": "verdict", "Report": "report", "Verdict": "verdict", "verify": "run"}
+
+if TYPE_CHECKING:
+    from .effort import EFFORTS
+    from .report import Report
+    from .run import verify
+    from .verdict import Card, Verdict
+else:
+
+    def __getattr__(name: str) -> object:
+        if name in _PLACES:
+            return getattr(import_module("." + _PLACES[name], __name__), name)
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+
 
 __all__ = ["EFFORTS", "Card", "Report", "Verdict", "verify"]
 
-make_callable(__name__, verify)
+make_callable(__name__, lambda *args, **options: import_module(".run", __name__).verify(*args, **options))

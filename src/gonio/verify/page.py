@@ -12,9 +12,9 @@ from pathlib import Path
 
 from .. import files
 from .report import Report
-from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
 
-CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", NOT_APPLICABLE: "none"}
+CLASSES = {PASS: "pass", FAIL: "fail", DECLARED: "declared", KNOWN: "declared", NOT_APPLICABLE: "none"}
 
 STYLE = """
 :root { --ink: #1d2530; --soft: #5c6876; --paper: #fbfaf7; --card: #fff; --line: #e4e1da; --accent: #2b5d8a;
@@ -114,9 +114,11 @@ def _card(card: Card, number: int) -> str:
         rows.append(f"<tr><td>{v.number}<td><a href='#{anchor}'>{v.law}</a><td>{_pill(v)}<td>{figure}<td>{allowed}")
         if v.status != NOT_APPLICABLE:
             details.append(_detail(v, anchor))
+    below = [*card.notes, *([card.quality.words] if card.quality else [])]
+    lines = "".join(f"<p class=soft>{html.escape(line)}</p>" for line in below)
     return (
         f"<h2>{html.escape(card.title)}</h2>"
-        f"<table><tr><th><th>law<th>verdict<th>figure<th>allowed{''.join(rows)}</table>{''.join(details)}"
+        f"<table><tr><th><th>law<th>verdict<th>figure<th>allowed{''.join(rows)}</table>{lines}{''.join(details)}"
     )
 
 
@@ -130,7 +132,7 @@ def _detail(v: Verdict, anchor: str) -> str:
     if v.worst:
         rows.append(("worst case", html.escape(v.worst)))
     rows.append(("see it again", f"<pre>{html.escape(v.command)}</pre>"))
-    if v.failed or v.status == DECLARED:
+    if v.failed or v.status in (DECLARED, KNOWN):
         rows.append(("in a picture", html.escape(v.meaning)))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
     drawn = ""

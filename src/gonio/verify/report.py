@@ -23,6 +23,7 @@ class Report:
 
     tests      statistical tests in the whole report
     threshold  p-value below which one of them rejects, by Sidak's correction
+    mended     what a baseline holds needlessly, in words
     """
 
     cards: list[Card]
@@ -31,6 +32,7 @@ class Report:
     tests: int
     threshold: float
     seconds: float = 0.0
+    mended: list[str] = dataclasses.field(default_factory=list)
 
     @property
     def passed(self) -> bool:
@@ -61,6 +63,7 @@ class Report:
             "tests": self.tests,
             "threshold": self.threshold,
             "seconds": round(self.seconds, 3),
+            "mended": list(self.mended),
             "cards": [card.as_dict() for card in self.cards],
         }
 
@@ -68,6 +71,8 @@ class Report:
         """Print a table a subject, then for each failure why, what it means, and how to see it again; a line in sum."""
         for card in self.cards:
             terminal.show_card(card, console)
+        for line in self.mended:
+            console.print(f"mended: {line}", markup=False)
         broken = len(self.failures)
         word = "[green]all laws hold[/]" if not broken else f"[bold red]{broken} broken[/]"
         tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (.01 over all)"

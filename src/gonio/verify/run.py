@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
-from .. import files
+from .. import members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import box, directions, page, statistics, subject
+from . import box, directions, quality, statistics, subject
 from .box import Place
+from .ci.outputs import Outputs
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .laws import Law, chosen
 from .report import SIGNIFICANCE, Report
@@ -21,8 +24,11 @@ from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, F
 from .watch import limited
 
 DEFAULT_SEED = 1
+# what is asked of a subject besides the laws
+PLACES, QUALITY = "other values", "sampling quality"
 CONFIRMATION = 0.001  # of the second seed's test: a real error shows there as well, chance does not
 Target = BSDF | Subject | str
+Begin = Callable[[str], None]
 
 
 def verify(
@@ -34,7 +40,15 @@ def verify(
     seed: int = DEFAULT_SEED,
     law: str | Sequence[str] | None = None,
     report: str | Path | None = None,
+    junit: str | Path | None = None,
+    sarif: str | Path | None = None,
+    baseline: str | Path | None = None,
+    write_baseline: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    isolated: bool | None = None,
+    jobs: int = 1,
+    limit: float | None = None,
+    memory: float | None = None,
 ) -> Report:
     """Put a BSDF, or several, on trial.
 
@@ -47,37 +61,110 @@ def verify(
     seed      of all random numbers; same seed, same report
     law       a law's name, or several; all where None
     report    folder for report.html and report.json; None writes nothing
+    junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
+    baseline  file of what is known to fail, and fails no more because of it; `write_baseline` writes one
     progress  called with steps done, steps in all, and what is next
+    isolated  whether the BSDF is judged in a process of its own, which it may bring down or keep for ever: that fails
+              the law, and the next one is asked. Names are, and objects are not, unless this says otherwise
+    jobs      such processes at a time; the report is the same
+    limit     seconds that a law may take there, 300 if not given
+    memory    GB that such a process may take, half of the machine's if not given
     Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; printed, it is the terminal's table.
     Raises InputError for unknown laws and targets. A failing BSDF raises nothing: the law fails.
     """
     if quick and deep:
         raise InputError("quick and deep together", "--quick", "give one of them")
-    if report is not None:
-        files.check_folder(report)
+    outputs = Outputs(report, junit, sarif, baseline, write_baseline)
+    known = outputs.check()
     effort = "quick" if quick else "deep" if deep else "default"
-    asked = chosen([law] if isinstance(law, str) else law)
-    subjects = _subjects(target, sweep)
-    started = time.perf_counter()
-    steps = len(subjects) * len(asked)
-    held: list[tuple[Subject, list[Place], Law, list[Asked]]] = []
-    for one in subjects:
-        others = _places(one, effort, seed)
-        for each in asked:
-            if progress:
-                progress(len(held), steps, f"{one.title}: {each.name}")
-            held.append((one, others, each, _everywhere(each, one, others, effort, seed)))
-    tests = sum(len(it.what.trials) for _, _, _, all_ in held for it in all_ if isinstance(it.what, Finding))
-    threshold = statistics.sidak(SIGNIFICANCE, tests)
-    cards: dict[int, Card] = {}
-    for one, others, each, all_ in held:
-        verdict = _joined([_verdict(each, it, threshold, seed) for it in all_], all_)
-        card = cards.setdefault(id(one), Card(one, [], box.covered(one, others)))
-        card.verdicts.append(verdict)
-    made = Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
-    if report is not None:
-        page.write(made, Path(report))
+    names = None if law is None else [law] if isinstance(law, str) else list(law)
+    all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
+    if isolated is None:
+        # what a program has registered, it alone knows
+        isolated = all(isinstance(one, str) for one in all_) and not members.registered and bool(sys.executable)
+    if isolated:
+        from . import child
+
+        asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.object_(one) for one in all_]
+        task = child.Task(asked_of, effort, seed, names)
+        made = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+    else:
+        made = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
+    outputs.write(made, known)
     return made
+
+
+def _here(
+    subjects: list[Subject],
+    laws: list[Law],
+    effort: str,
+    seed: int,
+    progress: Callable[[int, int, str], None] | None,
+) -> Report:
+    """The trial in this process."""
+    started = time.perf_counter()
+    steps, done = len(subjects) * len(laws), 0
+    held = []
+    for one in subjects:
+
+        def begin(what: str, title: str = one.title) -> None:
+            nonlocal done
+            if progress:
+                progress(min(done, steps), steps, f"{title}: {what}")
+            done += what not in (PLACES, QUALITY)
+
+        held.append(judged(one, laws, effort, seed, begin))
+    tests = sum(one.tests for one in held)
+    threshold = statistics.sidak(SIGNIFICANCE, tests)
+    cards = [one.card(threshold, seed) for one in held]
+    return Report(cards, seed, effort, tests, threshold, time.perf_counter() - started)
+
+
+class Held(NamedTuple):
+    """All that was found on a subject, before it is known how many tests the whole report holds."""
+
+    subject: Subject
+    others: list[Place]
+    laws: list[tuple[Law, list[Asked]]]
+    quality: quality.Quality | None
+
+    @property
+    def tests(self) -> int:
+        return sum(len(it.what.trials) for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding))
+
+    def card(self, threshold: float, seed: int, begin: Begin = lambda what: None) -> Card:
+        """The verdicts; a rejected test is repeated here, so the BSDF is asked again."""
+        verdicts = []
+        for law, all_ in self.laws:
+            begin(law.name)
+            verdicts.append(_joined([_verdict(law, it, threshold, seed) for it in all_], all_))
+        return Card(self.subject, verdicts, box.covered(self.subject, self.others), quality=self.quality)
+
+
+def judged(
+    one: Subject,
+    laws: list[Law],
+    effort: str,
+    seed: int,
+    begin: Begin = lambda what: None,
+    skip: Mapping[str, str] = MappingProxyType({}),
+) -> Held:
+    """What the laws find on a subject.
+
+    begin  called with a law's name, or what else is next
+    skip   what must not be asked again, and why: the BSDF ended the process, or kept it for ever
+    """
+    begin(PLACES)
+    others = [] if PLACES in skip else _places(one, effort, seed)
+    found: list[tuple[Law, list[Asked]]] = []
+    for law in laws:
+        if law.name in skip:
+            found.append((law, [Asked(Place({}, "given", one), _failed(law, one, skip[law.name]), 0.0)]))
+            continue
+        begin(law.name)
+        found.append((law, _everywhere(law, one, others, effort, seed)))
+    begin(QUALITY)
+    return Held(one, others, found, None if QUALITY in skip else quality.of(one, seed))
 
 
 class Asked(NamedTuple):
@@ -140,19 +227,20 @@ def _joined(verdicts: list[Verdict], all_: list[Asked]) -> Verdict:
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
     """A law's finding; what goes wrong inside the BSDF is a failure of the law, and of this law only."""
-
-    def verdict(status: str, why: str) -> Verdict:
-        command = one.command("--law", law.name)
-        return Verdict(law.number, law.name, law.title, status, why=[why], command=command, meaning=law.meaning)
-
     try:
         with warnings.catch_warnings(), limited(law.name):
             warnings.simplefilter("ignore", GonioWarning)  # variants go to the ends of the ranges on purpose
             return law.judge(one, effort, seed)
     except DoesNotApply as reason:
-        return verdict(NOT_APPLICABLE, str(reason))
+        return _failed(law, one, str(reason), NOT_APPLICABLE)
     except (Fault, TimeoutError, InputError) as fault:  # a direction of no unit length is refused as bad input
-        return verdict(FAIL, str(fault))
+        return _failed(law, one, str(fault))
+
+
+def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
+    """A verdict without a figure."""
+    command = one.command("--law", law.name)
+    return Verdict(law.number, law.name, law.title, status, why=[why], command=command, meaning=law.meaning)
 
 
 def decide(
@@ -212,13 +300,15 @@ def decide(
     )
 
 
-def _subjects(target: Target | Sequence[Target], sweep: str) -> list[Subject]:
-    if isinstance(target, list | tuple):
-        return [one for item in target for one in _subjects(item, sweep)]
-    if isinstance(target, str):
-        from .targets import resolve
+def _subjects(targets: Sequence[Target], sweep: str) -> list[Subject]:
+    found: list[Subject] = []
+    for target in targets:
+        if isinstance(target, str):
+            from .targets import resolve
 
-        return resolve(target, sweep=sweep)
-    if sweep:
-        raise InputError("a sweep of an object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
-    return [subject.of(target)]
+            found += resolve(target, sweep=sweep)
+        elif sweep:
+            raise InputError("a sweep of an object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
+        else:
+            found.append(subject.of(target))
+    return found

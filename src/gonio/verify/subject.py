@@ -23,7 +23,7 @@ from ..errors import GonioError, InputError
 from ..models import BSDF, Breach, Parameter, Sample, notation, tree
 from ..models.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
-from . import directions
+from . import directions, watch
 
 
 class Fault(Exception):
@@ -203,18 +203,35 @@ class Subject:
         return array.astype(np.float64)
 
 
+@dataclasses.dataclass(frozen=True)
+class Described(Subject):
+    """A subject that was judged in another process: its names, and no model."""
+
+    heading: str = ""
+
+    @property
+    def title(self) -> str:
+        return self.heading
+
+    @classmethod
+    def of(cls, subject: Subject) -> Described:
+        settings = {name: str(value) for name, value in subject.settings.items()}
+        return cls(None, subject.target, settings, subject.title)
+
+
 def guarded(model: Any, method: str, run: Any) -> Any:
     """What `run` returns; an exception inside the model comes out as a Fault that names its line."""
     try:
-        return run()
+        with watch.calling(model, method) if watch.calling else contextlib.nullcontext():
+            return run()
     except (Fault, GonioError, KeyboardInterrupt, TimeoutError):
         raise
-    except Exception as error:
+    except (Exception, SystemExit, GeneratorExit) as error:
         text = str(error).strip().splitlines()
         raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from error
 
 
-def _line(model: Any, error: Exception) -> str:
+def _line(model: Any, error: BaseException) -> str:
     """file:line of the innermost frame inside the model's own file, else of the innermost frame at all."""
     frames = traceback.extract_tb(error.__traceback__)
     try:

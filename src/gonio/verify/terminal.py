@@ -8,7 +8,7 @@ import numpy as np
 
 from . import directions
 from .subject import Fault, Subject
-from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, Verdict
+from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,6 +17,7 @@ MARKS = {
     PASS: "[green]pass[/]",
     FAIL: "[bold red]FAIL[/]",
     DECLARED: "[yellow]breaks as declared[/]",
+    KNOWN: "[yellow]fails, known[/]",
     NOT_APPLICABLE: "[dim]-[/]",
 }
 
@@ -33,8 +34,10 @@ def show_card(card: Card, console: Console) -> None:
     for v in card.verdicts:
         table.add_row(str(v.number), v.law, MARKS[v.status], escape(_figure(v)), _allowed(v), escape(_remark(v)))
     console.print(table)
-    if card.covered:
-        console.print(f"[dim]{escape(card.covered)}[/]\n")
+    below = [card.covered, *card.notes, *([card.quality.words] if card.quality else [])]
+    for line in filter(None, below):
+        console.print(f"[dim]{escape(line)}[/]")
+    console.print()
     for v in card.verdicts:
         if v.failed:
             _explain(v, console)
@@ -53,7 +56,7 @@ def _allowed(verdict: Verdict) -> str:
 def _remark(verdict: Verdict) -> str:
     if verdict.status == NOT_APPLICABLE:
         return "does not apply: " + "; ".join(verdict.why)
-    if verdict.failed:
+    if verdict.failed or verdict.status == KNOWN:
         return verdict.title
     return verdict.notes[0] if verdict.notes else ""
 

@@ -14,9 +14,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .quality import Quality
 from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = "pass", "fail", "breaks as declared", "does not apply"
+KNOWN = "known"  # fails, as it did when a baseline was written
 
 
 class Evidence(Protocol):
@@ -105,11 +107,18 @@ class Verdict:
 
 @dataclasses.dataclass
 class Card:
-    """All verdicts on one subject; `covered` says at which values of its parameters."""
+    """All verdicts on one subject.
+
+    covered  at which values of its parameters
+    notes    how it behaved: what it printed, what brought it down
+    quality  how well it samples; None where it could not be measured
+    """
 
     subject: Subject
     verdicts: list[Verdict]
     covered: str = ""
+    notes: list[str] = dataclasses.field(default_factory=list)
+    quality: Quality | None = None
 
     @property
     def title(self) -> str:
@@ -132,6 +141,8 @@ class Card:
             "target": self.subject.target,
             "settings": settings,
             "covered": self.covered,
+            "notes": list(self.notes),
+            "quality": self.quality.as_dict() if self.quality else None,
             "passed": self.passed,
             "verdicts": [verdict.as_dict() for verdict in self.verdicts],
         }

@@ -7,26 +7,38 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from typer import Option
+from typer import Argument, Option
 
+from ...errors import InputError, did_you_mean
 from .base import SUPPORT, verb
+
+KINDS = ("scene", "report")
 
 
 @verb(SUPPORT, place=1)
 def schema(
+    kind: Annotated[str, Argument(metavar="scene|report", help="Of scene files, or of reports.")] = "scene",
     output: Annotated[
         Path | None, Option("-o", "--output", metavar="FILE", help="Where to write; else it is printed.")
     ] = None,
 ) -> None:
-    """Print the JSON Schema of scene files, by which editors complete and check them.
+    """Print the JSON Schema of scene files or reports, by which editors complete and programs check them.
 
     \b
-    Example:
+    Examples:
       gonio schema -o scene.schema.json
+      gonio schema report
     """
-    from ...render import scene
+    if kind not in KINDS:
+        raise InputError(f"no schema of '{kind}'", "", did_you_mean(kind, KINDS))
+    if kind == "report":
+        from ...verify.ci import schema as report
 
-    text = json.dumps(scene.json_schema(), indent=2) + "\n"
+        text = report.text()
+    else:
+        from ...render import scene
+
+        text = json.dumps(scene.json_schema(), indent=2) + "\n"
     if output is None:
         sys.stdout.write(text)
         return

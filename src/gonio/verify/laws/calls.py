@@ -86,7 +86,10 @@ def _rows(value: Any, count: int) -> np.ndarray:
 def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision) -> Iterator[Check]:
     whole = _answers(subject, wo, wi, u, precision)
     if not subject.stochastic:
-        yield "asked twice", _unlike(whole, _answers(subject, wo, wi, u, precision), wo, wi, 0.0)
+        wrong = _unlike(whole, _answers(subject, wo, wi, u, precision), wo, wi, 0.0)
+        yield "asked twice", wrong and f"{wrong}: declare `stochastic = True` if its values are random"
+        if wrong:
+            return
     same = SAME[precision]
     few = slice(0, 5)
     if not subject.stochastic:

@@ -1,0 +1,166 @@
+"""Gonio in other people's tests: a fixture, and test items for materials that the command line names.
+
+    def test_glass(gonio_verify):
+        gonio_verify("glass.py:Glass")
+
+    pytest --gonio glass.py:Glass --gonio mitsuba:roughplastic --gonio-quick
+
+Every run of pytest loads this file where Gonio is installed, so it imports nothing of Gonio before it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from .verify import Report, Verdict
+
+__all__ = ["gonio_verify"]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("gonio", "laws of materials (Gonio)")
+    group.addoption(
+        "--gonio",
+        action="append",
+        default=[],
+        metavar="TARGET",
+        help="a test for each law of FILE.py:CLASS, mitsuba:PLUGIN or a model; repeatable",
+    )
+    group.addoption("--gonio-quick", action="store_true", help="a first look, in seconds")
+
+
+@pytest.fixture
+def gonio_verify() -> Callable[..., Report]:
+    """Fail the test where a material breaks a law: gonio_verify(material or target, ...), as `check`."""
+    return check
+
+
+def check(
+    target: Any,
+    quick: bool = True,
+    law: str | Sequence[str] | None = None,
+    breaks: Mapping[str, float] | Collection[str] = (),
+    **more: Any,
+) -> Report:
+    """The report of a material that keeps its laws; fails the test, with the report's text, where it does not.
+
+    target  a material, or a target's name as `gonio verify` takes it
+    law     a law's name, or several; all where None
+    breaks  laws that may be broken, by name, or with the largest figure that may be; one that holds fails the test
+    more    as `gonio.verify` takes it: deep, seed, limit, memory, isolated
+    A material that can be sent to another process, or named, is judged there, and may crash.
+    """
+    __tracebackhide__ = True
+    from .errors import InputError
+    from .verify import verify
+
+    try:
+        report = verify(target, quick=quick, law=law, **{"isolated": True, **more})
+    except InputError as error:
+        if error.where != "isolated" or "isolated" in more:
+            raise
+        report = verify(target, quick=quick, law=law, isolated=False, **more)  # a class of the test's own
+    complaints = _complaints(report, breaks)
+    if complaints:
+        pytest.fail("\n".join([str(report), *complaints]), pytrace=False)
+    return report
+
+
+def _complaints(report: Report, breaks: Mapping[str, float] | Collection[str]) -> list[str]:
+    found = []
+    broken = set()
+    for verdict in report.failures:
+        broken.add(verdict.law)
+        if verdict.law not in breaks:
+            found.append(f"{verdict.law} is broken: {'; '.join(verdict.why)}")
+            continue
+        most = breaks[verdict.law] if isinstance(breaks, Mapping) else None
+        if most is not None and (verdict.figure is None or not abs(verdict.figure) <= most):
+            found.append(f"{verdict.law} is broken by {verdict.shown or 'no figure'}, and {most:g} is allowed")
+    asked = {verdict.law for card in report.cards for verdict in card.verdicts}
+    found += [f"{name} is said to be broken, and holds" for name in breaks if name in asked and name not in broken]
+    return found
+
+
+# --------------------------------------------------------------------------- --gonio
+
+
+@pytest.hookimpl(tryfirst=True)  # before -k and -m choose
+def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
+    targets = dict.fromkeys(config.getoption("--gonio"))
+    if not targets:
+        return
+    from .verify.laws import laws
+
+    for target in targets:
+        group = Target.from_parent(session, name=f"gonio {target}", nodeid=f"gonio {target}", target=target)
+        group.children = [LawItem.from_parent(group, name=name) for name in laws()]
+        items += group.children
+
+
+class Target(pytest.Collector):
+    """A target, judged once by all its laws that were chosen."""
+
+    def __init__(self, *, target: str, **more: Any) -> None:
+        super().__init__(**more)
+        self.target = target
+        self.children: list[LawItem] = []
+        self._report: Report | Exception | None = None
+
+    def collect(self) -> Iterable[LawItem]:
+        return self.children
+
+    def report(self) -> Report:
+        if self._report is None:
+            from .verify import verify
+
+            chosen = [item.name for item in self.session.items if item.parent is self]
+            try:
+                self._report = verify(self.target, quick=self.config.getoption("--gonio-quick"), law=chosen)
+            except Exception as error:
+                self._report = error
+        if isinstance(self._report, Exception):
+            raise self._report
+        return self._report
+
+
+class LawItem(pytest.Item):
+    """A law of a target."""
+
+    parent: Target
+
+    def runtest(self) -> None:
+        verdict = self.parent.report()[self.name]
+        if verdict.failed:
+            raise Broken(verdict)
+        if verdict.status == "does not apply":
+            pytest.skip("; ".join(verdict.why))
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, Broken):
+            return _text(excinfo.value.verdict)
+        from .errors import GonioError
+
+        return str(excinfo.value) if isinstance(excinfo.value, GonioError) else super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        return self.config.rootpath, None, f"{self.parent.name}: {self.name}"
+
+
+class Broken(Exception):
+    """A law that does not hold."""
+
+    def __init__(self, verdict: Verdict) -> None:
+        self.verdict = verdict
+        super().__init__(verdict.law)
+
+
+def _text(verdict: Verdict) -> str:
+    from .verify.ci import places
+
+    return "\n".join([f"{verdict.law}: {verdict.title}", *(f"  {line}" for line in places.words(verdict))])

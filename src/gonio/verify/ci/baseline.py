@@ -1,0 +1,95 @@
+"""A baseline: what fails already and is not to stop anybody. Only what is new fails.
+
+A law of a card is known where it failed when the baseline was written, and its figure is at most a tenth worse now. Any
+report.json is a baseline; `text` writes the short form, to be kept beside the code.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ..report import Report
+from ..verdict import FAIL, KNOWN, Verdict
+
+SCHEMA = "gonio-baseline/1"
+WORSE = 1.1  # by more than a tenth is new: rounding and other machines move a figure by less
+
+Known = Mapping[tuple[str, str], float | None]
+
+
+def read(path: Path) -> Known:
+    """The figures of what is known, by title and law; None where it failed without one. InputError where it is none."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"no file '{path}'", "--baseline", "write one with --write-baseline FILE") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"no JSON: {error}", str(path), "write one with --write-baseline FILE") from None
+    try:
+        return dict(_failures(data))
+    except (KeyError, TypeError, AttributeError):
+        what = "neither a baseline nor a report.json"
+        raise InputError(what, str(path), "write one with --write-baseline FILE") from None
+
+
+def _failures(data: Any) -> list[tuple[tuple[str, str], float | None]]:
+    if data["schema"] == SCHEMA:
+        return [((str(one["title"]), str(one["law"])), _number(one["figure"])) for one in data["failures"]]
+    return [
+        ((str(card["title"]), str(verdict["law"])), _number(verdict["figure"]))
+        for card in data["cards"]
+        for verdict in card["verdicts"]
+        if verdict["status"] in (FAIL, KNOWN)
+    ]
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def text(report: Report) -> str:
+    """The baseline that a report makes."""
+    failures = [
+        {"title": card.title, "law": verdict.law, "figure": verdict.as_dict()["figure"], "why": verdict.why[:1]}
+        for card in report.cards
+        for verdict in card.verdicts
+        if verdict.status in (FAIL, KNOWN)
+    ]
+    data = {"schema": SCHEMA, "seed": report.seed, "effort": report.effort, "failures": failures}
+    return json.dumps(data, indent=2) + "\n"
+
+
+def apply(report: Report, known: Known) -> list[str]:
+    """Mark what is known in a report, which then fails no more because of it; what the baseline holds needlessly."""
+    mended = []
+    for card in report.cards:
+        for verdict in card.verdicts:
+            key = card.title, verdict.law
+            if key not in known:
+                continue
+            if not verdict.failed:
+                mended.append(f"{card.title}: {verdict.law} no longer fails: remove it from the baseline")
+            elif _no_worse(verdict, known[key]):
+                verdict.status = KNOWN
+            else:
+                now = verdict.shown or "no figure"
+                verdict.notes.append(f"worse than in the baseline: {now}, {_words(known[key])}")
+    return mended
+
+
+def _no_worse(verdict: Verdict, before: float | None) -> bool:
+    now = verdict.as_dict()["figure"]
+    if not isinstance(now, float | int):
+        return before is None
+    return before is None or abs(now) <= WORSE * abs(before)
+
+
+def _words(before: float | None) -> str:
+    return "no figure then" if before is None else f"{before:.3g} then"
+
+
+__all__ = ["apply", "read", "text"]

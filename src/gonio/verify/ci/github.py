@@ -1,0 +1,43 @@
+"""Annotations of GitHub Actions: lines that the runner reads and shows beside the code."""
+
+from __future__ import annotations
+
+import os
+
+from ..report import Report
+from ..verdict import KNOWN
+from . import places
+
+_KINDS = {"error": "error", "warning": "warning", "note": "notice"}
+
+
+def wanted() -> bool:
+    """Whether a runner of GitHub Actions reads what is printed."""
+    return os.environ.get("GITHUB_ACTIONS") == "true"
+
+
+def text(report: Report) -> str:
+    """A line for each law that is not kept, for its file where there is one; "" where all hold."""
+    lines = []
+    for card in report.cards:
+        for verdict in card.verdicts:
+            if not verdict.failed and verdict.status != KNOWN:
+                continue
+            place = places.of(card, verdict)
+            options = {"file": place.file, "line": str(place.line)} if place else {}
+            options["title"] = f"{card.title}: {verdict.law}" + (": known" if verdict.status == KNOWN else "")
+            named = ",".join(f"{name}={_property(value)}" for name, value in options.items())
+            lines.append(f"::{_KINDS[places.level(verdict)]} {named}::{_data(chr(10).join(places.words(verdict)))}\n")
+    return "".join(lines)
+
+
+def _data(text: str) -> str:
+    """As the runner's own toolkit escapes it: one line, and % first."""
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")
+
+
+__all__ = ["text", "wanted"]

@@ -1,0 +1,64 @@
+"""JUnit's XML, which Jenkins, GitLab, Azure and others show: a suite for each card, a case for each law."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree as xml
+
+from ..report import Report
+from ..verdict import KNOWN, NOT_APPLICABLE, Card, Verdict
+from . import places
+
+_FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0, even when escaped
+
+
+def text(report: Report) -> str:
+    """The file's text."""
+    root = xml.Element("testsuites", {"name": "gonio verify", **_counts(report.cards), "time": f"{report.seconds:.3f}"})
+    for card in report.cards:
+        time = sum(verdict.seconds for verdict in card.verdicts)
+        suite = xml.SubElement(
+            root, "testsuite", {"name": _clean(card.title), **_counts([card]), "time": f"{time:.3f}"}
+        )
+        for verdict in card.verdicts:
+            _case(suite, card, verdict)
+        lines = [*card.notes, *([card.quality.words] if card.quality else [])]
+        if lines:
+            xml.SubElement(suite, "system-out").text = _clean("\n".join(lines))
+    xml.indent(root)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+
+
+def _case(suite: xml.Element, card: Card, verdict: Verdict) -> None:
+    case = xml.SubElement(
+        suite, "testcase", classname=_clean(card.title), name=verdict.law, time=f"{verdict.seconds:.3f}"
+    )
+    place = places.of(card, verdict)
+    if place is not None:
+        case.set("file", _clean(place.file))
+        case.set("line", str(place.line))
+    first = _clean(verdict.why[0] if verdict.why else verdict.title)
+    if verdict.failed:
+        failure = xml.SubElement(case, "failure", message=first, type=places.grade(verdict) or verdict.law)
+        failure.text = _clean("\n".join(places.words(verdict)))
+    elif verdict.status in (NOT_APPLICABLE, KNOWN):
+        xml.SubElement(case, "skipped", message=f"{verdict.status}: {first}")
+    elif verdict.notes:
+        xml.SubElement(case, "system-out").text = _clean("\n".join(verdict.notes))
+
+
+def _counts(cards: list[Card]) -> dict[str, str]:
+    verdicts = [verdict for card in cards for verdict in card.verdicts]
+    return {
+        "tests": str(len(verdicts)),
+        "failures": str(sum(verdict.failed for verdict in verdicts)),
+        "errors": "0",
+        "skipped": str(sum(verdict.status in (NOT_APPLICABLE, KNOWN) for verdict in verdicts)),
+    }
+
+
+def _clean(text: str) -> str:
+    return _FORBIDDEN.sub("?", text)
+
+
+__all__ = ["text"]

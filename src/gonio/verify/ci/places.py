@@ -1,0 +1,97 @@
+"""Where in a source file a verdict belongs, and how serious it is: what all formats ask."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+from ..verdict import DECLARED, FAIL, KNOWN, Card, Verdict
+
+_CLASS = re.compile(r"(?P<file>[^({=,\s]+\.py):(?P<name>\w+)")
+_LINE = re.compile(r"\((?P<file>[^()\s:]+\.py):(?P<line>\d+)\)")
+
+
+_SLIGHT = ("invisible", "noise", "fitting only")  # grades that bias no picture
+
+
+class Place(NamedTuple):
+    """A file as the repository names it, "materials/glass.py", and a line of it."""
+
+    file: str
+    line: int
+
+
+def of(card: Card, verdict: Verdict | None = None) -> Place | None:
+    """The line that a verdict's reason names, else the one on which the class begins; None where no file is judged."""
+    named = _CLASS.search(card.subject.target) or next(filter(None, map(_CLASS.search, _settings(card))), None)
+    if named is None:
+        file = Path(card.subject.target)
+        known = file.suffix.lower() in (".json", ".xml", ".bsdf") and file.is_file()
+        return Place(_relative(file), 1) if known else None
+    file = Path(named["file"]).expanduser()
+    for text in verdict.why if verdict else ():
+        for found in _LINE.finditer(text):
+            if found["file"] == file.name:
+                return Place(_relative(file), int(found["line"]))
+    return Place(_relative(file), _class_line(file, named["name"]))
+
+
+def level(verdict: Verdict) -> str:
+    """ "error" for what fails, "warning" where no picture shows it, "note" where declared or known, else "none"."""
+    if verdict.status == FAIL:
+        return "warning" if grade(verdict) in _SLIGHT else "error"
+    return "note" if verdict.status in (DECLARED, KNOWN) else "none"
+
+
+def grade(verdict: Verdict) -> str:
+    """How much of it shows in a picture, in a word; "" where nobody said."""
+    return str(getattr(verdict, "grade", "") or "")
+
+
+def cause(verdict: Verdict) -> str:
+    """The likely mistake; "" where none is known."""
+    return str(getattr(verdict, "cause", "") or "")
+
+
+def words(verdict: Verdict) -> list[str]:
+    """What happened, what it means, and how to see it again, a line each."""
+    lines = list(verdict.why) or ([verdict.notes[0]] if verdict.notes else [])
+    for name, text in (
+        ("likely cause", cause(verdict)),
+        ("grade", grade(verdict)),
+        ("worst", verdict.worst),
+        ("means", verdict.meaning),
+        ("again", verdict.command),
+    ):
+        if text:
+            lines.append(f"{name}: {text}")
+    return lines
+
+
+def _settings(card: Card) -> list[str]:
+    return [str(value) for value in card.subject.settings.values()]
+
+
+def _relative(file: Path) -> str:
+    """From the repository's root, which CI names or which is the current folder; else the whole path."""
+    whole = file.absolute()
+    root = Path(os.environ.get("GITHUB_WORKSPACE") or Path.cwd())
+    for base in (root, Path.cwd()):
+        if whole.resolve().is_relative_to(base.resolve()):
+            return whole.resolve().relative_to(base.resolve()).as_posix()
+    return whole.as_posix()
+
+
+def _class_line(file: Path, name: str) -> int:
+    """Without running the file: it ran where it was judged."""
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return 1
+    return next((n.lineno for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name == name), 1)
+
+
+__all__ = ["Place", "cause", "grade", "level", "of", "words"]

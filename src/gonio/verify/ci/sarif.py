@@ -1,0 +1,89 @@
+"""SARIF 2.1.0, the standard form of what a checker finds: a rule for each law, a result for each that is not kept."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import PurePosixPath
+from typing import Any
+from urllib.parse import quote
+
+from ..._version import __version__
+from ..report import Report
+from ..verdict import DECLARED, KNOWN, Card, Verdict
+from . import places
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+
+
+def text(report: Report) -> str:
+    """The file's text."""
+    laws = {verdict.law: verdict for card in report.cards for verdict in card.verdicts}
+    rules = [_rule(verdict) for verdict in laws.values()]
+    order = {name: index for index, name in enumerate(laws)}
+    run = {
+        "tool": {"driver": {"name": "Gonio", "version": __version__, "rules": rules}},
+        "invocations": [{"executionSuccessful": True, "exitCode": report.exit_code}],
+        "columnKind": "unicodeCodePoints",
+        "results": [
+            _result(card, verdict, order[verdict.law])
+            for card in report.cards
+            for verdict in card.verdicts
+            if verdict.failed or verdict.status in (DECLARED, KNOWN)
+        ],
+        "properties": {"seed": report.seed, "effort": report.effort, "tests": report.tests},
+    }
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2) + "\n"
+
+
+def _rule(verdict: Verdict) -> dict[str, Any]:
+    rule: dict[str, Any] = {
+        "id": f"gonio/{verdict.law}",
+        "name": "".join(part.capitalize() for part in verdict.law.split("-")),
+        "shortDescription": {"text": verdict.title},
+        "defaultConfiguration": {"level": "error"},
+    }
+    if verdict.meaning:
+        rule["fullDescription"] = {"text": verdict.meaning}
+    return rule
+
+
+def _result(card: Card, verdict: Verdict, rule: int) -> dict[str, Any]:
+    location: dict[str, Any] = {
+        "logicalLocations": [{"name": card.title, "fullyQualifiedName": card.subject.target, "kind": "type"}]
+    }
+    place = places.of(card, verdict)
+    if place is not None:
+        prefix = "file://" if PurePosixPath(place.file).is_absolute() else ""
+        location["physicalLocation"] = {
+            "artifactLocation": {"uri": prefix + quote(place.file)},
+            "region": {"startLine": place.line},
+        }
+    key = hashlib.sha256(f"{card.title}\n{verdict.law}".encode()).hexdigest()
+    facts = {
+        "status": verdict.status,
+        "figure": verdict.as_dict()["figure"],  # null where it is no number
+        "tolerance": verdict.as_dict()["tolerance"],
+        "p": verdict.as_dict()["p"],
+        "command": verdict.command,
+        "grade": places.grade(verdict),
+        "cause": places.cause(verdict),
+    }
+    result: dict[str, Any] = {
+        "ruleId": f"gonio/{verdict.law}",
+        "ruleIndex": rule,
+        "level": places.level(verdict),
+        "message": {"text": "\n".join([f"{card.title}: {verdict.title}: {verdict.status}", *places.words(verdict)])},
+        "locations": [location],
+        "partialFingerprints": {"titleAndLaw/v1": key},
+        "properties": {name: value for name, value in facts.items() if value not in ("", None)},
+    }
+    if verdict.status == KNOWN:
+        result["baselineState"] = "unchanged"
+        result["suppressions"] = [{"kind": "external", "justification": "known from the baseline"}]
+    elif verdict.status == DECLARED:
+        result["suppressions"] = [{"kind": "inSource", "justification": "the BSDF declares it"}]
+    return result
+
+
+__all__ = ["text"]

@@ -1,0 +1,13 @@
+"""The JSON Schema of report.json, as a file beside this one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def text() -> str:
+    """The schema's text."""
+    return Path(__file__).with_name("report.schema.json").read_text(encoding="utf-8")
+
+
+__all__ = ["text"]

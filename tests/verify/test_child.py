@@ -1,0 +1,227 @@
+"""BSDFs that loop, crash, print and eat memory: each ends in a report, in which the other laws are judged."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import gonio as go
+import pytest
+from gonio.verify import Report, verify
+
+HOSTILE = '''
+import ctypes, os, sys, threading
+import gonio as go
+from gonio.ops import where, inv_pi
+
+class Good(go.BSDF):
+    """Diffuse, half of the light."""
+    def eval(self, wo, wi, mode="radiance"):
+        return go.ops.vec3(*[where((wo.z > 0) & (wi.z > 0), wi.z * inv_pi * 0.5, 0.0)] * 3)
+
+class LoopsInPython(Good):
+    """Never returns, and hears the alarm."""
+    def sample(self, wo, u, mode="radiance"):
+        while True: pass
+
+class IsDeaf(Good):
+    """Never returns, and does not hear the alarm."""
+    def sample(self, wo, u, mode="radiance"):
+        while True:
+            try:
+                while True: pass
+            except TimeoutError: pass
+
+class LoopsInAKernel(Good):
+    """Never returns from compiled code."""
+    def sample(self, wo, u, mode="radiance"):
+        import drjit as dr
+        x, = dr.while_loop((u.x,), lambda x: x < 2.0, lambda x: (x * 0.5,))
+        s = super().sample(wo, u, mode)
+        return s._replace(pdf=s.pdf + x)
+
+class Allocates(Good):
+    """Takes all memory."""
+    def sample(self, wo, u, mode="radiance"):
+        kept = []
+        while True:
+            kept.append(bytearray(os.urandom(1 << 10)) * (8 << 10))
+
+class Aborts(Good):
+    """Crashes the process."""
+    def sample(self, wo, u, mode="radiance"):
+        print("these are my last words")
+        os.abort()
+
+class Leaves(Good):
+    """Ends the process as if all were well."""
+    def sample(self, wo, u, mode="radiance"):
+        os._exit(0)
+
+class Exits(Good):
+    """Raises what is no Exception."""
+    def sample(self, wo, u, mode="radiance"):
+        raise SystemExit(0)
+
+class KillsItsThread(Good):
+    """Interrupts the thread that calls it."""
+    def sample(self, wo, u, mode="radiance"):
+        me = ctypes.c_ulong(threading.get_ident())
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(me, ctypes.py_object(KeyboardInterrupt))
+        for _ in range(10_000): pass
+        return super().sample(wo, u, mode)
+
+class RaisesAside(Good):
+    """Fails where no method is called."""
+    @property
+    def transmits(self):
+        raise ValueError("which side?")
+
+class Prints(Good):
+    """Has much to say."""
+    def sample(self, wo, u, mode="radiance"):
+        for line in range(10_000): print(line)
+        print("and in red", file=sys.stderr)
+        return super().sample(wo, u, mode)
+
+class Changes(Good):
+    """Another answer each time."""
+    calls = 0
+    def eval(self, wo, wi, mode="radiance"):
+        Changes.calls += 1
+        return super().eval(wo, wi, mode) * (1.0 + 0.01 * (Changes.calls % 2))
+'''
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("hostile") / "hostile.py"
+    path.write_text(HOSTILE)
+    return path
+
+
+def judged(file: Path, name: str, **more: object) -> Report:
+    return verify(f"{file}:{name}", quick=True, law=["reciprocity", "weight", "isotropy"], **more)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("LoopsInPython", "no end after 2 s"),
+        ("IsDeaf", "no end after 2 s"),
+        ("LoopsInAKernel", "no end after 2 s"),
+        ("Allocates", "more than 1 GB of memory"),
+        ("Aborts", "the process died: SIGABRT"),
+        ("Leaves", "the process ended itself with exit code 0"),
+        ("Exits", "SystemExit in sample"),
+        ("KillsItsThread", "KeyboardInterrupt in sample"),
+    ],
+)
+def test_what_brings_the_process_down_fails_the_laws_that_need_it(file: Path, name: str, words: str) -> None:
+    report = judged(file, name, limit=2.0, memory=1.0)
+    statuses = {verdict.law: verdict.status for verdict in report.cards[0].verdicts}
+    assert statuses == {"reciprocity": "pass", "weight": "fail", "isotropy": "pass"}
+    assert words in report["weight"].why[0]
+    assert name != "Aborts" or "these are my last words" in report.cards[0].notes[0]
+
+
+def test_what_is_printed_is_counted_and_does_not_disturb_json(file: Path) -> None:
+    command = [sys.executable, "-m", "gonio.cli", "verify", f"{file}:Prints", "--quick", "--law", "weight", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    (card,) = json.loads(done.stdout)["cards"]
+    assert card["passed"] and done.stderr == ""
+    assert "it printed" in card["notes"][0] and int(card["notes"][0].split()[2]) > 10_000
+
+
+def test_an_answer_that_changes_is_a_failure_that_says_so(file: Path) -> None:
+    report = judged(file, "Changes")
+    assert "eval changed its answer between two calls" in report["reciprocity"].why[0]
+
+
+def test_a_fact_that_raises_fails_the_laws_that_ask_for_it(file: Path) -> None:
+    report = judged(file, "RaisesAside")
+    assert "ValueError: which side? (hostile.py:" in report["reciprocity"].why[0]
+
+
+@pytest.mark.parametrize(("line", "words"), [("os._exit(3)", "exit code 3"), ("raise SystemExit", "SystemExit")])
+def test_a_file_that_cannot_even_be_loaded_is_bad_input(tmp_path: Path, line: str, words: str) -> None:
+    (tmp_path / "bad.py").write_text(f"import os\n{line}\n")
+    with pytest.raises(go.InputError, match=words):
+        verify(f"{tmp_path}/bad.py:Good", quick=True, law="weight")
+
+
+def plain(report: Report) -> dict[str, object]:
+    """The report without what time it took."""
+
+    def without(value: object) -> object:
+        if isinstance(value, dict):
+            return {name: without(inner) for name, inner in value.items() if name != "seconds"}
+        return [without(inner) for inner in value] if isinstance(value, list) else value
+
+    found = without(report.as_dict())
+    assert isinstance(found, dict)
+    return found
+
+
+def test_the_report_is_the_same_in_one_process_in_another_and_in_several(file: Path) -> None:
+    names = ["phong", "lambert", f"{file}:Good"]
+    laws = ["energy", "weight", "isotropy"]
+    here = plain(verify(names, quick=True, law=laws, isolated=False))
+    assert here == plain(verify(names, quick=True, law=laws))
+    assert here == plain(verify(names, quick=True, law=laws, jobs=3))
+
+
+def test_a_crash_in_one_setting_leaves_the_others_as_they_are(file: Path) -> None:
+    report = verify([f"{file}:Good", f"{file}:Aborts", "lambert"], quick=True, law=["weight", "shader"], jobs=2)
+    assert [card.passed for card in report.cards] == [True, False, True]
+
+
+def test_a_material_that_python_holds_can_be_judged_apart() -> None:
+    gold = go.Conductor.preset("Au", alpha=0.3)
+    assert plain(verify(gold, quick=True, law="weight", isolated=True)) == plain(verify(gold, quick=True, law="weight"))
+
+    class Local(go.Lambert):
+        """Of this function alone."""
+
+    with pytest.raises(go.InputError, match="cannot be sent to another process"):
+        verify(Local(0.5), quick=True, law="weight", isolated=True)
+
+
+def test_the_order_of_sets_does_not_matter(file: Path) -> None:
+    command = [sys.executable, "-m", "gonio.cli", "verify", f"{file}:Good", "--quick", "--law", "pdf", "--json"]
+    found = []
+    for seed in ("1", "2"):
+        done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": seed})
+        found.append(
+            [line for line in json.dumps(json.loads(done.stdout), indent=1).split("\n") if "seconds" not in line]
+        )
+    assert found[0] == found[1]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+def test_ctrl_c_ends_both_processes(file: Path) -> None:
+    command = [sys.executable, "-m", "gonio.cli", "verify", f"{file}:IsDeaf", "--quick", "--law", "weight"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    time.sleep(2.0)
+    child = children.read_text().split() if children.exists() else []
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=10)
+    assert process.returncode == 130 and "ended by Ctrl-C" in err
+    assert not any(Path(f"/proc/{one}").exists() for one in child)
+
+
+def test_the_parent_starts_the_child_before_it_loads_anything() -> None:
+    code = (
+        "import sys, gonio.verify.child; print(*{'numpy', 'drjit', 'mitsuba', 'gonio.models', 'rich'} & {*sys.modules})"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == ""
+
+
+def test_no_target_is_an_empty_report() -> None:
+    assert verify([], quick=True).passed
