@@ -139,8 +139,8 @@ def test_what_is_printed_is_counted_and_does_not_disturb_json(file: Path) -> Non
 
 
 def test_an_answer_that_changes_is_a_failure_that_says_so(file: Path) -> None:
-    report = judged(file, "Changes")
-    assert "eval changed its answer between two calls" in report["reciprocity"].why[0]
+    report = verify(f"{file}:Changes", quick=True, law="calls")
+    assert "asked twice: " in report["calls"].why[0] and "stochastic = True" in report["calls"].why[0]
 
 
 def test_a_fact_that_raises_fails_the_laws_that_ask_for_it(file: Path) -> None:

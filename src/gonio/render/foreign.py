@@ -28,8 +28,8 @@ ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specul
 
 
 # Ranges and defaults of the numbers among the properties of Mitsuba's own plugins, (default, low, high), from their
-# pages in Mitsuba's documentation (version 3.9, "BSDFs"). A property that is not here has no range that is known, and is
-# judged at the value that it has.
+# pages in Mitsuba's documentation (version 3.9, "BSDFs"). A property that is not here has no range that is known, and
+# is judged at the value that it has.
 _SHARE = (0.0, 0.0, 1.0)
 _PRINCIPLED = {"roughness": (0.5, 0.0, 1.0)} | dict.fromkeys(
     ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness"), _SHARE

@@ -35,11 +35,17 @@ def signed_lambda(w: Direction, alpha: Pair) -> Scalar:
     return where(w.z > 0.0, above, -1.0 - above)
 
 
+def raised(base: Array, power: Scalar) -> Array:
+    """base^power; beyond e^-80 and e^80 those: Dr.Jit's own power of 64 bits is no number where it underflows."""
+    dr = backend.drjit()
+    return dr.exp(dr.clip(power * dr.log(base), -80.0, 80.0))
+
+
 def escape(w: Direction, height: Array, alpha: Pair) -> Array:
     """G1(w, h): the chance to leave from C(h) = height along w; 0 downward."""
     dr = backend.drjit()
     power = maximum(distribution("ggx").Lambda(w, alpha), 0.0)
-    return where(w.z > 0.0, dr.power(dr.clip(height, 1e-12, 1.0), power), 0.0)
+    return where(w.z > 0.0, raised(dr.clip(height, 1e-12, 1.0), power), 0.0)
 
 
 def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Array]:
@@ -50,7 +56,7 @@ def meet(w: Direction, height: Array, u: Array, alpha: Pair) -> tuple[Array, Arr
     rest = dr.maximum(1.0 - u, 1e-12)
     steep = w.z < -0.9999
     power = -1.0 / where(dr.abs(bend) < 1e-9, 1e-9, bend)
-    there = where(steep, u, dr.power(rest, power)) * height
+    there = where(steep, u, raised(rest, power)) * height
     there = where(dr.abs(w.z) < FLAT, height, there)
     return dr.clip(there, 1e-12, 1.0), leaves
 

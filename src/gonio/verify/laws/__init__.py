@@ -17,6 +17,7 @@ def laws() -> dict[str, Law]:
 
 
 def chosen(names: Sequence[str] | None) -> list[Law]:
-    """The laws of these names in the order of a report, all where None; InputError where one is unknown."""
+    """The laws of these names in the order of a report; where None all but those that are asked on request; InputError
+    where one is unknown."""
     asked = None if names is None else {Law.family.get(name).name for name in names}
-    return [law for name, law in laws().items() if asked is None or name in asked]
+    return [law for name, law in laws().items() if (not law.on_request if asked is None else name in asked)]

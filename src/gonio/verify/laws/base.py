@@ -23,6 +23,7 @@ class Law:
     meaning  what its violation means for a picture
     everywhere  whether it is also asked at other values of the parameters
     at_ends     and at the ends of their ranges
+    on_request  whether it is asked only when it is named
     """
 
     family: ClassVar[Family[Law]]
@@ -32,6 +33,7 @@ class Law:
     meaning: ClassVar[str] = ""
     everywhere: ClassVar[bool] = True
     at_ends: ClassVar[bool] = True
+    on_request: ClassVar[bool] = False
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         raise NotImplementedError(f"{type(self).__name__} has no judge")

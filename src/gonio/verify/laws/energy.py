@@ -131,7 +131,7 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
     if not subject.has_density:
         return ideal, np.full_like(ideal, 1e-6)
     if subject.stochastic:
-        return _uniformly(subject, wo, effort.furnace_samples, seed)
+        return _randomly(subject, wo, effort.furnace_samples, seed)
     integral = cubature.integrate(subject.sample, subject.power(), wo, effort.accuracy, seed)
     return integral.value + ideal, integral.error + effort.accuracy
 
@@ -147,14 +147,21 @@ def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarr
     return np.sum(carried * seen.found[..., None], axis=1)
 
 
-def _uniformly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """A stochastic eval: mean over uniform wi, with three standard errors for its error."""
+def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """A stochastic eval: its mean over directions, half of them the model's own, with three standard errors."""
     values, errors = [], []
+    half, even = count // 2, 0.25 / np.pi
     for i, one in enumerate(wo):
-        wi = directions.uniform(np.random.default_rng([seed, 41, i]), count)
-        value = subject.eval(np.tile(one, (count, 1)), wi, "importance") * 4.0 * np.pi
+        rng = np.random.default_rng([seed, 41, i])
+        many = np.tile(one, (half, 1))
+        drawn = subject.sample(many, directions.numbers(rng, half), "importance")
+        usable = (drawn.pdf > 0.0) & ~drawn.delta & (np.abs(np.linalg.norm(drawn.wi, axis=1) - 1.0) < 1e-3)
+        wi = np.concatenate([np.where(usable[:, None], drawn.wi, [0.0, 0.0, 1.0]), directions.uniform(rng, half)])
+        density = 0.5 * (subject.pdf(np.tile(one, (2 * half, 1)), wi) + even)
+        value = subject.eval(np.tile(one, (2 * half, 1)), wi, "importance") / density[:, None]
+        value[:half][~usable] = 0.0
         values.append(value.mean(0))
-        errors.append(3.0 * value.std(0) / np.sqrt(count))
+        errors.append(3.0 * value.std(0) / np.sqrt(2 * half))
     return np.array(values), np.array(errors)
 
 

@@ -11,7 +11,8 @@ from .base import Law
 class Shader(Law):
     """The shader code that is written from a model gives the model's values."""
 
-    number = 10
+    number = 12
+    on_request = True
     name = "shader"
     title = "shader code gives the same values"
     meaning = "The engine's picture differs from the offline reference."
