@@ -11,7 +11,7 @@ from typing import NamedTuple
 from .. import files
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import box, directions, page, statistics, subject
+from . import box, diagnosis, directions, page, statistics, subject
 from .box import Place
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .laws import Law, chosen
@@ -70,10 +70,22 @@ def verify(
     tests = sum(len(it.what.trials) for _, _, _, all_ in held for it in all_ if isinstance(it.what, Finding))
     threshold = statistics.sidak(SIGNIFICANCE, tests)
     cards: dict[int, Card] = {}
+    answers: dict[int, list[diagnosis.Answer]] = {}
     for one, others, each, all_ in held:
-        verdict = _joined([_verdict(each, it, threshold, seed) for it in all_], all_)
+        verdicts = [_verdict(each, it, threshold, seed) for it in all_]
+        verdict = _joined(verdicts, all_)
         card = cards.setdefault(id(one), Card(one, [], box.covered(one, others)))
         card.verdicts.append(verdict)
+        place, what, _ = next(it for it, v in zip(all_, verdicts, strict=True) if v is verdict)
+        found = what if isinstance(what, Finding) else None
+        answers.setdefault(id(one), []).append(diagnosis.Answer(each, verdict, place.subject, found))
+
+    def judged(law: Law, other: Subject) -> Verdict:
+        what = _judge(law, other, ELSEWHERE[effort], seed)
+        return what if isinstance(what, Verdict) else decide(law, other, what, threshold, seed)
+
+    for asked_of_one in answers.values():
+        diagnosis.explain(asked_of_one, EFFORTS[effort], seed, judged)
     made = Report(list(cards.values()), seed, effort, tests, threshold, time.perf_counter() - started)
     if report is not None:
         page.write(made, Path(report))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...energy.albedo import cubature
 from ...errors import InputError
-from .. import directions, statistics
+from .. import directions, severity, statistics
+from ..causes import SPREAD, Cause, factor_key, place_of, written
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..subject import Subject
@@ -63,6 +67,40 @@ class Energy(Law):
             finding.shown = f"gain {finding.figure:.4f}"
         finding.evidence = curves
         return finding
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        found = [severity.of_sampling(subject)]
+        if finding.figure > finding.tolerance:
+            found.append(severity.gain(subject))
+            white = _white(subject)
+            if white is not None and found[-1].average == 0.0:
+                gained = severity.gain(white)
+                found.append(dataclasses.replace(gained, where=f"{gained.where}, where nothing is absorbed"))
+        if finding.problems and (white := _white(subject)) is not None:
+            found.append(severity.loss(white))
+        return max(found, key=lambda bias: bias.average)
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        curves = finding.evidence
+        if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
+            return
+        # only where nothing is absorbed is it known what the albedo should be
+        albedo = curves.quadrature if curves.furnace is None else curves.furnace
+        if np.ptp(albedo, axis=1).max() > SPREAD:
+            return
+        a = albedo.mean(1)
+        if np.ptp(a) < SPREAD * a.mean():
+            if curves.furnace is not None or a.mean() > 1.0:
+                factor = written(float(a.mean()))
+                words = f"it reflects {factor} times what comes in, whatever wo: a constant factor?"
+                yield Cause(words, factor_key(float(a.mean())))
+            return
+        bad = np.abs(a - 1.0) > SPREAD
+        place = place_of(curves.wo, curves.wo, bad)
+        # an edge, and no gradual rise
+        if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
+            words = f"{place.replace('from wi', 'from wo')}"
+            yield Cause(f"it reflects all that comes in, but {np.median(a[bad]):.4g} times that {words}", words)
 
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
