@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
@@ -117,13 +118,15 @@ def named(ratio: Ratio) -> Cause | None:
         return astray
     if region is None:
         # a channel alone is a place as well
-        return Cause(f"{ratio.name} is 1 but {words}", f"{words}") if words and bad.mean() > COVER else None
+        text = f"{ratio.name} is 1 but {words}"
+        return Cause(text, text) if words and bad.mean() > COVER else None
     place, rows = region
     words = f"{words} and {place}".removeprefix(" and ") if words else place
     inside = _fitted(ratio.take(np.flatnonzero(rows)))
     if inside is not None:
         return _cause(ratio, inside, words)
-    return Cause(f"{ratio.name} is 1 everywhere else, and wrong {words}", words)
+    text = f"{ratio.name} is 1 everywhere else, and wrong {words}"
+    return Cause(text, text)
 
 
 def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:
@@ -196,8 +199,11 @@ def _scalar(ratio: Ratio) -> np.ndarray | None:
     """One number a pair (N,), where all channels have the same ratio; None where they have not."""
     lit = np.abs(ratio.below) > 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
     r = np.divide(ratio.above, ratio.below, out=np.full_like(ratio.above, np.nan), where=lit)
-    middle = np.nanmedian(r, axis=1)
-    apart = np.nanmax(np.abs(r - middle[:, None]), axis=1) > max(SPREAD, _tolerance(ratio)) * np.abs(middle)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows in which nothing is lit stay no number
+        middle = np.nanmedian(r, axis=1)
+        spread = np.nanmax(np.abs(r - middle[:, None]), axis=1)
+    apart = ~(spread <= max(SPREAD, _tolerance(ratio)) * np.abs(middle))
     return middle if apart.mean() < 1.0 - COVER else None
 
 
@@ -324,8 +330,8 @@ class Cosines(Candidate):
         scale = float(np.median(quotient))
         number = written(scale)
         plain = abs(scale - 1.0) < SPREAD
-        if not plain and number not in NUMBERS and len(names) > 1:
-            return None
+        if not plain and number not in NUMBERS:
+            return None  # a clamp leaves such a ratio, and any number can be had of it
         held = _holds(ratio, quotient / scale)
         if held is None:
             return None
@@ -359,6 +365,55 @@ def product(scale: float | str, powers: dict[str, int]) -> str:
             over.insert(0, text)
     below = under[0] if len(under) == 1 and " " not in under[0] else f"({' '.join(under)})"
     return " ".join(over) or "1" if not under else f"{' '.join(over) or '1'} / {below}"
+
+
+class Colour(Candidate):
+    """A constant of each channel's own: an albedo or a tint that one of the two lacks."""
+
+    def fit(self, ratio: Ratio) -> Fit | None:
+        if ratio.above.shape[1] != 3 or ratio.antisymmetric or np.any(ratio.below <= 0.0):
+            return None
+        r = ratio.above / ratio.below
+        middle = np.median(r, axis=0)
+        if np.any(middle <= 0.0) or np.ptp(middle) < 0.01 * middle.max():
+            return None
+        helds = [_holds(ratio, column / m) for column, m in zip(r.T, middle, strict=True)]
+        spreads = [held for held in helds if held is not None]
+        if len(spreads) < 3:
+            return None
+        text = ", ".join(f"{m:.4g}" for m in middle)
+        guess = "a colour that one of the two lacks"
+        return Fit(f"({text})", guess, max(s for s, _ in spreads), min(c for _, c in spreads))
+
+
+class Refraction(Candidate):
+    """Powers of the cosines of a refraction, about the half vector of the index that samples tell."""
+
+    NAMES = ("|o.m|", "|i.m|", "cos_i", "cos_o", "cos_m")
+
+    def fit(self, ratio: Ratio) -> Fit | None:
+        if np.any(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0):
+            return None
+        r = _scalar(ratio)
+        if r is None or np.any(~(r > 0.0)):
+            return None
+        for eta in index_below(ratio.subject):
+            side = np.where(ratio.wo[:, 2] > 0.0, eta, 1.0 / eta)
+            m = ratio.wo + side[:, None] * ratio.wi
+            m /= np.linalg.norm(m, axis=1, keepdims=True)
+            cosines = [np.sum(ratio.wo * m, 1), np.sum(ratio.wi * m, 1), ratio.wi[:, 2], ratio.wo[:, 2], m[:, 2]]
+            values = np.maximum(np.abs(np.stack(cosines, axis=1)), 1e-9)
+            singles = [(k, power) for k in range(len(self.NAMES)) for power in (1, -1, 2, -2)]
+            pairs = itertools.combinations([(k, power) for k, power in singles if abs(power) == 1], 2)
+            for which in (*((one,) for one in singles), *pairs):
+                field = np.prod([values[:, k] ** float(power) for k, power in which], axis=0)
+                for over in (0, 2, -2):
+                    held = _holds(ratio, r / (field * side**over))
+                    if held is None:
+                        continue
+                    powers = {self.NAMES[k]: power for k, power in which} | ({"eta": over} if over else {})
+                    return Fit(product("", powers), "the Jacobian of refraction", *held)
+        return None
 
 
 class Index(Candidate):
@@ -501,6 +556,16 @@ class Fresnel(Candidate):
         cosines = [ratio.wo[:, 2], ratio.wi[:, 2], np.sum(ratio.wo * m, 1), m[:, 2]]
         powers = [(1.0 - np.clip(np.abs(c), 0.0, 1.0)) ** 5 for c in cosines]
         r = ratio.above / np.where(ratio.below == 0.0, np.nan, ratio.below)
+        if not ratio.antisymmetric:
+            # F of (1 - cos)^5 = 1 is 1: a term that one of the two lacks
+            one = np.ones(len(r))
+            for name, x in zip(self.NAMES, powers, strict=True):
+                for formula, held in (
+                    (f"F({name})", self._held(ratio, r, x, one)),
+                    (f"1 / F({name})", self._held(ratio, r, one, x)),
+                ):
+                    if held is not None:
+                        return Fit(formula, "Fresnel's term, forgotten in one of the two or there twice", *held)
         order = [(0, 1), (1, 0)] if ratio.antisymmetric else itertools.permutations(range(4), 2)
         for a, b in order:
             held = self._held(ratio, r, powers[a], powers[b])
@@ -541,7 +606,7 @@ class OneDirection(Candidate):
             return None
         o, i = (np.abs(w[:, 2:]) for w in (ratio.wo, ratio.wi))
         powers = np.arange(1, self.DEGREE + 1)
-        columns = o**powers - i**powers
+        columns = np.column_stack([o**powers - i**powers, np.log(o / i)])
         solved = np.linalg.lstsq(columns, np.log(r), rcond=None)[0]
         held = _holds(ratio, r / np.exp(columns @ solved))
         if held is None:
@@ -552,8 +617,10 @@ class OneDirection(Candidate):
 
 CANDIDATES: tuple[Candidate, ...] = (
     Constant(),
+    Colour(),
     Cosines(),
     Index(),
+    Refraction(),
     Otherwise(),
     Distribution(),
     Fresnel(),

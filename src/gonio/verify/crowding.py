@@ -154,6 +154,17 @@ def _effect(expected: np.ndarray, seen: np.ndarray) -> float:
 def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
     """Factors from simple to less so."""
     yield "1", "a constant of the pdf", lambda o, i: np.ones(len(o))
+
+    def uniform(o: np.ndarray, i: np.ndarray) -> np.ndarray:
+        plain = subject.pdf(o, i)
+        return np.divide(1.0, plain, out=np.zeros(len(o)), where=plain > 0.0)
+
+    yield "1 / pdf", "samples are uniform, and the pdf is not", uniform
+    yield (
+        "cos_i / pdf",
+        "samples follow the cosine, and the pdf does not",
+        lambda o, i: uniform(o, i) * np.abs(i[:, 2]),
+    )
     names = ("(o.m)", "cos_m", "cos_i")
 
     def product(o: np.ndarray, i: np.ndarray, powers: tuple[int, ...]) -> np.ndarray:
@@ -169,6 +180,12 @@ def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
                 powers_of = dict(zip(names, powers, strict=True))
                 guess = " and ".join(causes.Cosines.GUESSES[name] for name, p in powers_of.items() if p)
                 yield causes.product("", powers_of), guess, functools.partial(product, powers=powers)
+    for eta in causes.index_below(subject):
+        for place, side in (("", 0.0), (" from outside", 1.0), (" from inside", -1.0)):
+            for power in (2, -2, 4, -4):
+                formula = f"{causes.product('', {'eta': power})} in transmission{place}"
+                field = functools.partial(_through, eta=eta, side=side, power=float(power))
+                yield formula, "eta^2 of the Jacobian of refraction", field
     for text, other in causes.widths(subject):
 
         def replaced(o: np.ndarray, i: np.ndarray, other: Subject = other) -> np.ndarray:
@@ -178,24 +195,19 @@ def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
         yield f"those of {text}", "alpha against alpha^2", replaced
     width = causes.width_of(subject)
     if width is not None and not subject.transmits:
-        for text, power in causes.POWERS.items():
+        for text, exponent in causes.POWERS.items():
 
-            def narrower(o: np.ndarray, i: np.ndarray, power: float = power) -> np.ndarray:
+            def narrower(o: np.ndarray, i: np.ndarray, exponent: float = exponent) -> np.ndarray:
                 m = causes.half_vector(o, i)
-                return causes.ggx(m, width**power) / causes.ggx(m, width)
+                return causes.ggx(m, width**exponent) / causes.ggx(m, width)
 
             yield f"D({text}) / D(alpha) of GGX", "alpha against alpha^2", narrower
 
-    def uniform(o: np.ndarray, i: np.ndarray) -> np.ndarray:
-        plain = subject.pdf(o, i)
-        return np.divide(1.0, plain, out=np.zeros(len(o)), where=plain > 0.0)
 
-    yield "1 / pdf", "samples are uniform, and the pdf is not", uniform
-    yield (
-        "cos_i / pdf",
-        "samples follow the cosine, and the pdf does not",
-        lambda o, i: uniform(o, i) * np.abs(i[:, 2]),
-    )
+def _through(o: np.ndarray, i: np.ndarray, eta: float, side: float, power: float) -> np.ndarray:
+    """A power of the index on wi's side over that on wo's in transmission from a side, from both where it is 0."""
+    there = (o[:, 2] * i[:, 2] < 0.0) & (o[:, 2] * side >= 0.0)
+    return np.where(there, np.where(o[:, 2] > 0.0, eta, 1.0 / eta) ** power, 1.0)
 
 
 def around(subject: Subject, light: severity.Estimates | None = None) -> str:

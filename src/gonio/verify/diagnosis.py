@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .severity import Bias
 
 # What breaks these comes first: a NaN spoils every figure, a weight spoils the pdf's and the energy's.
-ORDER = ("positivity", "weight", "pdf", "energy", "reciprocity", "isotropy", "linearity", "precision", "gradients")
+ORDER = ("positivity", "weight", "pdf", "reciprocity", "energy", "isotropy", "linearity", "precision", "gradients")
 # Failures that another one brings along: the quadrature and the samples of the energy disagree where weights are wrong.
 FOLLOWS = {"energy": ("weight", "pdf"), "pdf": ("weight",)}
 LIMIT = 60.0  # seconds a law; it takes less than one unless the BSDF loops
@@ -61,6 +61,8 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
                 continue
             cause = _cause(law, subject, finding, effort, seed)
         leader = named.get(cause.key) if cause is not None else None
+        if law.name == "energy" and "reciprocity" in named.values():
+            leader = "reciprocity"  # a cosine too many or too few changes what is reflected, by a constant maybe
         if leader is None:
             # a disagreement of two estimates; a gain of eval itself follows from nothing
             follows = FOLLOWS.get(law.name, ()) if cause is None and finding.figure <= finding.tolerance else ()

@@ -67,7 +67,9 @@ class Bias:
     where    the worst wo, or what else says where, in words
     kind     "bias", "lost" or "gained" energy; "nan", whose shares are those of directions; "noise", which costs
              samples and biases nothing; "derivatives", which only fitting sees
-    both     the average where light and BSDF samples are combined; None where there is one way only
+    furnace  the average under light from everywhere alike, where errors of both signs cancel; None where it is no
+             matter of sampling
+    both     the same where light and BSDF samples are combined
     """
 
     worst: float
@@ -75,6 +77,7 @@ class Bias:
     share: float
     where: str
     kind: Kind
+    furnace: float | None = None
     both: float | None = None
 
     @property
@@ -105,6 +108,8 @@ class Bias:
         text += f" ({self.where})"
         if self.share:
             text += f", more than 1 % over {percent(self.share)} of directions"
+        if self.furnace is not None and self.furnace < 0.9 * self.average:
+            text += f"; under light from everywhere alike {percent(self.furnace)}"
         if self.both is not None and abs(self.both - self.average) > 0.1 * self.average:
             text += f"; light and BSDF sampling together: {percent(self.both)}"
         return text
@@ -195,6 +200,8 @@ class Estimates(NamedTuple):
     consistent, consistent_both  the same two where each sample weighs eval / pdf: what is left of the difference
               to `sampled` and `both` is the weights' fault, what is left to `value` the pdf's
     noise     two standard errors of `sampled` and `both`
+    parts     `value`, `sampled` and `consistent`, means of the channels, by where the light comes from: (3, N, bins)
+    doubt     three standard errors of the latter two, (N, bins)
     claimed   int pdf dwi, (N,)
     drawn     share of samples that did not fail and are no delta, (N,)
     """
@@ -207,6 +214,8 @@ class Estimates(NamedTuple):
     consistent: np.ndarray
     consistent_both: np.ndarray
     noise: np.ndarray
+    parts: np.ndarray
+    doubt: np.ndarray
     claimed: np.ndarray
     drawn: np.ndarray
 
@@ -226,20 +235,23 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
     own = _eval_over_pdf(subject, many, s.wi, weight, good, mode)
     heuristic = np.where(good, own.pdf / (own.pdf + SPHERE), 1.0)
     expected = _batched(own.weight, n), _batched(own.weight * heuristic[:, None], n)
+    bins = _bins(s.wi)
+    apart = [_batched(w.mean(1, keepdims=True) * bins * good[:, None], n) for w in (weight, own.weight)]
 
     def integrand(o: np.ndarray, i: np.ndarray) -> np.ndarray:
         value = np.nan_to_num(subject.eval(o, i, mode), posinf=0.0, neginf=0.0)
         pdf = np.maximum(np.nan_to_num(subject.pdf(o, i), posinf=0.0, neginf=0.0), 0.0)[:, None]
-        return np.concatenate([value, value * (SPHERE / (pdf + SPHERE)), pdf], axis=1)
+        split = value.mean(1, keepdims=True) * _bins(i)
+        return np.concatenate([value, value * (SPHERE / (pdf + SPHERE)), pdf, split], axis=1)
 
     if not subject.has_density:
-        integral = np.zeros((n, 2 * channels + 1))
+        integral = np.zeros((n, 2 * channels + 1 + BINS))
     elif subject.stochastic:  # values are random: no cell would ever be good enough
         wi = directions.uniform(np.random.default_rng(43), len(many))
         integral = integrand(many, wi).reshape(n, SAMPLES, -1).mean(1) / SPHERE
     else:
         integral = cubature.integrate(_seeds(subject), integrand, wo, ACCURACY).value
-    seen, claimed = integral[:, :-1], integral[:, -1]
+    seen, claimed, split = np.split(integral, [2 * channels, 2 * channels + 1], axis=1)
     ideal = _deltas(s.wi, weight, s.pdf, s.delta, n)
     (sampled, spread), (part, other) = followed
     value = seen[:, :channels] + ideal
@@ -252,9 +264,20 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
         expected[0][0],
         expected[1][0] + seen[:, channels:],
         2.0 * np.maximum(spread, other) + (0.02 * value if subject.stochastic else 0.0),
-        claimed,
+        np.stack([split, apart[0][0], apart[1][0]]),
+        3.0 * np.maximum(apart[0][1], apart[1][1]) + (0.02 * split if subject.stochastic else 0.0),
+        claimed[:, 0],
         good.reshape(n, SAMPLES).mean(1),
     )
+
+
+BINS = 16  # four quarters of the azimuth, within 45 degrees of the normal and beyond, on each side of the surface
+
+
+def _bins(w: np.ndarray) -> np.ndarray:
+    """1 in the column of the bin that a direction lies in, (N, BINS); edges are those of cubature's first cells."""
+    number = (w[:, 0] > 0.0) + 2 * (w[:, 1] > 0.0) + 4 * (np.abs(w[:, 2]) > np.sqrt(0.5)) + 8 * (w[:, 2] > 0.0)
+    return (number[:, None] == np.arange(BINS)).astype(float)
 
 
 class _Own(NamedTuple):
@@ -268,8 +291,9 @@ def _eval_over_pdf(
     """What samples with a density should weigh, and their pdf, by `eval` and `pdf`; others keep what they have."""
     weight, pdf = weight.copy(), np.zeros(len(wo))
     if good.any():
-        value = subject.eval(wo[good], wi[good], mode, "float32")
-        pdf[good] = np.maximum(np.nan_to_num(subject.pdf(wo[good], wi[good], "float32"), posinf=0.0), 0.0)
+        unit = wi[good] / np.maximum(np.linalg.norm(wi[good], axis=1, keepdims=True), 1e-12)
+        value = subject.eval(wo[good], unit, mode, "float32")
+        pdf[good] = np.maximum(np.nan_to_num(subject.pdf(wo[good], unit, "float32"), posinf=0.0), 0.0)
         over = np.divide(value, pdf[good, None], out=np.zeros_like(value), where=pdf[good, None] > 0.0)
         weight[good] = np.nan_to_num(over, posinf=0.0, neginf=0.0)
     return _Own(weight, pdf)
@@ -318,8 +342,17 @@ def of_sampling(subject: Subject, part: Part = "all", light: Estimates | None = 
         off = np.where(np.abs(off) > light.noise + 0.1 * ACCURACY, off, 0.0)
         found.append(summed(off, np.maximum(light.value, 0.0), light.wo, light.mass))
     alone, both = found
-    worse = both if both.average > alone.average else alone
-    worse = dataclasses.replace(worse, both=both.average)
+    # the same light from a lamp: bin by bin, so that too much on one side does not make up for too little on another
+    value, drawn, own = light.parts
+    apart = np.abs((own if part == "pdf" else drawn) - (own if part == "weights" else value))
+    # a lobe that the edge of a bin cuts in two lies on either side by chance: half a per cent of all light is nothing
+    doubt = light.doubt + 5e-3 * np.abs(value).sum(1, keepdims=True)
+    apart = np.where(apart > doubt, apart, 0.0).sum(1, keepdims=True)
+    lamp = summed(apart, light.value.mean(1, keepdims=True).clip(min=0.0), light.wo, light.mass, alone.kind)
+    worse = max((alone, both, lamp), key=lambda bias: bias.average)
+    if lamp.average > 1.1 * max(alone.average, both.average) and alone.kind != "bias":
+        worse = dataclasses.replace(worse, kind="bias")
+    worse = dataclasses.replace(worse, furnace=alone.average, both=both.average)
     if subject.transmits and light is subject.light and worse.grade == Grade.INVISIBLE:
         other = of_sampling(subject, part, estimates(subject, "importance"))
         if other.average > worse.average:

@@ -101,8 +101,9 @@ class Pdf(Law):
         if there.stochastic or not isinstance(finding.evidence, SampleCells):
             return
         # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are one
-        oblique = directions.single(directions.at(*(OBLIQUE if 1 in there.sides else BELOW[2])))
-        for tested in _chi_square(there, FEW, seed, oblique[None]):
+        angles = [angles for side, angles in ((1, OBLIQUE), (-1, BELOW[1])) if side in there.sides]
+        oblique = directions.single(np.array([directions.at(*pair) for pair in angles]).reshape(-1, 3))
+        for tested in _chi_square(there, FEW, seed, oblique):
             held = crowding.blocks(tested.cells)
             cause = crowding.named(there, held) if held is not None else None
             if cause is not None:

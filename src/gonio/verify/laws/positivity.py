@@ -111,7 +111,7 @@ class Positivity(Law):
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         there = where_found(subject, finding)
         wo, wi, _ = _grid(there, effort, seed)
-        value = there.eval(wo, wi).min(1)
+        value = np.min([there.eval(wo, wi, precision=p).min(1) for p in there.precisions], axis=0)
         for what, bad in (("no number", ~np.isfinite(value)), ("negative", value < 0.0)):
             for words, rows in _exact_places(wo, wi):
                 if bad.any() and not np.any(bad & ~rows) and (rows & bad).sum() > 0.2 * rows.sum():
