@@ -165,10 +165,10 @@ def nothing_below(
 ) -> Cause | None:
     """A numerator where there is no denominator, in a place that can be named: samples that eval knows nothing of."""
     dark = np.all(below == 0.0, axis=1)
-    bad: np.ndarray = dark & np.any(above > 0.0, axis=1)
-    if bad.mean() < 5e-3 or bad.sum() < FEWEST:
-        return None
     lit: np.ndarray = np.any(above > 0.0, axis=1)
+    bad = dark & lit
+    if bad.sum() < max(FEWEST, 5e-3 * len(bad)):
+        return None
     place = place_of(wo[lit], wi[lit], bad[lit])
     words = f"{top} is there and {bottom} is 0 {place}"
     return Cause(f"{words}, at {bad[lit].mean():.2g} of the directions", words) if place else None

@@ -46,6 +46,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
     failed = [answer for answer in answers if answer.verdict.status in (FAIL, DECLARED)]
     rank = {name: k for k, name in enumerate(ORDER)}
     named: dict[str, str] = {}  # a cause's key, and the law that named it
+    nan = False  # whether values are no numbers at more than single directions: every other figure suffers
     felt: set[str] = set()  # laws whose failure changes a picture
     for law, verdict, subject, finding in sorted(failed, key=lambda a: rank.get(a.law.name, len(rank))):
         if finding is None:
@@ -67,6 +68,10 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
             # a disagreement of two estimates; a gain of eval itself follows from nothing
             follows = FOLLOWS.get(law.name, ()) if cause is None and finding.figure <= finding.tolerance else ()
             leader = next((name for name in follows if name in felt), None)
+            if cause is None and nan:
+                leader = "positivity"
+        if verdict.grade is Grade.NAN and verdict.bias is not None and verdict.bias.average > 0.0:
+            nan = True
         if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE):
             felt.add(law.name)
         if leader is not None:
@@ -87,6 +92,12 @@ def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
 _SICK = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexError, KeyError, MemoryError)
 
 
+UNSTEADY = Cause(
+    "a pair's value changes when it is asked again, or among other pairs: state, chance, or a sum over all rays?",
+    "unsteady",
+)
+
+
 def _measure(law: Law, verdict: Verdict, subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:
     try:
         with limited(law.name, LIMIT):
@@ -101,6 +112,8 @@ def _measure(law: Law, verdict: Verdict, subject: Subject, finding: Finding, eff
 def _cause(law: Law, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Cause | None:
     try:
         with limited(law.name, LIMIT):
+            if not (subject.stochastic or subject.steady):
+                return UNSTEADY  # and no ratio of two calls means anything
             for one in law.ratios(subject, finding, effort, seed):
                 cause = causes.named(one) if isinstance(one, Ratio) else one
                 if cause is not None:

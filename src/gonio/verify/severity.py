@@ -165,7 +165,7 @@ def between(
     signed  int (a - b) dwi in its place: what a furnace shows, where errors of both signs cancel
     None where nothing is reflected, or where values are random.
     """
-    if subject.stochastic or not subject.has_density:
+    if subject.stochastic or not subject.has_density or not subject.steady:
         return None
     wo, mass = views(subject.sides)
 
@@ -176,6 +176,24 @@ def between(
     value = cubature.integrate(_seeds(subject), integrand, wo, ACCURACY).value
     off, light = np.split(value, 2, axis=1)
     return summed(off, light, wo, mass, kind, where) if np.any(light > 0.0) else None
+
+
+def by_samples(subject: Subject, pair: Pair, where: str = "") -> Bias | None:
+    """As `between`, over directions that are sampled, half of them uniformly: for differences too ragged for cells."""
+    if subject.stochastic or not subject.steady:
+        return None
+    wo, mass = views(subject.sides)
+    count = 2048
+    rng = np.random.default_rng(12)
+    o = np.repeat(wo, count, axis=0)
+    wi = directions.uniform(rng, len(o))
+    s = subject.sample(o, directions.numbers(rng, len(o)))
+    drawn = (rng.random(len(o)) < 0.5) & (s.pdf > 0.0) & ~s.delta
+    wi[drawn] = directions.single(s.wi[drawn])
+    density = 0.5 * subject.pdf(o, wi)[:, None] + 0.5 * SPHERE
+    a, b = (np.nan_to_num(v, nan=0.0, posinf=0.0, neginf=0.0) / density for v in pair(o, wi))
+    off, light = (v.reshape(len(wo), count, -1).mean(1) for v in (np.abs(a - b), np.abs(a)))
+    return summed(off, light, wo, mass, "bias", where) if np.any(light > 0.0) else None
 
 
 def _seeds(subject: Subject) -> cubature.Sampler:
@@ -227,7 +245,11 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
     u = np.tile(_stratified(SAMPLES), (n, 1))
     many = np.repeat(wo, SAMPLES, axis=0)
     s = subject.sample(many, u, mode, "float32")
-    weight = np.where((s.pdf > 0.0)[:, None], np.nan_to_num(s.weight, posinf=0.0, neginf=0.0), 0.0)
+    found = s.pdf > 0.0
+    if not subject.transmits:
+        # what goes through the surface of a solid that does not transmit meets its inside, which is dark
+        found = found & (s.wi[:, 2] * many[:, 2] > 0.0)
+    weight = np.where(found[:, None], np.nan_to_num(s.weight, posinf=0.0, neginf=0.0), 0.0)
     channels = weight.shape[1]
     heuristic = np.where(s.delta, 1.0, s.pdf / np.maximum(s.pdf + SPHERE, 1e-30))
     followed = _batched(weight, n), _batched(weight * np.nan_to_num(heuristic)[:, None], n)
@@ -246,7 +268,7 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
 
     if not subject.has_density:
         integral = np.zeros((n, 2 * channels + 1 + BINS))
-    elif subject.stochastic:  # values are random: no cell would ever be good enough
+    elif subject.stochastic or not subject.steady:  # values are random: no cell would ever be good enough
         wi = directions.uniform(np.random.default_rng(43), len(many))
         integral = integrand(many, wi).reshape(n, SAMPLES, -1).mean(1) / SPHERE
     else:

@@ -133,6 +133,17 @@ class Subject:
         return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
 
     @functools.cached_property
+    def steady(self) -> bool:
+        """Whether `eval` gives a pair's value again when it is asked again, among fewer pairs and others."""
+        rng = np.random.default_rng(7)
+        wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
+        first = self.eval(wo, wi)
+        again = [self.eval(wo, wi), self.eval(wo[256:], wi[256:])]
+        return all(
+            np.allclose(v, w, rtol=1e-5, equal_nan=True) for v, w in zip(again, (first, first[256:]), strict=True)
+        )
+
+    @functools.cached_property
     def light(self) -> severity.Estimates:
         """The albedos that integrators find, each in its way: computed when a law fails, once for all laws."""
         return severity.estimates(self)

@@ -60,6 +60,6 @@ class Precision(Law):
         )
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
-        return severity.between(
+        return severity.by_samples(
             subject, lambda wo, wi: (subject.eval(wo, wi), subject.eval(wo, wi, precision="float32"))
         )

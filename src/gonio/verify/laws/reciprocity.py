@@ -80,6 +80,9 @@ class Reciprocity(Law):
                     f"with its parameter's index, {other:.4g}, it is reciprocal: `eta` of its samples is {text} that",
                     "eta of samples",
                 )
+        if abs(eta - 1.0) > 1e-3 and _reciprocal_with(subject, 1.0, seed):
+            text = "f(wo, wi) = f(wi, wo) in transmission too: the factor (eta_o / eta_i)^2 of radiance is missing"
+            yield Cause(f"{text}, or `eta` of its samples should be 1?", "eta^2 in transmission")
         wo, wi = pairs(subject, PAIRS, seed, subject.best == "float64")
         there, back = subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo)
         yield Ratio("f(wo, wi)", "f(wi, wo)", wo, wi, there, back, subject, antisymmetric=True)
