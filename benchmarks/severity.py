@@ -73,7 +73,7 @@ def ball(
     image = np.asarray(mi.render(scene, spp=spp, seed=seed))[..., :3]
     x = (np.arange(size) + 0.5) / size * 2.0 - 1.0
     square = x[:, None] ** 2 + x[None, :] ** 2
-    inside = square < (1.0 - 0.7 / size) ** 2
+    inside = square < 1.0
     across, up = np.meshgrid(x, x)
     ring, azimuth = np.floor(32.0 * square[inside]), np.arctan2(up, across)[inside]
     return image[inside][np.lexsort((azimuth, ring))]

@@ -595,6 +595,48 @@ class Fresnel(Candidate):
         return spread, cover
 
 
+class DielectricFresnel(Candidate):
+    """The exact F of a dielectric at n.o in place of o.m: F where light is reflected, 1 - F where it goes through."""
+
+    def fit(self, ratio: Ratio) -> Fit | None:
+        r = _scalar(ratio)
+        if r is None:
+            return None
+        o, i = ratio.wo[:, 2], ratio.wi[:, 2]
+        through = o * i < 0.0
+        for eta in index_below(ratio.subject):
+            side = np.where(o > 0.0, eta, 1.0 / eta)
+            m = ratio.wo + np.where(through, side, 1.0)[:, None] * ratio.wi
+            m /= np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
+
+            def share(cosine: np.ndarray, index: np.ndarray, through: np.ndarray = through) -> np.ndarray:
+                F = _dielectric(np.abs(cosine), index)
+                return np.where(through, 1.0 - F, F)
+
+            if ratio.antisymmetric:
+                other, words = share(i, np.where(i > 0.0, eta, 1.0 / eta)), "F(n.o) / F(n.i)"
+            else:
+                other, words = share(np.sum(ratio.wo * m, axis=1), side), "F(n.o) / F(o.m)"
+            at_normal = share(o, side)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                quotients = {words: r * other / at_normal, f"1 / ({words})": r * at_normal / other}
+            for formula, quotient in quotients.items():
+                held = _holds(ratio, quotient)
+                if held is not None:
+                    text = f"{formula} of index {eta:.4g}"
+                    return Fit(text, "Fresnel's term at the normal, where the half vector belongs", *held)
+        return None
+
+
+def _dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """Reflectance of unpolarized light, by the cosine >= 0 and the index beyond over that here (Walter2007, eq. 22)."""
+    square = eta**2 - 1.0 + cosine**2
+    g = np.sqrt(np.maximum(square, 0.0))
+    plus = np.maximum(g + cosine, 1e-12)
+    a, b = (g - cosine) / plus, (cosine * plus - 1.0) / (cosine * (g - cosine) + 1.0)
+    return np.where(square > 0.0, 0.5 * a**2 * (1.0 + b**2), 1.0)
+
+
 class OneDirection(Candidate):
     """f(wo, wi) / f(wi, wo) = g(cos_o) / g(cos_i): a term that knows one of the two directions only."""
 
@@ -624,6 +666,7 @@ CANDIDATES: tuple[Candidate, ...] = (
     Otherwise(),
     Distribution(),
     Fresnel(),
+    DielectricFresnel(),
     OneDirection(),
 )
 

@@ -126,7 +126,7 @@ def percent(share: float) -> str:
 def views(sides: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """16 wo a side, and each one's share of the cosine-weighted hemisphere; shares sum to 1 over all sides."""
     # equal steps of sin^2 theta are equal shares; the normal itself is left out, where azimuths have no value
-    theta = np.concatenate([[1.0], np.degrees(np.arcsin(np.sqrt(np.arange(1, 12) / 12.0))), [80.0, 85.0, 88.0, 89.5]])
+    theta = np.concatenate([[1.0], np.degrees(np.arcsin(np.sqrt(np.arange(1, 12) / 12.0))), [80.0, 84.0, 87.0, 89.5]])
     s = np.sin(np.radians(theta)) ** 2
     edges = np.concatenate([[0.0], 0.5 * (s[1:] + s[:-1]), [1.0]])
     phi = 137.508 * np.arange(len(theta))
@@ -173,7 +173,7 @@ def between(
         a, b = (np.nan_to_num(value, nan=0.0, posinf=0.0, neginf=0.0) for value in pair(o, i))
         return np.concatenate([a - b if signed else np.abs(a - b), np.abs(a)], axis=1)
 
-    value = cubature.integrate(_seeds(subject), integrand, wo, ACCURACY).value
+    value = cubature.integrate(_seeds(subject), integrand, wo, 2.0 * ACCURACY).value
     off, light = np.split(value, 2, axis=1)
     return summed(off, light, wo, mass, kind, where) if np.any(light > 0.0) else None
 
