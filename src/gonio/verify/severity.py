@@ -29,7 +29,8 @@ Mode: TypeAlias = Literal["radiance", "importance"]
 Pair: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 SAMPLES = 1 << 13  # for each wo; stratified, so that the mean is good to about 1e-3 of a weight
-ACCURACY = 1e-3  # of integrals: a tenth of the least bias that is told
+ACCURACY = 4e-3  # stated of integrals, which are ten times better: that is what cells are divided for
+LEAST = 2e-4  # differences of albedos that are none
 FLOOR = 0.02  # of the brightest channel: what a nearly black one is off by, nobody sees
 SPHERE = 0.25 / np.pi  # density of light samples: a constant environment's
 
@@ -125,8 +126,10 @@ def percent(share: float) -> str:
 
 def views(sides: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """16 wo a side, and each one's share of the cosine-weighted hemisphere; shares sum to 1 over all sides."""
-    # equal steps of sin^2 theta are equal shares; the normal itself is left out, where azimuths have no value
-    theta = np.concatenate([[1.0], np.degrees(np.arcsin(np.sqrt(np.arange(1, 12) / 12.0))), [80.0, 84.0, 87.0, 89.5]])
+    # equal steps of sin^2 theta are equal shares, and their middles are no round angles at which a material may change;
+    # the normal itself is left out, where azimuths have no value
+    middles = np.degrees(np.arcsin(np.sqrt((np.arange(12) + 0.5) / 12.0)))
+    theta = np.concatenate([[1.0], middles, [82.0, 86.0, 89.5]])
     s = np.sin(np.radians(theta)) ** 2
     edges = np.concatenate([[0.0], 0.5 * (s[1:] + s[:-1]), [1.0]])
     phi = 137.508 * np.arange(len(theta))
@@ -173,7 +176,7 @@ def between(
         a, b = (np.nan_to_num(value, nan=0.0, posinf=0.0, neginf=0.0) for value in pair(o, i))
         return np.concatenate([a - b if signed else np.abs(a - b), np.abs(a)], axis=1)
 
-    value = cubature.integrate(_seeds(subject), integrand, wo, 2.0 * ACCURACY).value
+    value = cubature.integrate(_seeds(subject), integrand, wo, ACCURACY).value
     off, light = np.split(value, 2, axis=1)
     return summed(off, light, wo, mass, kind, where) if np.any(light > 0.0) else None
 
@@ -220,6 +223,7 @@ class Estimates(NamedTuple):
     noise     two standard errors of `sampled` and `both`
     parts     `value`, `sampled` and `consistent`, means of the channels, by where the light comes from: (3, N, bins)
     doubt     three standard errors of the latter two, (N, bins)
+    unseen    share of light that rare samples of huge weight may still add, (N,)
     claimed   int pdf dwi, (N,)
     drawn     share of samples that did not fail and are no delta, (N,)
     """
@@ -234,6 +238,7 @@ class Estimates(NamedTuple):
     noise: np.ndarray
     parts: np.ndarray
     doubt: np.ndarray
+    unseen: np.ndarray
     claimed: np.ndarray
     drawn: np.ndarray
 
@@ -276,6 +281,7 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
     seen, claimed, split = np.split(integral, [2 * channels, 2 * channels + 1], axis=1)
     ideal = _deltas(s.wi, weight, s.pdf, s.delta, n)
     (sampled, spread), (part, other) = followed
+    unseen = _unseen(weight, n)
     value = seen[:, :channels] + ideal
     return Estimates(
         wo,
@@ -285,12 +291,28 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
         part + seen[:, channels:],
         expected[0][0],
         expected[1][0] + seen[:, channels:],
-        2.0 * np.maximum(spread, other) + (0.02 * value if subject.stochastic else 0.0),
+        unseen + 2.0 * np.maximum(spread, other) + (0.02 * value if subject.stochastic else 0.0),
         np.stack([split, apart[0][0], apart[1][0]]),
-        3.0 * np.maximum(apart[0][1], apart[1][1]) + (0.02 * split if subject.stochastic else 0.0),
+        unseen + 3.0 * np.maximum(apart[0][1], apart[1][1]) + (0.02 * split if subject.stochastic else 0.0),
+        unseen[:, 0] / np.maximum(value.mean(1), 1e-12),
         claimed[:, 0],
         good.reshape(n, SAMPLES).mean(1),
     )
+
+
+TAIL = 64  # largest weights of a wo that say how a tail falls
+
+
+def _unseen(weight: np.ndarray, n: int) -> np.ndarray:
+    """What samples beyond the largest weight that was seen may add to the mean, (N, 1); 0 where weights are bounded.
+
+    The tail's exponent is Hill's: P(w > t) ~ t^-a gives a mean of a / (a - 1) t P(w > t) beyond t.
+    """
+    largest = np.partition(weight.mean(1).reshape(n, SAMPLES), -TAIL, axis=1)[:, -TAIL:]
+    least, most = np.maximum(largest.min(1), 1e-30), largest.max(1)
+    falls = 1.0 / np.maximum(np.log(np.maximum(largest, least[:, None]) / least[:, None]).mean(1), 1e-6)
+    beyond = falls / np.maximum(falls - 1.0, 0.05) * most / SAMPLES
+    return np.where(falls < 2.5, beyond, 0.0)[:, None]
 
 
 BINS = 16  # four quarters of the azimuth, within 45 degrees of the normal and beyond, on each side of the surface
@@ -361,7 +383,7 @@ def of_sampling(subject: Subject, part: Part = "all", light: Estimates | None = 
     found = []
     for sampled, consistent in ((light.sampled, light.consistent), (light.both, light.consistent_both)):
         off = (consistent if part == "pdf" else sampled) - (consistent if part == "weights" else light.value)
-        off = np.where(np.abs(off) > light.noise + 0.1 * ACCURACY, off, 0.0)
+        off = np.where(np.abs(off) > light.noise + LEAST, off, 0.0)
         found.append(summed(off, np.maximum(light.value, 0.0), light.wo, light.mass))
     alone, both = found
     # the same light from a lamp: bin by bin, so that too much on one side does not make up for too little on another
@@ -375,6 +397,13 @@ def of_sampling(subject: Subject, part: Part = "all", light: Estimates | None = 
     if lamp.average > 1.1 * max(alone.average, both.average) and alone.kind != "bias":
         worse = dataclasses.replace(worse, kind="bias")
     worse = dataclasses.replace(worse, furnace=alone.average, both=both.average)
+    if worse.grade is Grade.INVISIBLE and part != "pdf" and light.unseen.max() > 0.01:
+        row = int(np.argmax(light.unseen))
+        theta = float(directions.angles(light.wo[row])[0])
+        where = (
+            f"single samples hold more than {percent(float(light.unseen[row]))} of the light, wo at {theta:.3g} degrees"
+        )
+        return dataclasses.replace(worse, kind="noise", where=where)
     if subject.transmits and light is subject.light and worse.grade == Grade.INVISIBLE:
         other = of_sampling(subject, part, estimates(subject, "importance"))
         if other.average > worse.average:
@@ -385,7 +414,7 @@ def of_sampling(subject: Subject, part: Part = "all", light: Estimates | None = 
 def gain(subject: Subject, mode: Mode = "importance") -> Bias:
     """What is reflected beyond what came in, as a share of the latter; power, so without the radiance factor."""
     light = estimates(subject, mode) if subject.transmits else subject.light
-    over = np.where(light.value > 1.0 + ACCURACY, light.value - 1.0, 0.0)
+    over = np.where(light.value > 1.0 + 5.0 * LEAST, light.value - 1.0, 0.0)
     return summed(over, np.ones_like(over), light.wo, light.mass, "gained")
 
 
