@@ -397,14 +397,15 @@ class Refraction(Candidate):
         r = _scalar(ratio)
         if r is None or np.any(~(r > 0.0)):
             return None
-        for eta in index_below(ratio.subject):
+        for eta in [*index_below(ratio.subject)] or [1.0]:
             side = np.where(ratio.wo[:, 2] > 0.0, eta, 1.0 / eta)
             m = ratio.wo + side[:, None] * ratio.wi
-            m /= np.linalg.norm(m, axis=1, keepdims=True)
+            m /= np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
             cosines = [np.sum(ratio.wo * m, 1), np.sum(ratio.wi * m, 1), ratio.wi[:, 2], ratio.wo[:, 2], m[:, 2]]
             values = np.maximum(np.abs(np.stack(cosines, axis=1)), 1e-9)
             singles = [(k, power) for k in range(len(self.NAMES)) for power in (1, -1, 2, -2)]
-            pairs = itertools.combinations([(k, power) for k, power in singles if abs(power) == 1], 2)
+            pairs = [*itertools.combinations([(k, power) for k, power in singles if abs(power) == 1], 2)]
+            pairs += [((a, p), (b, -p)) for a, b in ((0, 1), (2, 3)) for p in (2, -2)]
             for which in (*((one,) for one in singles), *pairs):
                 field = np.prod([values[:, k] ** float(power) for k, power in which], axis=0)
                 for over in (0, 2, -2):
@@ -412,7 +413,11 @@ class Refraction(Candidate):
                     if held is None:
                         continue
                     powers = {self.NAMES[k]: power for k, power in which} | ({"eta": over} if over else {})
-                    return Fit(product("", powers), "the Jacobian of refraction", *held)
+                    facet = any("m" in name for name in powers)
+                    guess = (
+                        "the Jacobian of refraction" if facet or over else "the cosine of wi or wo, of the other side"
+                    )
+                    return Fit(product("", powers), guess, *held)
         return None
 
 

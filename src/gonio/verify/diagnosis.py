@@ -93,7 +93,7 @@ _SICK = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexErro
 
 
 UNSTEADY = Cause(
-    "a pair's value changes when it is asked again, or among other pairs: state, chance, or a sum over all rays?",
+    "asked again, or among other rays, it answers otherwise: state, chance, or a sum over all rays?",
     "unsteady",
 )
 

@@ -134,11 +134,14 @@ class Subject:
 
     @functools.cached_property
     def steady(self) -> bool:
-        """Whether `eval` gives a pair's value again when it is asked again, among fewer pairs and others."""
+        """Whether `eval` and `sample` answer as before when they are asked again, `eval` among fewer pairs too."""
         rng = np.random.default_rng(7)
         wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
         first = self.eval(wo, wi)
         again = [self.eval(wo, wi), self.eval(wo[256:], wi[256:])]
+        u = directions.numbers(rng, len(wo))
+        if not np.allclose(self.sample(wo, u).wi, self.sample(wo, u).wi, atol=1e-5, equal_nan=True):
+            return False
         return all(
             np.allclose(v, w, rtol=1e-5, equal_nan=True) for v, w in zip(again, (first, first[256:]), strict=True)
         )

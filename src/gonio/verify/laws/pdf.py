@@ -108,6 +108,9 @@ class Pdf(Law):
             cause = crowding.named(there, held) if held is not None else None
             if cause is not None:
                 yield cause
+        for note in finding.notes:
+            if note.startswith("pdf puts"):
+                yield Cause(note, "pdf where no sample falls")
 
 
 _KINDS = {"fine": "cells", "coarse": "coarse cells", "others": "share of samples in no cell against 1 - int pdf"}

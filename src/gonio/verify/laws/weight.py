@@ -8,7 +8,7 @@ import numpy as np
 
 from ...ops import Precision
 from .. import directions, severity, statistics
-from ..causes import Ratio
+from ..causes import Cause, Ratio
 from ..effort import Effort
 from ..subject import Subject
 from ..verdict import Finding, Trial
@@ -57,7 +57,7 @@ class Weight(Law):
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
         return severity.of_sampling(subject, "weights")
 
-    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio]:
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         if subject.stochastic:
             return
         wo, u = _drawn(subject, PAIRS, seed)
@@ -80,6 +80,10 @@ class Weight(Law):
                 )
             value = subject.eval(o, i, mode)
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
+        for problem in finding.problems:
+            _, _, convention = problem.partition(": ")
+            if "is allowed" not in convention:  # a figure says no more than the verdict does
+                yield Cause(convention, convention)
 
     def _at(
         self, subject: Subject, wo: np.ndarray, u: np.ndarray, precision: Precision, problems: list[str]
