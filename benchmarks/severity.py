@@ -107,7 +107,7 @@ def patches(a: np.ndarray) -> np.ndarray:
 def blurred(a: np.ndarray, b: np.ndarray, noise: float = 0.0) -> float:
     """The same of noisy pictures, over patches; what two pictures of one scene differ by is noise."""
     off = float(np.mean(np.abs(patches(a) - patches(b))) / np.mean(patches(b)))
-    return float(np.sqrt(max(off**2 - noise**2, 0.0)))
+    return float(np.sqrt(off**2 - noise**2)) if off > 1.5 * noise else 0.0
 
 
 def lit_otherwise(cls: type[BSDF], other: dict[str, Any], size: int, turn: float = 0.0) -> float:

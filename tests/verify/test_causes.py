@@ -114,6 +114,14 @@ class OtherPdf(RightFacets):
         return RightFacets.pdf(self, wo, wi) * 4.0 * abs(dot(wo, frame.half_vector(wo, wi)))
 
 
+class BlueGains(RightDiffuse):
+    """Blue is normalised otherwise."""
+
+    def _shape(self, wo: Any, wi: Any) -> Any:
+        one = RightDiffuse._shape(self, wo, wi)
+        return vec3(one, one, 1.2 * one)
+
+
 class RoughnessSquared(RightDiffuse):
     """A gradient that misses the chain rule of a square."""
 
@@ -156,6 +164,7 @@ def cause(material: go.BSDF, law: str) -> str:
         (WrongScaling, "reciprocity", "eta^4 in transmission"),
         (OnePercentMore, "energy", "1.01 times what comes in"),
         (MoreAtGrazing, "energy", "1.02 times that where wo's angle to the normal is beyond"),
+        (BlueGains, "energy", "blue is 1.2 times the other channels"),
         (AlbedoSquared, "linearity", "albedo^2"),
         (SwappedAxes, "isotropy", "alpha_x and alpha_y exchanged"),
         (RoughnessSquared, "gradients", "1 / (2 rim)"),

@@ -87,6 +87,8 @@ class Energy(Law):
         # only where nothing is absorbed is it known what the albedo should be
         albedo = curves.quadrature if curves.furnace is None else curves.furnace
         if np.ptp(albedo, axis=1).max() > SPREAD:
+            if curves.furnace is not None and albedo.shape[1] == 3:
+                yield from _one_channel(albedo)
             return
         a = albedo.mean(1)
         if np.ptp(a) < SPREAD * a.mean():
@@ -130,6 +132,17 @@ class Energy(Law):
             finding.problems.append(
                 f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, at most {claim:g} is claimed"
             )
+
+
+def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
+    """The channel of a white furnace that is a constant times the other two, which are one."""
+    for channel, name in enumerate(("red", "green", "blue")):
+        a, b = np.delete(furnace, channel, axis=1).T
+        factor = furnace[:, channel] / np.maximum(a, 1e-9)
+        middle = float(np.median(factor))
+        if np.abs(a - b).max() < SPREAD and np.ptp(factor) < SPREAD * middle:
+            words = f"where nothing is absorbed, {name} is {written(middle)} times the other channels, whatever wo"
+            yield Cause(f"{words}: a constant of that channel?", f"{factor_key(middle)} in {name}")
 
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
