@@ -467,8 +467,8 @@ class Otherwise(Candidate):
         if subject.transmits:
             for mode in ("radiance", "importance"):
                 ways.append((f"in mode {mode}", "`mode` is ignored, or turned", (subject, wo, wi, mode)))
-        for text, other in widths(subject):
-            ways.append((f"with {text}", "alpha against alpha^2", (other, wo, wi, "radiance")))
+        for text, guess, other in widths(subject):
+            ways.append((f"with {text}", guess, (other, wo, wi, "radiance")))
         for words, guess, arguments in ways:
             try:
                 below = ratio.again(*arguments)
@@ -486,8 +486,12 @@ class Otherwise(Candidate):
 POWERS = {"alpha^2": 2.0, "sqrt(alpha)": 0.5}
 
 
-def widths(subject: Subject) -> Iterator[tuple[str, Subject]]:
-    """The subject at alpha^2 and at sqrt(alpha), where it has a width that changes by that."""
+def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
+    """The subject at alpha^2, at sqrt(alpha) and with its two widths exchanged, where that changes anything."""
+    pair = getattr(subject.model, "alpha", None)
+    if isinstance(pair, tuple | list) and len(pair) == 2 and np.ndim(pair[0]) == 0 and pair[0] != pair[1]:
+        exchanged = subject.replace(alpha=(pair[1], pair[0]))
+        yield "alpha_x and alpha_y exchanged", "alpha_x where alpha_y belongs", exchanged
     for text, power in POWERS.items():
         for name, parameter in subject.parameters.items():
             value = getattr(subject.model, name, None)
@@ -500,6 +504,7 @@ def widths(subject: Subject) -> Iterator[tuple[str, Subject]]:
             try:
                 yield (
                     f"{text} in place of alpha",
+                    "alpha against alpha^2",
                     subject.replace(**{name: float(changed) if changed.ndim == 0 else tuple(changed.tolist())}),
                 )
             except GonioError:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 BLOCK = 10  # rows and columns of cells that are joined: a difference is told from noise in few, well-filled ones
 FULL = 25.0  # expectation of a block that counts
 EFFECT = 0.02  # root mean square of what is left between samples and expectation, as a share: clean below this
+KNOWN = 0.004  # how near a known number a scale must be; 2^17 samples tell it to a third of a per cent
 BEFORE = 0.08  # and what must have been there to begin with
 
 
@@ -117,7 +118,9 @@ def named(subject: Subject, held: Blocks) -> Cause | None:
                 continue
         if left > max(EFFECT, 0.0) or left > 0.1 * before:
             continue
-        text = causes.written(scale, 0.01)
+        text = causes.written(scale, KNOWN)
+        if text not in causes.NUMBERS:
+            text = f"{scale:.3g}"
         plain = abs(scale - 1.0) < 0.01
         if not plain and formula != "1" and text not in causes.NUMBERS:
             continue
@@ -186,13 +189,13 @@ def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
                 formula = f"{causes.product('', {'eta': power})} in transmission{place}"
                 field = functools.partial(_through, eta=eta, side=side, power=float(power))
                 yield formula, "eta^2 of the Jacobian of refraction", field
-    for text, other in causes.widths(subject):
+    for text, guess, other in causes.widths(subject):
 
         def replaced(o: np.ndarray, i: np.ndarray, other: Subject = other) -> np.ndarray:
             plain = subject.pdf(o, i)
             return np.divide(other.pdf(o, i), plain, out=np.zeros(len(o)), where=plain > 0.0)
 
-        yield f"those of {text}", "alpha against alpha^2", replaced
+        yield f"those of {text}", guess, replaced
     width = causes.width_of(subject)
     if width is not None and not subject.transmits:
         for text, exponent in causes.POWERS.items():
