@@ -50,6 +50,20 @@ class _Described(Native):
 
     description: ClassVar[PluginDict] = {}
 
+    @property
+    def by_nature(self) -> Mapping[str, str]:
+        """Laws that plugins of this kind break by what they are meant to be, with the reasons."""
+        return _BY_NATURE.get(str(self.description.get("type", "")), {})
+
+    @property
+    def held(self) -> dict[str, Native]:
+        """The BSDFs inside, as materials of their own."""
+        return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
+
+    def around_diffuse(self) -> Native:
+        """The same around plain diffuse ones."""
+        return load({**self.description, **dict.fromkeys(self.held, _DIFFUSE)})
+
     def __post_init__(self) -> None:
         super().__post_init__()
         changed = {}
@@ -110,6 +124,17 @@ def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
     return found
 
 
+def _is_bsdf(value: object) -> bool:
+    """Whether a property describes a BSDF; textures and spectra are dictionaries as well."""
+    if not isinstance(value, Mapping):
+        return False
+    try:
+        _built(dict(value))
+    except InputError:
+        return False
+    return True
+
+
 def load_file(path: Path) -> Native:
     """The BSDF of a Mitsuba XML file: its root, or the first in a scene."""
     mi = _mitsuba()
@@ -157,6 +182,22 @@ _NESTS: dict[str, PluginDict] = {
     "roughplastic": {},
     "thindielectric": {},
     "twosided": {"bsdf": {"type": "roughconductor"}},
+}
+
+# A frame that is turned away from the surface's knows a direction of its own, and cosines that are not the surface's
+# (Veach1997, section 5.3): what Mitsuba's manual calls an approximation that these two plugins are made of.
+_TURNED_FRAME = {
+    "isotropy": "the normal it is shaded with is tilted to one side: it turns with the surface",
+    "reciprocity": "the cosine of wi is that of another normal than the surface's (Veach1997, section 5.3)",
+    "energy": "what the tilted frame reflects to below the surface is cut off in one direction only",
+}
+_BY_NATURE: dict[str, dict[str, str]] = {
+    "bumpmap": _TURNED_FRAME,
+    "normalmap": _TURNED_FRAME,
+    "hair": {
+        "reciprocity": "where wo's ray meets the fibre, its offset, is fixed: light that comes back has another",
+        "isotropy": "a fibre has an axis",
+    },
 }
 
 

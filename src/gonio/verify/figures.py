@@ -52,6 +52,7 @@ class SampleCells:
 
     expected, observed  samples in each cell, (sides, rows, columns)
     rows, columns       edges of the cells, see `gonio.verify.histogram`
+    wo, sides           whose cells they are, and on which sides of the surface
     """
 
     expected: np.ndarray
@@ -59,6 +60,8 @@ class SampleCells:
     rows: np.ndarray
     columns: np.ndarray
     drawn: int
+    wo: np.ndarray | None = None
+    sides: tuple[int, ...] = (1,)
 
     def draw(self) -> tuple[str, str]:
         """Samples, what the pdf expects, and their difference in standard deviations, about the brighter lobe."""

@@ -87,7 +87,8 @@ def page(report: Report) -> str:
 
 
 def _pill(verdict: Verdict) -> str:
-    return f"<span class='verdict {CLASSES[verdict.status]}'>{verdict.status}</span>"
+    grade = f": {verdict.grade}" if verdict.grade else ""
+    return f"<span class='verdict {CLASSES[verdict.status]}'>{verdict.status}{grade}</span>"
 
 
 def _overview(report: Report) -> str:
@@ -133,7 +134,13 @@ def _detail(v: Verdict, anchor: str) -> str:
         rows.append(("worst case", html.escape(v.worst)))
     rows.append(("see it again", f"<pre>{html.escape(v.command)}</pre>"))
     if v.failed or v.status in (DECLARED, KNOWN):
-        rows.append(("in a picture", html.escape(v.meaning)))
+        rows.append(
+            ("in a picture", html.escape(f"{v.bias.words[:1].upper()}{v.bias.words[1:]}" if v.bias else v.meaning))
+        )
+        if v.bias:
+            rows.append(("means", html.escape(v.meaning)))
+    if v.cause:
+        rows.append(("cause", html.escape(v.cause)))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
     drawn = ""
     if v.evidence is not None:

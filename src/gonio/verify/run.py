@@ -13,7 +13,7 @@ from typing import NamedTuple
 from .. import members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from . import box, directions, quality, statistics, subject
+from . import box, diagnosis, directions, quality, statistics, subject
 from .box import Place
 from .ci.outputs import Outputs
 from .effort import EFFORTS, ELSEWHERE, Effort
@@ -116,7 +116,7 @@ def _here(
         held.append(judged(one, laws, effort, seed, begin))
     tests = sum(one.tests for one in held)
     threshold = statistics.sidak(SIGNIFICANCE, tests)
-    cards = [one.card(threshold, seed) for one in held]
+    cards = [one.card(threshold, seed, effort) for one in held]
     return Report(cards, seed, effort, tests, threshold, time.perf_counter() - started)
 
 
@@ -132,12 +132,23 @@ class Held(NamedTuple):
     def tests(self) -> int:
         return sum(len(it.what.trials) for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding))
 
-    def card(self, threshold: float, seed: int, begin: Begin = lambda what: None) -> Card:
-        """The verdicts; a rejected test is repeated here, so the BSDF is asked again."""
-        verdicts = []
+    def card(self, threshold: float, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
+        """The verdicts, and what failures are worth and come from; the BSDF is asked again for both."""
+        answers = []
         for law, all_ in self.laws:
             begin(law.name)
-            verdicts.append(_joined([_verdict(law, it, threshold, seed) for it in all_], all_))
+            verdicts = [_verdict(law, it, threshold, seed) for it in all_]
+            verdict = _joined(verdicts, all_)
+            place, what, _ = next(it for it, v in zip(all_, verdicts, strict=True) if v is verdict)
+            found = what if isinstance(what, Finding) else None
+            answers.append(diagnosis.Answer(law, verdict, place.subject, found))
+
+        def judge(law: Law, other: Subject) -> Verdict:
+            what = _judge(law, other, ELSEWHERE[effort], seed)
+            return what if isinstance(what, Verdict) else decide(law, other, what, threshold, seed)
+
+        diagnosis.explain(answers, EFFORTS[effort], seed, judge)
+        verdicts = [answer.verdict for answer in answers]
         return Card(self.subject, verdicts, box.covered(self.subject, self.others), quality=self.quality)
 
 

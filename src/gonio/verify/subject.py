@@ -13,17 +13,17 @@ import functools
 import inspect
 import shlex
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import GonioError, InputError
-from ..models import BSDF, Breach, Parameter, Sample, notation, tree
+from ..models import BSDF, Breach, Parameter, Sample, models, notation, tree
 from ..models.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
-from . import directions, watch
+from . import directions, severity, watch
 
 
 class Fault(Exception):
@@ -87,6 +87,25 @@ class Subject:
         """Laws that it declares to break."""
         return self.model.breaches()
 
+    @property
+    def by_nature(self) -> Mapping[str, str]:
+        """Laws that it breaks by what it is meant to be, with the reasons."""
+        return getattr(self.model, "by_nature", {})
+
+    @property
+    def inner(self) -> list[Subject]:
+        """The materials that it holds, each alone."""
+        held = getattr(self.model, "held", None)
+        children = held if held is not None else tree.children(self.model) if isinstance(self.model, BSDF) else {}
+        return [Subject(inner, f"{self.target}'s {name}") for name, inner in children.items()]
+
+    def around_sound(self) -> Subject:
+        """The same around diffuse materials, which break no law."""
+        if hasattr(self.model, "around_diffuse"):
+            return Subject(self.model.around_diffuse(), self.target, self.settings)
+        sound = models()["lambert"]()
+        return Subject(tree.replace(self.model, dict.fromkeys(tree.children(self.model), sound)), self.target)
+
     @functools.cached_property
     def sides(self) -> tuple[int, ...]:
         """The sides of the surface from which it answers: (1,), (1, -1), or () where nothing comes back at all."""
@@ -112,6 +131,25 @@ class Subject:
             return True
         drawn = self.sample(wo, directions.numbers(rng, 2048), precision="float32")
         return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
+
+    @functools.cached_property
+    def steady(self) -> bool:
+        """Whether `eval` and `sample` answer as before when they are asked again, `eval` among fewer pairs too."""
+        rng = np.random.default_rng(7)
+        wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
+        first = self.eval(wo, wi)
+        again = [self.eval(wo, wi), self.eval(wo[256:], wi[256:])]
+        u = directions.numbers(rng, len(wo))
+        if not np.allclose(self.sample(wo, u).wi, self.sample(wo, u).wi, atol=1e-5, equal_nan=True):
+            return False
+        return all(
+            np.allclose(v, w, rtol=1e-5, equal_nan=True) for v, w in zip(again, (first, first[256:]), strict=True)
+        )
+
+    @functools.cached_property
+    def light(self) -> severity.Estimates:
+        """The albedos that integrators find, each in its way: computed when a law fails, once for all laws."""
+        return severity.estimates(self)
 
     def replace(self, **values: Any) -> Subject:
         """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""

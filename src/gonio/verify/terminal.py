@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
-from . import directions
+from . import diagnosis, directions
 from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
 
@@ -32,15 +32,19 @@ def show_card(card: Card, console: Console) -> None:
     for heading, style in (("", "dim"), ("law", "cyan"), ("verdict", ""), ("figure", ""), ("allowed", ""), ("", "dim")):
         table.add_column(heading, style=style, no_wrap=heading in ("law", "verdict", "allowed"))
     for v in card.verdicts:
-        table.add_row(str(v.number), v.law, MARKS[v.status], escape(_figure(v)), _allowed(v), escape(_remark(v)))
+        table.add_row(str(v.number), v.law, _mark(v), escape(_figure(v)), _allowed(v), escape(_remark(v)))
     console.print(table)
     below = [card.covered, *card.notes, *([card.quality.words] if card.quality else [])]
     for line in filter(None, below):
         console.print(f"[dim]{escape(line)}[/]")
     console.print()
-    for v in card.verdicts:
-        if v.failed:
-            _explain(v, console)
+    for v in diagnosis.in_order(card.verdicts):
+        _explain(v, console)
+
+
+def _mark(verdict: Verdict) -> str:
+    """The status, and what a failure is worth: FAIL visible."""
+    return f"{MARKS[verdict.status]} {verdict.grade}" if verdict.grade else MARKS[verdict.status]
 
 
 def _figure(verdict: Verdict) -> str:
@@ -67,6 +71,8 @@ def _explain(verdict: Verdict, console: Console) -> None:
     console.print(Text(f"{verdict.law}: ", style="bold red").append(verdict.title, style="default not bold"))
     rows = [("why", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
     rows += [
+        ("in a picture", verdict.bias.words if verdict.bias else ""),
+        ("cause", verdict.cause),
         ("worst", verdict.worst),
         ("means", verdict.meaning),
         ("tolerance", verdict.reason),
@@ -74,7 +80,9 @@ def _explain(verdict: Verdict, console: Console) -> None:
     ]
     for name, line in rows:
         if line:
-            console.print(Text(f"  {name:>9}  ", style="cyan").append(line, style="default"), soft_wrap=name == "again")
+            console.print(
+                Text(f"  {name:>12}  ", style="cyan").append(line, style="default"), soft_wrap=name == "again"
+            )
     console.print()
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .quality import Quality
+from .severity import Bias, Grade
 from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = "pass", "fail", "breaks as declared", "does not apply"
@@ -75,6 +76,9 @@ class Verdict:
     """A law's word on one subject.
 
     places  values of the parameters at which it was asked, the given ones among them
+    bias    of a failure or a declared breach, what it does to a picture; None where the law cannot say
+    grade   what that is worth; None likewise
+    cause   of a failure, what it probably comes from; "" where nothing is clean
     """
 
     number: int
@@ -93,6 +97,9 @@ class Verdict:
     notes: list[str] = dataclasses.field(default_factory=list)
     seconds: float = 0.0
     places: int = 1
+    bias: Bias | None = None
+    grade: Grade | None = None
+    cause: str = ""
     evidence: Evidence | None = dataclasses.field(default=None, repr=False)
 
     @property
@@ -151,6 +158,8 @@ class Card:
 def _plain(value: object) -> object:
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
+    if isinstance(value, Bias):
+        return {name: _plain(part) for name, part in dataclasses.asdict(value).items()}
     if isinstance(value, list | tuple):
         return [_plain(v) for v in value]
     return value

@@ -67,7 +67,7 @@ def main(folder: str) -> None:
                 lines[card] = printed.since(before)
                 say("judged", card, held[card].tests)
             else:
-                made = held[card].card(what[0], task.seed, begin)
+                made = held[card].card(what[0], task.seed, task.effort, begin)
                 say("card", card, _plain(made), lines[card] + printed.since(before))
     except GonioError as error:
         say("error", error)

@@ -8,12 +8,12 @@ those differences is the error that is stated: it is that of the coarser of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...ops import Direction, Scalar, Spectrum, backend
+from ...ops import Direction, Scalar, backend
 from ...optics.special import gauss
 
 ORDER = 4  # nodes a side: exact for polynomials of degree 7, and cheap enough to divide further instead
@@ -61,9 +61,21 @@ def _aside(seen: _Seen, rim: _Seen) -> np.ndarray:
     return _OUTSIDE * np.maximum(more, less)
 
 
-Integrand: TypeAlias = Callable[[Direction, Direction], Spectrum]  # of Dr.Jit vectors of 64 bits
+Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of Dr.Jit vectors of 64 bits
 # (wo, u) of rows (N, 3) -> a Sample of arrays: where cells are divided first
 Sampler: TypeAlias = Callable[[np.ndarray, np.ndarray], Any]
+
+
+def of_rows(function: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Integrand:
+    """An integrand of a function of rows, (N, 3) and (N, 3) -> (N, channels): some ten times slower."""
+    types = backend.types("float64")
+
+    def integrand(wo: Direction, wi: Direction) -> list[Scalar]:
+        count = backend.drjit().width(wi)
+        value = function(backend.to_numpy(wo, count), backend.to_numpy(wi, count))
+        return [backend.float_of(column, types) for column in value.T]
+
+    return integrand
 
 
 class Integral(NamedTuple):
@@ -191,10 +203,10 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: _Nodes) -> 
             dr.sincos(of_cell(part.low[:, k]) + step * share) for k, step, share in ((0, width, s), (1, height, t))
         )
         wi = types.vec3(sin * cos_phi, sin * sin_phi, cos * of_cell(part.side))
-        value = integrand(types.vec3(*[of_cell(column) for column in wo[part.row].T]), wi)
+        value = list(integrand(types.vec3(*[of_cell(column) for column in wo[part.row].T]), wi))
         area = sin * width * height
         sums = [dr.block_sum(channel * (area * weight), many) for channel in value]
-        whole = dr.sum(value) * area
+        whole = sum(value[1:], start=value[0]) * area
         ends = [dr.block_reduce(op, whole, many) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         dr.eval(sums, ends)
         parts.append(_Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))

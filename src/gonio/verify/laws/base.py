@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import ClassVar
 
 import numpy as np
 
 from ...members import Family, instances_of
 from .. import directions
+from ..causes import Cause, Ratio
 from ..effort import Effort
+from ..severity import Bias
 from ..subject import Fault, Subject
 from ..verdict import Finding
 
@@ -38,8 +40,21 @@ class Law:
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         raise NotImplementedError(f"{type(self).__name__} has no judge")
 
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias | None:
+        """What a failure does to a picture; None where the law cannot say. Asked only where it fails."""
+        return None
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterable[Ratio | Cause]:
+        """Ratios that may name a failure's cause, or causes that are known already, the best first."""
+        return ()
+
 
 Law.family = Family("law", "gonio.laws", ["gonio.verify.laws"], instances_of(Law), "verify: laws")
+
+
+def where_found(subject: Subject, finding: Finding) -> Subject:
+    """The subject with the settings at which a finding was made."""
+    return subject.replace(**finding.settings) if finding.settings else subject
 
 
 def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:

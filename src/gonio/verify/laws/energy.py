@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...energy.albedo import cubature
 from ...errors import InputError
 from ...models import BSDF
 from ...ops import Mode, backend
-from .. import directions, histogram, lobes, statistics
+from .. import directions, histogram, lobes, severity, statistics
+from ..causes import SPREAD, Cause, factor_key, place_of, written
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..subject import Subject, guarded
@@ -67,6 +71,42 @@ class Energy(Law):
         finding.evidence = curves
         return finding
 
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        found = [severity.of_sampling(subject)]
+        if finding.figure > finding.tolerance:
+            found.append(severity.gain(subject))
+            white = _white(subject)
+            if white is not None and found[-1].average == 0.0:
+                gained = severity.gain(white)
+                found.append(dataclasses.replace(gained, where=f"{gained.where}, where nothing is absorbed"))
+        if finding.problems and (white := _white(subject)) is not None:
+            found.append(severity.loss(white))
+        return max(found, key=lambda bias: bias.average)
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        curves = finding.evidence
+        if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
+            return
+        # only where nothing is absorbed is it known what the albedo should be
+        albedo = curves.quadrature if curves.furnace is None else curves.furnace
+        if np.ptp(albedo, axis=1).max() > SPREAD:
+            if curves.furnace is not None and albedo.shape[1] == 3:
+                yield from _one_channel(albedo)
+            return
+        a = albedo.mean(1)
+        if np.ptp(a) < SPREAD * a.mean():
+            if curves.furnace is not None or a.mean() > 1.0:
+                factor = written(float(a.mean()))
+                words = f"it reflects {factor} times what comes in, whatever wo: a constant factor?"
+                yield Cause(words, factor_key(float(a.mean())))
+            return
+        bad = np.abs(a - 1.0) > SPREAD
+        place = place_of(curves.wo, curves.wo, bad)
+        # an edge, and no gradual rise
+        if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
+            words = f"{place.replace('from wi', 'from wo')}"
+            yield Cause(f"it reflects all that comes in, but {np.median(a[bad]):.4g} times that {words}", words)
+
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
         """The closed form that a material gives of its albedo is what its values integrate to."""
         if not isinstance(subject.model, BSDF) or subject.stochastic:
@@ -115,6 +155,17 @@ class Energy(Law):
             finding.problems.append(
                 f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, at most {claim:g} is claimed"
             )
+
+
+def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
+    """The channel of a white furnace that is a constant times the other two, which are one."""
+    for channel, name in enumerate(("red", "green", "blue")):
+        a, b = np.delete(furnace, channel, axis=1).T
+        factor = furnace[:, channel] / np.maximum(a, 1e-9)
+        middle = float(np.median(factor))
+        if np.abs(a - b).max() < SPREAD and np.ptp(factor) < SPREAD * middle:
+            words = f"where nothing is absorbed, {name} is {written(middle)} times the other channels, whatever wo"
+            yield Cause(f"{words}: a constant of that channel?", f"{factor_key(middle)} in {name}")
 
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from ...errors import InputError
 from ...models import BSDF, Parameter, binding, tree
 from ...ops import backend
+from ..causes import Ratio
 from ..effort import Effort
+from ..severity import Bias
 from ..subject import Subject, guarded
 from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of
@@ -62,6 +65,36 @@ class Gradients(Law):
             problems=problems,
             notes=[f"tried: {', '.join(tried)}; {skipped:.2%} of the pairs lie on edges"],
         )
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias:
+        name, _, _, exact, differences = self._worst(subject, finding, seed)
+        size = float(np.sum(np.abs(exact - differences)) / max(float(np.sum(np.abs(differences))), 1e-30))
+        return Bias(finding.figure, size, 1.0, f"by {name}", "derivatives")
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio]:
+        name, wo, wi, exact, differences = self._worst(subject, finding, seed)
+        size = _size(tree.value_at(subject.model, name))
+        yield Ratio(
+            f"autodiff by {name}",
+            "differences",
+            wo,
+            wi,
+            exact,
+            differences,
+            subject,
+            numbers={f"2 {name}": 2.0 * size, f"1 / (2 {name})": 0.5 / size},
+            zero="a value that is detached, rounded or branched on before autodiff sees it",
+        )
+
+    def _worst(
+        self, subject: Subject, finding: Finding, seed: int
+    ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The parameter that was worst, pairs away from edges, and its derivatives there, by both ways."""
+        name = finding.worst.partition(":")[0]
+        parameter = dict(_numeric(subject.model))[name]
+        wo, wi = pairs(subject, 4096, seed)
+        exact, differences, smooth, _ = _derivatives(subject.model, name, parameter, wo, wi)
+        return name, wo[smooth], wi[smooth], exact[smooth], differences[smooth]
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
@@ -133,6 +166,6 @@ def _derivatives(
     narrow = (8.0 * half - one) / (6.0 * step)
     # a percent more of the parameter that changes a value by less than its hundred-millionth changes nothing
     least = 1e-6 * float(np.max(np.abs(number(0.0)), initial=0.0)) / _size(plain)
-    noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.max(np.abs(narrow), initial=0.0)), 1e-2 * least)
+    noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.percentile(np.abs(narrow), 90.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
     return exact, narrow, smooth, least

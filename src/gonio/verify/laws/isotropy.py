@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from .. import directions
+from .. import directions, severity
+from ..causes import Cause
 from ..effort import Effort
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
@@ -58,6 +61,25 @@ class Isotropy(Law):
         self._axes(subject, finding)
         return finding
 
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
+        swapped = _swapped(subject) if not subject.isotropic else None
+        if not subject.isotropic and swapped is None:
+            return None
+
+        def turned(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            if swapped is not None:
+                return subject.eval(wo, wi), swapped.eval(wo, wi)
+            # by another angle for each wo, the same for all its wi
+            turn = 1.0 + 40.0 * wo[:, 2] + 13.0 * wo[:, 0]
+            return subject.eval(wo, wi), subject.eval(directions.turned(wo, turn), directions.turned(wi, turn))
+
+        where = ", against the other axes" if swapped is not None else ", when turned"
+        return severity.between(subject, turned, where=where)
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        if any("axes swapped" in problem for problem in finding.problems):
+            yield Cause("the wider axis is that of the smaller width: alpha_x and alpha_y exchanged?", "axes exchanged")
+
     def _difference(
         self, subject: Subject, first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], exact: bool
     ) -> np.ndarray:
@@ -92,3 +114,12 @@ class Isotropy(Law):
         if (along - across) * (float(pair[0]) - float(pair[1])) < 0.0:
             wider = "x" if along > across else "y"
             finding.problems.append(f"widths {pair[0]:g}, {pair[1]:g}, but wider along {wider}: axes swapped")
+
+
+def _swapped(subject: Subject) -> Subject | None:
+    """The subject with its two widths exchanged; None where it has none."""
+    for name, parameter in subject.parameters.items():
+        pair = getattr(subject.model, name, None)
+        if parameter.kind == "alpha" and isinstance(pair, tuple | list):
+            return subject.replace(**{name: (pair[1], pair[0])})
+    return None

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...models import BSDF, models
+from .. import severity
+from ..causes import SPREAD, Cause
 from ..effort import Effort
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
@@ -29,18 +33,8 @@ class Linearity(Law):
             raise DoesNotApply("all lobes are deltas, which have no value to compare")
         if subject.stochastic:
             raise DoesNotApply("the model is stochastic: single values are random")
-        names = [n for n, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0]
         wo, wi = pairs(subject, effort.pairs // 4, seed)
-        cases = []
-        for name in names:
-            low, high, middle = (subject.replace(**{name: v}).eval(wo, wi) for v in (0.125, 0.875, 0.3125))
-            cases.append((name, middle, 0.75 * low + 0.25 * high))
-        if isinstance(subject.model, BSDF):
-            other = models()["lambert"]((0.2, 0.5, 0.8))  # type: ignore[call-arg]
-            mixed = Subject(models()["mix"](subject.model, other, 0.25), "mix")  # type: ignore[call-arg]
-            cases.append(
-                ("mix", mixed.eval(wo, wi), 0.75 * subject.eval(wo, wi) + 0.25 * Subject(other, "lambert").eval(wo, wi))
-            )
+        cases = [(name, *pair(wo, wi)) for name, pair in _pairs(subject).items()]
         if not cases:
             raise DoesNotApply("it has no albedo that could be changed, and is no Gonio material that could be mixed")
         exact = subject.best == "float64"
@@ -57,3 +51,44 @@ class Linearity(Law):
             at=(wo[place], wi[place]),
             notes=[f"tried: {', '.join(label for label, _, _ in cases)}"],
         )
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
+        name = finding.worst.partition(":")[0]
+        pair = _pairs(subject)[name]
+
+        def expected_first(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            value, expected = pair(wo, wi)
+            return expected, value
+
+        return severity.between(subject, expected_first, where=f", where {name} is between two others")
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        name = finding.worst.partition(":")[0]
+        if name == "mix":
+            return
+        wo, wi = pairs(subject, 4096, seed)
+        low, high, middle = (subject.replace(**{name: v}).eval(wo, wi).mean(1) for v in (0.125, 0.875, 0.3125))
+        lit = (low > 1e-9 * high.max()) & (high > 0.0)
+        if lit.sum() < 64:
+            return
+        powers = np.log(high[lit] / low[lit]) / np.log(7.0), np.log(middle[lit] / low[lit]) / np.log(2.5)
+        power = float(np.median(powers[0]))
+        if abs(power - 1.0) > 0.01 and all(np.percentile(np.abs(p / power - 1.0), 97.0) < SPREAD for p in powers):
+            text = f"values follow {name}^{power:.3g}, within 1e-3: a colour decoded or multiplied twice?"
+            yield Cause(text, f"{name}^{power:.3g}")
+
+
+def _pairs(subject: Subject) -> dict[str, severity.Pair]:
+    """What should be equal: for each albedo its value between two others, and a mix, against what both give."""
+
+    def between(name: str) -> severity.Pair:
+        low, high, middle = (subject.replace(**{name: v}) for v in (0.125, 0.875, 0.3125))
+        return lambda wo, wi: (middle.eval(wo, wi), 0.75 * low.eval(wo, wi) + 0.25 * high.eval(wo, wi))
+
+    found = {n: between(n) for n, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0}
+    if isinstance(subject.model, BSDF):
+        other = models()["lambert"]((0.2, 0.5, 0.8))  # type: ignore[call-arg]
+        mixed = Subject(models()["mix"](subject.model, other, 0.25), "mix")  # type: ignore[call-arg]
+        plain = Subject(other, "lambert")
+        found["mix"] = lambda wo, wi: (mixed.eval(wo, wi), 0.75 * subject.eval(wo, wi) + 0.25 * plain.eval(wo, wi))
+    return found

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from .. import directions, histogram
+from .. import crowding, directions, histogram, severity
+from ..causes import Cause, nothing_below
 from ..effort import Effort
 from ..figures import SampleCells
 from ..subject import Subject
 from ..verdict import Finding, Trial
-from .base import Law, pair_in_words, pairs
+from .base import Law, pair_in_words, pairs, where_found
 
 ABOVE = (
     (0.0, 0.0),
@@ -24,6 +27,9 @@ ABOVE = (
     (89.5, 250.0),
 )
 BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
+OBLIQUE = (50.0, 200.0)
+FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # samples enough for a per cent
+PAIRS = 1 << 13  # that are looked at for a cause
 EXCESS = 1e-3
 SUPPORT = 1e-4
 LEAST = 1e-3
@@ -73,6 +79,38 @@ class Pdf(Law):
             finding.shown = largest
         _support(subject, finding, effort, seed)
         return finding
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        there = where_found(subject, finding)
+        bias = severity.of_sampling(there, "pdf")
+        held = crowding.blocks(finding.evidence) if isinstance(finding.evidence, SampleCells) else None
+        crowd = crowding.crowd(there, held) if held is not None else ""
+        if bias.grade is severity.Grade.INVISIBLE:
+            where = crowding.around(there) or crowd or "less than a thousandth of all samples is misplaced"
+            return dataclasses.replace(bias, kind="noise", where=where)
+        return dataclasses.replace(bias, where=f"{bias.where}; {crowd}" if crowd else bias.where)
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        there = where_found(subject, finding)
+        if not there.has_density:
+            return
+        wo, wi = pairs(there, PAIRS, seed)
+        unfound = nothing_below("eval", "pdf", wo, wi, there.eval(wo, wi), there.pdf(wo, wi)[:, None])
+        if unfound is not None:
+            yield unfound
+        if there.stochastic or not isinstance(finding.evidence, SampleCells):
+            return
+        # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are one
+        angles = [angles for side, angles in ((1, OBLIQUE), (-1, BELOW[1])) if side in there.sides]
+        oblique = directions.single(np.array([directions.at(*pair) for pair in angles]).reshape(-1, 3))
+        for tested in _chi_square(there, FEW, seed, oblique):
+            held = crowding.blocks(tested.cells)
+            cause = crowding.named(there, held) if held is not None else None
+            if cause is not None:
+                yield cause
+        for note in finding.notes:
+            if note.startswith("pdf puts"):
+                yield Cause(note, "pdf where no sample falls")
 
 
 _KINDS = {"fine": "cells", "coarse": "coarse cells", "others": "share of samples in no cell against 1 - int pdf"}
@@ -127,7 +165,8 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
     tested = []
     for i in range(len(grid.wo)):
         expectation = expected.cells[i] * counts.drawn
-        cells = SampleCells(expectation, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn)
+        seen = counts.cells[i]
+        cells = SampleCells(expectation, seen, grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides)
         outcome = histogram.compare(expected, counts, i)
         tested.append(_Tested(grid.wo[i], outcome, float(expected.total[i]), cells, grid.sides))
     return tested

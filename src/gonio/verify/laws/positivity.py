@@ -11,11 +11,12 @@ import numpy as np
 from ...errors import InputError
 from ...models import BSDF, binding
 from ...ops import Precision, backend
-from .. import box, directions
+from .. import box, directions, severity
+from ..causes import Cause, place_of
 from ..effort import Effort
 from ..subject import Fault, Subject, guarded
 from ..verdict import Finding
-from .base import Law, pair_in_words, pairs
+from .base import Law, pair_in_words, pairs, where_found
 
 THETA = (0.0, 1e-3, 1.0, 30.0, 60.0, 89.0, 89.9, 89.99, 89.9999, 90.0)
 PHI = (0.0, 90.0, 137.0, 180.0)
@@ -75,6 +76,65 @@ class Positivity(Law):
         finding.shown = f"{finding.figure:g} of {checked:.3g}"
         del finding.problems[6:]
         return finding
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
+        if all("gradient" in problem for problem in finding.problems):
+            return severity.Bias(0.0, 0.0, 0.0, finding.worst, "derivatives")
+        there = where_found(subject, finding)
+        wo, mass = severity.views(there.sides)
+        many = np.repeat(wo, 512, axis=0)
+        rng = np.random.default_rng([seed, 10])
+        wi = directions.single(directions.uniform(rng, len(many)))
+        if not there.transmits:
+            wi = np.where(wi[:, 2:] * many[:, 2:] < 0.0, wi * [1.0, 1.0, -1.0], wi)
+        wrong = np.zeros((len(wo), 512), bool)
+        for precision in there.precisions:
+            s = there.sample(many, directions.numbers(rng, len(many)), precision=precision)
+            for values in (
+                there.eval(many, wi, precision=precision),
+                there.pdf(many, wi, precision)[:, None],
+                s.weight,
+            ):
+                wrong |= ~np.isfinite(values).all(1).reshape(wrong.shape)
+        if wrong.any() or any("is nan" in problem or "is inf" in problem for problem in finding.problems):
+            bad = wrong.mean(1)
+            theta = directions.angles(wo[int(np.argmax(bad))])[0]
+            where = f"wo at {theta:.3g} degrees" if bad.any() else finding.worst
+            return severity.Bias(float(bad.max()), float(mass @ bad), float(mass[bad > 0.01].sum()), where, "nan")
+
+        def cut(o: np.ndarray, i: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            value = there.eval(o, i)
+            return value, np.maximum(value, 0.0)
+
+        return severity.between(there, cut, where=", where light is negative")
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        there = where_found(subject, finding)
+        wo, wi, _ = _grid(there, effort, seed)
+        value = np.min([there.eval(wo, wi, precision=p).min(1) for p in there.precisions], axis=0)
+        for what, bad in (("no number", ~np.isfinite(value)), ("negative", value < 0.0)):
+            for words, rows in _exact_places(wo, wi):
+                if bad.any() and not np.any(bad & ~rows) and (rows & bad).sum() > 0.2 * rows.sum():
+                    yield Cause(f"eval is {what} only where {words}: a division by 0 there?", f"{what} where {words}")
+                    return
+            place = place_of(wo, wi, bad)
+            if place:
+                yield Cause(f"eval is {what} only {place}", f"{what} {place}")
+
+
+def _exact_places(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Directions at which formulas divide by 0."""
+    normal = [np.hypot(w[:, 0], w[:, 1]) == 0.0 for w in (wo, wi)]
+    level = [w[:, 2] == 0.0 for w in (wo, wi)]
+    equal, opposite = np.all(wo == wi, axis=1), np.all(wo == -wi, axis=1)
+    yield "wo is the normal", normal[0]
+    yield "wi is the normal", normal[1]
+    yield "wo lies in the surface", level[0]
+    yield "wi lies in the surface", level[1]
+    yield "wi = wo", equal
+    yield "wi = -wo", opposite
+    yield "wo or wi is the normal", normal[0] | normal[1]
+    yield "wo or wi lies in the surface", level[0] | level[1]
 
 
 def _words(changed: dict[str, Any]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ... import ops
+from .. import severity
 from ..effort import Effort
 from ..figures import RoundingErrors
 from ..subject import Subject
@@ -56,4 +57,9 @@ class Precision(Law):
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             evidence=RoundingErrors(curve, np.abs(wo[:, 2]), np.abs(wi[:, 2])),
+        )
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
+        return severity.by_samples(
+            subject, lambda wo, wi: (subject.eval(wo, wi), subject.eval(wo, wi, precision="float32"))
         )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from .. import directions, statistics
+from .. import directions, severity, statistics
+from ..causes import Cause, Ratio, index_below
 from ..effort import Effort
 from ..figures import ReciprocityMap
 from ..subject import Subject
@@ -16,6 +19,7 @@ SINGLE = 2e-3
 STEPS = 24  # of the map, in each angle
 REPEATS = 4096  # of a stochastic model's values
 HAIR = 1e-5  # radians
+PAIRS = 1 << 13  # whose ratios are looked at for a cause
 
 
 class Reciprocity(Law):
@@ -52,6 +56,37 @@ class Reciprocity(Law):
             at=(wo[row], wi[row]),
             evidence=ReciprocityMap(_map(subject, eta, exact), subject.transmits),
         )
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
+        eta = _eta(subject, seed)
+
+        def both_ways(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            cosine = np.abs(wi[:, 2:])
+            return subject.f(wo, wi) * _scale(wo, wi, eta)[:, None] * cosine, subject.f(wi, wo) * cosine
+
+        return severity.between(subject, both_ways, where="; followed the other way, from light to eye")
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
+        if subject.stochastic:
+            return
+        eta = _eta(subject, seed)
+        for other in index_below(subject):
+            if abs(other / eta - 1.0) < 1e-3:
+                continue
+            wrong = _reciprocal_with(subject, other, seed)
+            if wrong:
+                is_inverse = abs(other * eta - 1.0) < 1e-3
+                text = "the inverse of" if is_inverse else f"{eta:.4g}, not"
+                yield Cause(
+                    f"with its parameter's index, {other:.4g}, it is reciprocal: `eta` of its samples is {text} that",
+                    "eta of samples",
+                )
+        if abs(eta - 1.0) > 1e-3 and _reciprocal_with(subject, 1.0, seed):
+            text = "f(wo, wi) = f(wi, wo) in transmission too: the factor (eta_o / eta_i)^2 of radiance is missing"
+            yield Cause(f"{text}, or `eta` of its samples should be 1?", "eta^2 in transmission")
+        wo, wi = pairs(subject, PAIRS, seed, subject.best == "float64")
+        there, back = subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo)
+        yield Ratio("f(wo, wi)", "f(wi, wo)", wo, wi, there, back, subject, antisymmetric=True)
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
         """A stochastic model: means over many values of each pair, both ways."""
@@ -102,6 +137,14 @@ def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed
     # where few values carry the mean, their own spread says too little of it
     heavy = float(np.abs(off - off.mean()).max()) / np.sqrt(REPEATS)
     return float(off.mean() / max(spread, 0.25 * heavy))
+
+
+def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
+    """Whether the law holds where eta is another than samples say."""
+    exact = subject.best == "float64"
+    wo, wi = pairs(subject, PAIRS, seed, exact)
+    keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 1e-4
+    return worst_of(_difference(subject, wo[keep], wi[keep], eta, exact))[1] < (EXACT if exact else SINGLE)
 
 
 def _eta(subject: Subject, seed: int) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ...ops import Precision
-from .. import directions, statistics
+from .. import directions, severity, statistics
+from ..causes import Cause, Ratio
 from ..effort import Effort
 from ..subject import Subject
 from ..verdict import Finding, Trial
@@ -14,6 +17,7 @@ from .base import Law, pair_in_words, relative, rounding, worst_of
 EXACT = 1e-10
 SINGLE = 2e-3
 ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
+PAIRS = 1 << 13  # samples whose ratios are looked at for a cause
 
 
 class Weight(Law):
@@ -50,6 +54,37 @@ class Weight(Law):
         if subject.stochastic:
             return _expected(subject, finding, seed, effort)
         return finding
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        return severity.of_sampling(subject, "weights")
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
+        if subject.stochastic:
+            return
+        wo, u = _drawn(subject, PAIRS, seed)
+        for mode in ("radiance", "importance") if subject.transmits else ("radiance",):
+            s = subject.sample(wo, u, mode)
+            rows = np.flatnonzero((s.pdf > 0.0) & ~s.delta & np.all(np.isfinite(s.wi), axis=1))
+            o, i, claimed = wo[rows], s.wi[rows], s.pdf[rows, None]
+            pdf = subject.pdf(o, i)[:, None]
+            suffix = "" if mode == "radiance" else f" in mode {mode}"
+            if mode == "radiance":
+                yield Ratio(
+                    "the pdf of samples",
+                    "pdf(wo, wi)",
+                    o,
+                    i,
+                    claimed,
+                    pdf,
+                    subject,
+                    lambda b, x, y, m: b.pdf(x, y)[:, None],
+                )
+            value = subject.eval(o, i, mode)
+            yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
+        for problem in finding.problems:
+            _, _, convention = problem.partition(": ")
+            if "is allowed" not in convention:  # a figure says no more than the verdict does
+                yield Cause(convention, convention)
 
     def _at(
         self, subject: Subject, wo: np.ndarray, u: np.ndarray, precision: Precision, problems: list[str]
