@@ -58,7 +58,7 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> type:
     if match is None:
         raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
     path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
-    module, name = _module(path, where), match["name"]
+    module, name = module_of(path, where), match["name"]
     named = vars(module).get(name)
     if not isinstance(named, type):
         own = [n for n, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__]
@@ -129,7 +129,7 @@ def is_outside(cls: type) -> bool:
 # --------------------------------------------------------------------------- running a file
 
 
-def _module(path: Path, where: str) -> ModuleType:
+def module_of(path: Path, where: str) -> ModuleType:
     """The file's module, run where it has not been since it was saved."""
     try:
         about = path.stat()

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import number, spectrum
+from ..models import number, outside, spectrum
 from . import adapter, engine
 from .native import Native
 from .types import MitsubaBSDF, OfVariant, PluginDict
@@ -209,6 +209,32 @@ def plugin(name: str, properties: Mapping[str, object]) -> Native:
         heights = _mitsuba().Bitmap(np.ascontiguousarray(np.broadcast_to(ramp, (16, 16))[..., None]))
         more = {"texture": {"type": "bitmap", "bitmap": heights, "raw": True}}
     return load({"type": name, **_NESTS.get(name, {}), **more, **properties})
+
+
+_registered: dict[Path, dict[str, object]] = {}  # what the files registered that were run, by path
+
+
+def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
+    """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
+    the file registers none of that name."""
+    path = Path(target.rpartition(":")[0]).expanduser().resolve()
+    name = target.rpartition(":")[2]
+    if not path.is_file() or b"register_bsdf" not in path.read_bytes():
+        return None
+    mi = _mitsuba()
+    register, seen = mi.register_bsdf, _registered.setdefault(path, {})
+
+    def noted(kind: str, make: object, *more: object) -> None:
+        seen[kind] = make
+        register(kind, make, *more)
+
+    mi.register_bsdf = noted
+    try:
+        module = outside.module_of(path, "TARGET")
+    finally:
+        mi.register_bsdf = register
+    kind = name if name in seen else next((k for k, make in seen.items() if make is vars(module).get(name)), None)
+    return None if kind is None else load({"type": kind, **properties})
 
 
 def _mitsuba() -> ModuleType:

@@ -164,14 +164,16 @@ def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarra
     inside = values[(values > low) & (values < high)]
     if not len(inside):
         return np.linspace(low, high, count + 1).astype(np.float32)
-    even, far = count // 4, count // 4
-    own = np.sort(inside)[np.linspace(0, len(inside) - 1, count + 1 - even - far).astype(int)]
+    even, far = count // 4 - 2, count // 4
+    own = np.sort(inside)[np.linspace(0, len(inside) - 1, count - 1 - even - far).astype(int)]
     first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
     tails = [
         middle + sign * _growing(reach, high - low, far // 2)
         for sign, reach in ((1, last - middle), (-1, middle - first))
     ]
-    spread = np.concatenate([own, np.linspace(low, high, even + 2)[1:-1], *tails])
+    # a density that ends with a step does so just beyond the outermost samples
+    beyond = [own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])]
+    spread = np.concatenate([own, beyond, np.linspace(low, high, even + 2)[1:-1], *tails])
     edges = np.sort(np.clip(spread, low, high))
     # clipped tails leave several edges at an end: cells of no width, which count nothing and expect nothing
     edges = np.concatenate([[low], edges, np.full(max(count - len(edges), 0), high)])[: count + 1]

@@ -2,6 +2,7 @@
 
 conductor                a model's name; a material in it is a name again: --param a=lambert
 glass.py:Glass           a class in a Python file, which runs because the user named it
+glass.py:my_glass        a plugin of Mitsuba's that the file registers, by that name or by its class
 mitsuba:roughplastic     a plugin, Mitsuba's or the user's, with its properties as parameters
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
@@ -60,6 +61,12 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         values = {key: _property(value) for key, value in given.items()}
         return Subject(foreign.plugin(target.removeprefix("mitsuba:"), values), target, values)
     if outside.names_code(target):
+        from ..render import foreign
+
+        properties = {key: _property(value) for key, value in given.items()}
+        plugin = foreign.plugin_in(target, properties)
+        if plugin is not None:
+            return Subject(plugin, target, properties)
         bsdf, values = notation.made(outside.load(target, where="TARGET"), given)
         return Subject(bsdf, target, values)
     if target.endswith(".py"):

@@ -64,6 +64,8 @@ class Energy(Law):
             finding.trials.append(Trial(p, text, again))
         self._known(subject, wo, value, error, finding)
         white = _white(subject)
+        if white is None and getattr(subject.model, "lossless", None) is not None:
+            white = subject  # nothing in it can be whitened, and it claims to lose nothing
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
         if finding.figure > GAIN:

@@ -38,6 +38,7 @@ class Linearity(Law):
         if not cases:
             raise DoesNotApply("it has no albedo that could be changed, and is no Gonio material that could be mixed")
         exact = subject.best == "float64"
+        dead = [label for label, _, _ in cases if label != "mix" and effort.full and _is_dead(subject, label, wo, wi)]
         worst, place, name = -1.0, 0, ""
         for label, a, b in cases:
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
@@ -49,6 +50,7 @@ class Linearity(Law):
             reason="a few roundings" if exact else "a few roundings of float32, some of them cancelling",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
+            problems=[f"{name} changes nothing" for name in dead],
             notes=[f"tried: {', '.join(label for label, _, _ in cases)}"],
         )
 
@@ -92,3 +94,9 @@ def _pairs(subject: Subject) -> dict[str, severity.Pair]:
         plain = Subject(other, "lambert")
         found["mix"] = lambda wo, wi: (mixed.eval(wo, wi), 0.75 * subject.eval(wo, wi) + 0.25 * plain.eval(wo, wi))
     return found
+
+
+def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
+    """Whether an albedo changes no value: a cache that forgets it, a parameter that nothing reads."""
+    low, high = (subject.replace(**{name: v}).eval(wo, wi) for v in (0.125, 0.875))
+    return bool(np.array_equal(low, high) and np.any(low > 0.0))
