@@ -8,14 +8,15 @@ anew can be right in every test of the others.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .answers import Answer
 from .types import BSDFContext, BSDFSample, MitsubaBSDF, SurfaceInteraction
 
-Answer = tuple[str, str]  # what was asked; what is wrong with it, "" where nothing is
 COUNT = 4096
 SAME = 1e-4  # relative: float32, and kernels that are fused otherwise
 FEW = 0.002  # share of rows that rounding may carry over an edge
@@ -24,14 +25,45 @@ FEW = 0.002  # share of rows that rounding may carry over an edge
 def answers(bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
     """Every way of asking, at the given surface interaction (COUNT wide), whose wi is replaced."""
     trial = _Trial(bsdf, si, seed)
-    yield "eval_pdf", trial.eval_pdf()
-    yield "eval_pdf_sample", trial.eval_pdf_sample()
-    yield "active", trial.active()
-    yield "flags", trial.flags()
-    yield "components", trial.components()
-    yield "types", trial.types()
-    yield "shading frame", trial.turned_frame()
-    yield "eval_diffuse_reflectance", trial.diffuse_reflectance()
+    for what, asked in (
+        ("eval_pdf", trial.eval_pdf),
+        ("eval_pdf_sample", trial.eval_pdf_sample),
+        ("active", trial.active),
+        ("flags", trial.flags),
+        ("components", trial.components),
+        ("types", trial.types),
+        ("shading frame", trial.turned_frame),
+        ("eval_diffuse_reflectance", trial.diffuse_reflectance),
+    ):
+        trial.difference = None
+        wrong = asked()
+        if wrong and what in SEEN and trial.difference is not None:
+            yield trial.difference.answer(what, wrong)
+        else:
+            yield Answer(what, wrong)
+
+
+# what path tracers call, so that a picture changes where it is wrong
+SEEN = ("eval_pdf", "eval_pdf_sample", "shading frame")
+
+
+class _Difference(NamedTuple):
+    """Two values that should be one, (N, channels), their names, and the directions, (N, 3)."""
+
+    name: str
+    other: str
+    got: np.ndarray
+    whole: np.ndarray
+    wo: np.ndarray
+    wi: np.ndarray
+
+    def answer(self, what: str, wrong: str) -> Answer:
+        total = float(np.sum(np.abs(self.whole)))
+        off = np.nan_to_num(np.abs(self.got - self.whole), nan=0.0)
+        share = float(np.sum(off)) / total if total > 0.0 else 1.0
+        worst = float(np.max(off / np.maximum(np.abs(self.whole), 1e-3 * np.abs(self.whole).max()), initial=0.0))
+        # Mitsuba's wi is where light goes to
+        return Answer(what, wrong, share, worst, (self.name, self.other, self.wi, self.wo, self.got, self.whole))
 
 
 class _Trial:
@@ -39,6 +71,7 @@ class _Trial:
 
     def __init__(self, bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> None:
         self.bsdf, self.si, self.ctx = bsdf, si, mi.BSDFContext()
+        self.difference: _Difference | None = None
         rng = np.random.default_rng([seed, 111])
         wi, wo = _uniform(rng), _uniform(rng)
         half = COUNT // 2
@@ -85,7 +118,7 @@ class _Trial:
     def active(self) -> str:
         live = np.arange(COUNT) % 2 == 0
         mask = mi.Bool(live)
-        value, pdf = self.bsdf.eval(self.ctx, self.si, self.wo, mask), self.bsdf.pdf(self.ctx, self.si, self.wo, mask)
+        value, pdf = (self.bsdf.eval(self.ctx, self.si, self.wo, mask), self.bsdf.pdf(self.ctx, self.si, self.wo, mask))
         both = self.bsdf.eval_pdf(self.ctx, self.si, self.wo, mask)
         _, weight = self.bsdf.sample(self.ctx, self.si, *self.u, mask)
         asked = {
@@ -177,7 +210,7 @@ class _Trial:
         frame = mi.Frame3f(mi.Vector3f(0.48, 0.6, 0.64), mi.Vector3f(-0.8, 0.6, 0.0), mi.Vector3f(-0.36, -0.48, 0.8))
         frame = mi.Frame3f(dr.normalize(dr.cross(frame.t, frame.n)), frame.t, frame.n)
         si = mi.SurfaceInteraction3f(self.si)
-        si.n, si.sh_frame, si.dp_du, si.dp_dv = mi.Normal3f(frame.n), frame, frame.s, frame.t
+        si.n, si.sh_frame, si.dp_du, si.dp_dv = (mi.Normal3f(frame.n), frame, frame.s, frame.t)
         return self.unlike(
             "eval on a tilted surface", "eval", self.color(self.bsdf.eval(self.ctx, si, self.wo)), self.value
         )
@@ -212,7 +245,7 @@ class _Trial:
         both = delta & self.delta & same & self.lit & np.any(weight > 0.0, axis=1)
         if both.sum() < 20:
             return ""
-        alone, among = (weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both]
+        alone, among = ((weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both])
         return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", alone, among)
 
     def diffuse_reflectance(self) -> str:
@@ -246,6 +279,8 @@ class _Trial:
         wrong = off > SAME
         if wrong.mean() <= FEW if len(wrong) else True:
             return ""
+        if len(got) == COUNT:
+            self.difference = _Difference(name, other, got, whole, _rows(self.wo), _rows(self.si.wi))
         ratio = got[wrong].sum() / max(whole[wrong].sum(), 1e-30)
         return f"{name} is not {other}: {ratio:.4g} times as much where they differ, in {wrong.mean():.1%} of the pairs"
 

@@ -18,6 +18,7 @@ from ..models import BSDF, Sample, binding, method
 from ..models.material import Delta
 from ..ops import Direction, Mode, Scalar, Spectrum, backend
 from . import calls
+from .answers import Answer
 from .types import BSDFContext, Mask, MitsubaBSDF, SurfaceInteraction
 
 
@@ -86,8 +87,8 @@ class Native(BSDF):
 
     # ------------------------------------------------------------------ facts
 
-    def calls(self, seed: int) -> Iterator[tuple[str, str]]:
-        """What else a renderer asks of it: what was asked, and what is wrong with the answer ("" where nothing is)."""
+    def calls(self, seed: int) -> Iterator[Answer]:
+        """What else a renderer asks of it, and what comes."""
         front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
         return calls.answers(self.bsdf, self._interaction(front), seed)
 

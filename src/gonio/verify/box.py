@@ -234,7 +234,7 @@ def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[
     third = RAYS // 3  # near the mirror direction, where narrow lobes are
     wi[:third] = wo[:third] * [-1.0, -1.0, 1.0] + 0.15 * rng.normal(size=(third, 3))
     wi[:third] /= np.linalg.norm(wi[:third], axis=1, keepdims=True)
-    wo, wi, u = directions.single(wo), directions.single(wi), directions.numbers(rng, RAYS)
+    wo, wi, u = (directions.single(wo), directions.single(wi), directions.numbers(rng, RAYS))
     count = len(values)
     many = [np.tile(part, (count, 1)) for part in (wo, wi, u)]
     together = _per_ray(subject, path, np.repeat(values, RAYS))

@@ -491,7 +491,7 @@ def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
     pair = getattr(subject.model, "alpha", None)
     if isinstance(pair, tuple | list) and len(pair) == 2 and np.ndim(pair[0]) == 0 and pair[0] != pair[1]:
         exchanged = subject.replace(alpha=(pair[1], pair[0]))
-        yield "alpha_x and alpha_y exchanged", "alpha_x where alpha_y belongs", exchanged
+        yield ("alpha_x and alpha_y exchanged", "alpha_x where alpha_y belongs", exchanged)
     for text, power in POWERS.items():
         for name, parameter in subject.parameters.items():
             value = getattr(subject.model, name, None)
@@ -523,10 +523,7 @@ class Distribution(Candidate):
         for name, D in (("GGX", ggx), ("Beckmann", _beckmann)):
             for text, power in POWERS.items():
                 field = D(m, width**power) / D(m, width)
-                for formula, quotient in (
-                    (f"D({text}) / D(alpha)", r / field),
-                    (f"D(alpha) / D({text})", r * field),
-                ):
+                for formula, quotient in ((f"D({text}) / D(alpha)", r / field), (f"D(alpha) / D({text})", r * field)):
                     held = _holds(ratio, quotient)
                     if held is not None:
                         return Fit(f"{formula} of {name}", "alpha against alpha^2", *held)
@@ -624,9 +621,9 @@ class DielectricFresnel(Candidate):
                 return np.where(through, 1.0 - F, F)
 
             if ratio.antisymmetric:
-                other, words = share(i, np.where(i > 0.0, eta, 1.0 / eta)), "F(n.o) / F(n.i)"
+                other, words = (share(i, np.where(i > 0.0, eta, 1.0 / eta)), "F(n.o) / F(n.i)")
             else:
-                other, words = share(np.sum(ratio.wo * m, axis=1), side), "F(n.o) / F(o.m)"
+                other, words = (share(np.sum(ratio.wo * m, axis=1), side), "F(n.o) / F(o.m)")
             at_normal = share(o, side)
             with np.errstate(divide="ignore", invalid="ignore"):
                 quotients = {words: r * other / at_normal, f"1 / ({words})": r * at_normal / other}
@@ -739,10 +736,10 @@ def _angles(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
     yield "wo's angle to the normal", degrees(np.abs(wo[:, 2]))
     yield "wi's angle to the normal", degrees(np.abs(wi[:, 2]))
-    yield "the larger angle to the normal", degrees(np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])))
-    yield "the smaller angle to the normal", degrees(np.maximum(np.abs(wo[:, 2]), np.abs(wi[:, 2])))
+    yield ("the larger angle to the normal", degrees(np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2]))))
+    yield ("the smaller angle to the normal", degrees(np.maximum(np.abs(wo[:, 2]), np.abs(wi[:, 2]))))
     yield "the angle between wo and wi", degrees(np.sum(wo * wi, axis=1))
-    yield "the half vector's angle to the normal", degrees(np.abs(half_vector(wo, wi)[:, 2]))
+    yield ("the half vector's angle to the normal", degrees(np.abs(half_vector(wo, wi)[:, 2])))
 
 
 def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:

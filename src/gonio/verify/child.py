@@ -39,7 +39,10 @@ if TYPE_CHECKING:
     from .verdict import Card
 
 STARTING, LOADING, BETWEEN = "starting", "loading the target", "nothing"
-PRINTED, CALLING = "printed", "calling"  # files of a process: its standard output and error, and which method it is in
+PRINTED, CALLING = (
+    "printed",
+    "calling",
+)  # files of a process: its standard output and error, and which method it is in
 ISOLATED = "isolated"  # what an error about a material that cannot be sent points at
 OTHERS = "*"  # all values of the parameters but the given ones
 GRACE = 1.0  # seconds over the limit: a loop in Python is stopped by the alarm inside, which spares a new process
@@ -226,7 +229,7 @@ class _Pool:
     """The processes of a trial, and what is known of each card."""
 
     def __init__(self, task: Task, jobs: int, limit: float, memory: float, progress: Progress | None) -> None:
-        self.task, self.jobs, self.limit, self.memory, self.progress = task, jobs, limit, memory, progress
+        self.task, self.jobs, self.limit, self.memory, self.progress = (task, jobs, limit, memory, progress)
         self.answers: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
         self.workers: list[_Worker] = []
         self.titles: list[str] | None = None
@@ -386,7 +389,7 @@ class _Pool:
     def _avoid(self, card: int, step: str, call: tuple[str, str, str] | None, reason: str) -> None:
         """Note what must not be done again: the call, or the law where that cannot be said."""
         assert self.titles is not None
-        skip, forbidden = self.skip.setdefault(card, {}), self.forbidden.setdefault(card, {})
+        skip, forbidden = (self.skip.setdefault(card, {}), self.forbidden.setdefault(card, {}))
         if call is not None and call[:2] not in forbidden:
             method, key, values = call
             forbidden[method, key] = f"{reason} (in {method}{', at ' if values else ''}{values})"

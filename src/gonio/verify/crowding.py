@@ -182,7 +182,7 @@ def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
                     continue
                 powers_of = dict(zip(names, powers, strict=True))
                 guess = " and ".join(causes.Cosines.GUESSES[name] for name, p in powers_of.items() if p)
-                yield causes.product("", powers_of), guess, functools.partial(product, powers=powers)
+                yield (causes.product("", powers_of), guess, functools.partial(product, powers=powers))
     for eta in causes.index_below(subject):
         for place, side in (("", 0.0), (" from outside", 1.0), (" from inside", -1.0)):
             for power in (2, -2, 4, -4):

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from .severity import Bias
 
 # What breaks these comes first: a NaN spoils every figure, a weight spoils the pdf's and the energy's.
-ORDER = ("positivity", "weight", "pdf", "reciprocity", "energy", "isotropy", "linearity", "precision", "gradients")
+ORDER = ("positivity", "calls", "delta", "weight", "pdf", "reciprocity", "energy")
+AFTER = ("isotropy", "linearity", "precision", "gradients")
 # Failures that another one brings along: the quadrature and the samples of the energy disagree where weights are wrong.
-FOLLOWS = {"energy": ("weight", "pdf"), "pdf": ("weight",)}
+FOLLOWS = {"energy": ("delta", "weight", "pdf"), "pdf": ("weight",)}
 LIMIT = 60.0  # seconds a law; it takes less than one unless the BSDF loops
 
 
@@ -44,7 +45,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
     judge  asks a law of another subject, at less cost
     """
     failed = [answer for answer in answers if answer.verdict.status in (FAIL, DECLARED)]
-    rank = {name: k for k, name in enumerate(ORDER)}
+    rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     named: dict[str, str] = {}  # a cause's key, and the law that named it
     nan = False  # whether values are no numbers at more than single directions: every other figure suffers
     felt: set[str] = set()  # laws whose failure changes a picture
@@ -83,7 +84,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
 
 def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
     """The failures, those that others follow from first."""
-    rank = {name: k for k, name in enumerate(ORDER)}
+    rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     failed = [verdict for verdict in verdicts if verdict.failed]
     return sorted(failed, key=lambda v: (v.cause.startswith("follows"), rank.get(v.law, len(rank))))
 
@@ -93,8 +94,7 @@ _SICK = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexErro
 
 
 UNSTEADY = Cause(
-    "asked again, or among other rays, it answers otherwise: state, chance, or a sum over all rays?",
-    "unsteady",
+    "asked again, or among other rays, it answers otherwise: state, chance, or a sum over all rays?", "unsteady"
 )
 
 
@@ -135,4 +135,7 @@ def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verd
     sound = subject.around_sound() if wrong else None
     if sound is None or judge(law, sound).status == FAIL:
         return None
-    return Grade.INNER, f"{' and '.join(dict.fromkeys(wrong))} inside fails this law alone; around a sound one it holds"
+    return (
+        Grade.INNER,
+        f"{' and '.join(dict.fromkeys(wrong))} inside fails this law alone; around a sound one it holds",
+    )

@@ -147,7 +147,7 @@ class AlbedoCurves:
                 theta[order], mean[order, c], 3.0 * noise[order, c], fmt="o", ms=2.6, lw=0.8, color=color, alpha=0.65
             )
         axes[0].axhline(1.0, color=SOFT, lw=0.8, ls=":")
-        low, high = float(min(value.min(), mean.min())), float(max(value.max(), mean.max(), 1.0))
+        low, high = (float(min(value.min(), mean.min())), float(max(value.max(), mean.max(), 1.0)))
         axes[0].set_ylim(max(low - 0.08 * (high - low) - 0.01, 0.0), high + 0.05 * (high - low) + 0.01)
         _label(axes[0], "angle of wo, degrees", "directional albedo", "quadrature (line), sampling (points)")
         if furnace is not None:
@@ -160,7 +160,10 @@ class AlbedoCurves:
                 "share of light lost",
                 f"white furnace: loses {self.loss:.4f} on average",
             )
-        return _svg(figure), "Above the dotted line at 1 light is made of nothing. Points carry three standard errors."
+        return (
+            _svg(figure),
+            "Above the dotted line at 1 light is made of nothing. Points carry three standard errors.",
+        )
 
 
 @dataclass
@@ -190,9 +193,10 @@ class ReciprocityMap:
         bar = figure.colorbar(image, ax=axes[0], ticks=[-16, -12, -8, -4, 0])
         bar.ax.set_yticklabels(["1e-16", "1e-12", "1e-8", "1e-4", "1"], fontsize=8)
         bar.outline.set_visible(False)
-        return _svg(
-            figure
-        ), "Relative difference of f when the two directions trade places, the worst over eight azimuths."
+        return (
+            _svg(figure),
+            "Relative difference of f when the two directions trade places, the worst over eight azimuths.",
+        )
 
 
 @dataclass

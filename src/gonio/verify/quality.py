@@ -123,7 +123,7 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     by_cosine = np.abs(s.wi[:, 2]) / (np.pi * (2.0 if subject.transmits else 1.0))
     second = np.where(s.pdf > 0.0, np.square(eval_) / (by_cosine * s.pdf), 0.0).reshape(shape).mean(1)
     delta = (s.delta & (s.pdf > 0.0)).any()
-    model, cosine = float(spread[lit].mean()), float((second[lit] / np.square(mean[lit]) - 1.0).mean())
+    model, cosine = (float(spread[lit].mean()), float((second[lit] / np.square(mean[lit]) - 1.0).mean()))
     if not ((math.isfinite(model) and math.isfinite(cosine)) or delta):
         return None
     quotient = None

@@ -95,11 +95,7 @@ def verify(
 
 
 def _here(
-    subjects: list[Subject],
-    laws: list[Law],
-    effort: str,
-    seed: int,
-    progress: Callable[[int, int, str], None] | None,
+    subjects: list[Subject], laws: list[Law], effort: str, seed: int, progress: Callable[[int, int, str], None] | None
 ) -> Report:
     """The trial in this process."""
     started = time.perf_counter()
@@ -279,7 +275,7 @@ def decide(
             pass
         elif not over:
             if breach.certain and (place is None or place.why == "given"):
-                status, why = FAIL, ["it is declared to be broken, and is not: " + breach.reason]
+                status, why = (FAIL, ["it is declared to be broken, and is not: " + breach.reason])
         elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
             status = DECLARED
             finding.notes.insert(0, f"declared: {breach.reason} (at most {breach.size:.4g})")

@@ -23,7 +23,7 @@ from . import directions
 if TYPE_CHECKING:
     from .subject import Subject
 
-Kind: TypeAlias = Literal["bias", "lost", "gained", "nan", "noise", "derivatives"]
+Kind: TypeAlias = Literal["bias", "lost", "gained", "nan", "noise", "derivatives", "interface"]
 Mode: TypeAlias = Literal["radiance", "importance"]
 # (wo, wi), (N, 3) each: two values (N, channels) that should be one, the right one first where it is known
 Pair: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -38,7 +38,8 @@ SPHERE = 0.25 / np.pi  # density of light samples: a constant environment's
 class Grade(enum.StrEnum):
     """What a failure is worth; limits of the average and of the worst direction stand in `LIMITS`.
 
-    NAN, NOISE and FITTING are no bias of a picture; BY_NATURE and INNER say that the fault is not this material's own.
+    NAN, NOISE, FITTING and INTERFACE (a call that integrators do not make, or whose answer they drop) are no bias of a
+    picture; BY_NATURE and INNER say that the fault is not this material's own.
     """
 
     INVISIBLE = "invisible"
@@ -48,6 +49,7 @@ class Grade(enum.StrEnum):
     NAN = "NaN"
     NOISE = "noise"
     FITTING = "fitting only"
+    INTERFACE = "interface"
     BY_NATURE = "by nature"
     INNER = "inner"
 
@@ -55,7 +57,7 @@ class Grade(enum.StrEnum):
 # (average, worst). A quarter of an 8-bit step is .1 %, and 1 % at single directions drowns in a render's noise. Two
 # pictures side by side show 1 % of a flat tone (Weber); 10 % is seen without the other one, as a wrong material.
 LIMITS = {Grade.INVISIBLE: (1e-3, 0.01), Grade.SMALL: (0.01, 0.1), Grade.VISIBLE: (0.1, 0.5)}
-_KINDS = {"nan": Grade.NAN, "noise": Grade.NOISE, "derivatives": Grade.FITTING}
+_KINDS = {"nan": Grade.NAN, "noise": Grade.NOISE, "derivatives": Grade.FITTING, "interface": Grade.INTERFACE}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +69,8 @@ class Bias:
     share    of that hemisphere over which it exceeds 1 %
     where    the worst wo, or what else says where, in words
     kind     "bias", "lost" or "gained" energy; "nan", whose shares are those of directions; "noise", which costs
-             samples and biases nothing; "derivatives", which only fitting sees
+             samples and biases nothing; "derivatives", which only fitting sees; "interface", which only those see who
+             call what `where` names
     furnace  the average under light from everywhere alike, where errors of both signs cancel; None where it is no
              matter of sampling
     both     the same where light and BSDF samples are combined
@@ -95,6 +98,8 @@ class Bias:
         """ "loses 4.8 % of the reflected light on average, 12 % at worst (wo at 85 degrees), ..."."""
         if self.kind == "noise":
             return f"costs samples, biases nothing: {self.where}"
+        if self.kind == "interface":
+            return f"no picture of a plain path tracer changes: {self.where}"
         if self.kind == "derivatives" and not self.average:
             return f"no picture is wrong; derivatives are no numbers: {self.where}"
         if self.kind == "derivatives":
@@ -118,6 +123,8 @@ class Bias:
 
 def percent(share: float) -> str:
     """ "4.8 %", "120 %"."""
+    if share > 100.0:
+        return "more than 10,000 %"
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
@@ -257,7 +264,7 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
     weight = np.where(found[:, None], np.nan_to_num(s.weight, posinf=0.0, neginf=0.0), 0.0)
     channels = weight.shape[1]
     heuristic = np.where(s.delta, 1.0, s.pdf / np.maximum(s.pdf + SPHERE, 1e-30))
-    followed = _batched(weight, n), _batched(weight * np.nan_to_num(heuristic)[:, None], n)
+    followed = (_batched(weight, n), _batched(weight * np.nan_to_num(heuristic)[:, None], n))
     good = (s.pdf > 0.0) & ~s.delta
     own = _eval_over_pdf(subject, many, s.wi, weight, good, mode)
     heuristic = np.where(good, own.pdf / (own.pdf + SPHERE), 1.0)

@@ -18,7 +18,7 @@ from .quality import Quality
 from .severity import Bias, Grade
 from .subject import Subject
 
-PASS, FAIL, DECLARED, NOT_APPLICABLE = "pass", "fail", "breaks as declared", "does not apply"
+PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
 KNOWN = "known"  # fails, as it did when a baseline was written
 
 
@@ -51,6 +51,7 @@ class Finding:
     notes      what else is worth knowing
     breach     the size to hold against a declared breach, where that is not the figure
     evidence   what the report draws of it
+    details    what the law wants back when it is asked for a bias or a cause
     """
 
     figure: float
@@ -65,6 +66,7 @@ class Finding:
     notes: list[str] = dataclasses.field(default_factory=list)
     breach: float | None = None
     evidence: Evidence | None = None
+    details: object = None
 
 
 class DoesNotApply(Exception):

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...ops import Mode, Precision, backend
-from .. import directions
+from ...render.answers import Answer
+from .. import directions, severity
+from ..causes import Ratio
 from ..effort import Effort
 from ..subject import Subject, guarded
 from ..verdict import Finding
@@ -33,30 +35,45 @@ class Calls(Law):
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         finding = Finding(0.0, 0.0, "one wrong answer is one too many", shown="agree")
         asked = []
-        checks = subject.model.calls(seed) if hasattr(subject.model, "calls") else ()
-        for what, wrong in [*_checks(subject, effort, seed), *checks]:
-            asked.append(what)
-            if wrong:
-                finding.problems.append(f"{what}: {wrong}")
+        others = subject.model.calls(seed) if hasattr(subject.model, "calls") else ()
+        wrong: list[Answer] = []
+        finding.details = wrong
+        for answer in (*_checks(subject, effort, seed), *others):
+            asked.append(answer.what)
+            if answer.wrong:
+                wrong.append(answer)
+                finding.problems.append(f"{answer.what}: {answer.wrong}")
         finding.notes.append(f"asked: {', '.join(dict.fromkeys(asked))}")
         finding.figure = float(len(finding.problems))
         if finding.problems:
             finding.shown = f"{len(finding.problems)} differ"
         return finding
 
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        """What the call that path tracers make returns too much or too little; nothing for the others."""
+        wrong: list[Answer] = finding.details  # type: ignore[assignment]
+        worst = max(wrong, key=lambda answer: answer.share)
+        if worst.share > 0.0:
+            return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"of {worst.what}", "bias")
+        names = ", ".join(dict.fromkeys(answer.what for answer in wrong))
+        return severity.Bias(0.0, 0.0, 0.0, f"only who asks for {names}", "interface")
 
-Check = tuple[str, str]  # what was asked, and what is wrong with it ("" where nothing is)
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio]:
+        for answer in finding.details:  # type: ignore[attr-defined]
+            if answer.rows is not None:
+                name, other, wo, wi, got, whole = answer.rows
+                yield Ratio(name, other, wo, wi, got, whole, subject)
 
 
-def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Check]:
+def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
     """What holds of any BSDF."""
     wo, wi = pairs(subject, min(effort.pairs // 8, 4096), seed)
     u = directions.numbers(np.random.default_rng([seed, 101]), len(wo))
     for precision in subject.precisions:
         yield from _batches(subject, wo, wi, u, precision)
     if subject.transmits and not subject.stochastic:
-        yield "mode", _mode(subject, wo, wi)
-    yield "declared facts", _facts(subject, wo, wi, u)
+        yield Answer("mode", _mode(subject, wo, wi))
+    yield Answer("declared facts", _facts(subject, wo, wi, u))
 
 
 def _answers(
@@ -83,65 +100,67 @@ def _rows(value: Any, count: int) -> np.ndarray:
     return array[:count].reshape(count, -1)
 
 
-def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision) -> Iterator[Check]:
+def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision) -> Iterator[Answer]:
     whole = _answers(subject, wo, wi, u, precision)
-    if not subject.stochastic:
-        wrong = _unlike(whole, _answers(subject, wo, wi, u, precision), wo, wi, 0.0)
-        yield "asked twice", wrong and f"{wrong}: declare `stochastic = True` if its values are random"
-        if wrong:
-            return
+    if subject.stochastic:
+        return
     same = SAME[precision]
-    few = slice(0, 5)
-    if not subject.stochastic:
-        for row in range(*few.indices(len(wo))):
-            one = slice(row, row + 1)
-            alone = _answers(subject, wo[one], wi[one], u[one], precision)
-            wrong = _unlike({k: v[one] for k, v in whole.items()}, alone, wo[one], wi[one], same)
-            if wrong:
-                break
-        yield "one row at a time", wrong
-        if precision == "float32":
-            times = LARGE // len(wo)
-            many = _answers(subject, *(np.tile(w, (times, 1)) for w in (wo, wi, u)), precision)
-            yield "a million rows", _unlike(whole, {k: v[-len(wo) :] for k, v in many.items()}, wo, wi, same)
-        order = np.random.default_rng(5).permutation(len(wo))
-        mixed = _answers(subject, wo[order], wi[order], u[order], precision)
-        yield (
-            "rows in another order",
-            _unlike({k: v[order] for k, v in whole.items()}, mixed, wo[order], wi[order], same),
-        )
-        off = np.arange(len(wo)) % 2 == 1
-        gone = [np.where(off[:, None], np.nan, w) for w in (wo, wi, u)]
-        half = _answers(subject, *gone, precision)
-        live = ~off
-        wrong = _unlike(
-            {k: v[live] for k, v in whole.items()}, {k: v[live] for k, v in half.items()}, wo[live], wi[live], same
-        )
-        yield "half the rows dead", wrong
+
+    def some(rows: Any, answers: dict[str, np.ndarray] = whole) -> dict[str, np.ndarray]:
+        return {name: value[rows] for name, value in answers.items()}
+
+    twice = _unlike("asked twice", whole, _answers(subject, wo, wi, u, precision), wo, wi, 0.0)
+    if twice.wrong:
+        yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
+        return
+    yield twice
+    for row in range(5):
+        one = slice(row, row + 1)
+        alone = _answers(subject, wo[one], wi[one], u[one], precision)
+        answer = _unlike("one row at a time", some(one), alone, wo[one], wi[one], same)
+        if answer.wrong:
+            break
+    yield answer
+    if precision == "float32":
+        times = LARGE // len(wo)
+        a, b, c = (np.tile(w, (times, 1)) for w in (wo, wi, u))
+        many = _answers(subject, a, b, c, precision)
+        yield _unlike("a million rows", whole, some(slice(-len(wo), None), many), wo, wi, same)
+    order = np.random.default_rng(5).permutation(len(wo))
+    mixed = _answers(subject, wo[order], wi[order], u[order], precision)
+    yield _unlike("rows in another order", some(order), mixed, wo[order], wi[order], same)
+    live = np.arange(len(wo)) % 2 == 0
+    a, b, c = (np.where(live[:, None], w, np.nan) for w in (wo, wi, u))
+    half = _answers(subject, a, b, c, precision)
+    yield _unlike("half the rows dead", some(live), some(live, half), wo[live], wi[live], same)
 
 
 def _unlike(
-    first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
-) -> str:
-    """The worst difference in words; "" where there is none beyond `same`, relative to the larger."""
+    what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
+) -> Answer:
+    """The worst difference in words, where there is any beyond `same`, relative to the larger."""
     lit = first["sample's pdf"][:, 0] > 0.0
     for name, a in first.items():
         b = second[name]
         if a.shape != b.shape:
-            return f"{name} has shape {b.shape}, and {a.shape} otherwise"
+            return Answer(what, f"{name} has shape {b.shape}, and {a.shape} otherwise")
         keep = np.isfinite(a).all(1)
         if name in ("sample's wi", "sample's eta"):
             keep &= lit
         largest = float(np.max(np.abs(a[keep]), initial=0.0))
         size = np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * largest)
-        off = np.where(keep[:, None], np.abs(a - b), 0.0) / np.where(size > 0.0, size, 1.0)
+        difference = np.where(keep[:, None], np.abs(a - b), 0.0)
+        off = difference / np.where(size > 0.0, size, 1.0)
         off = np.where(np.isnan(off), np.inf, off).max(1)
         # rounding differs where kernels are fused otherwise; a lobe of width 1e-4 magnifies it, in few rows
         wrong = off > same
         if wrong.sum() > (0 if same == 0.0 else 0.002 * len(off)) or np.any(off > 0.1):
             row = int(np.argmax(off))
-            return f"{name} is {_short(b[row])} instead of {_short(a[row])}, {pair_in_words(wo[row], wi[row])}"
-    return ""
+            text = f"{name} is {_short(b[row])} instead of {_short(a[row])}, {pair_in_words(wo[row], wi[row])}"
+            total = float(np.sum(np.abs(a[keep])))
+            share = float(np.sum(np.nan_to_num(difference, nan=0.0))) / total if total > 0.0 else 0.0
+            return Answer(what, text, share, min(float(off[row]), 1.0))
+    return Answer(what, "")
 
 
 def _short(values: np.ndarray) -> str:
@@ -191,7 +210,7 @@ def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> s
         if declared and subject.best == "float64" and 1 in subject.sides:
             flip = np.array([1.0, 1.0, -1.0])
             up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
-            over, under = subject.eval(*up), subject.eval(up[0] * flip, up[1] * flip)
+            over, under = subject.eval(up[0], up[1]), subject.eval(up[0] * flip, up[1] * flip)
             off = np.abs(over - under).max(1)
             if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
                 return "`two_sided` says that it looks from below as from above, and its values differ"

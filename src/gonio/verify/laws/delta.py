@@ -11,7 +11,8 @@ import numpy as np
 
 from ...models import BSDF, binding, tree
 from ...ops import backend
-from .. import directions, lobes, statistics
+from .. import directions, lobes, severity, statistics
+from ..causes import Cause
 from ..effort import Effort
 from ..lobes import Lobes
 from ..subject import Subject, guarded
@@ -26,12 +27,17 @@ INDICES = {"eta": 1.0, "int_ior": 1.0}  # parameters that name the index below, 
 
 
 class Miss(NamedTuple):
-    """One thing that is wrong: how much, in words, and where."""
+    """One thing that is wrong: how much, in words, and where; the mean over the views that have the lobe, and the share
+    of them that is off by more than a hundredth; whether only derivatives are wrong; and what it comes from."""
 
     size: float
     text: str
     wo: np.ndarray
     wi: np.ndarray
+    average: float = 1.0
+    share: float = 1.0
+    slope: bool = False
+    cause: str = ""
 
 
 class DeltaLobes(Law):
@@ -61,10 +67,13 @@ class DeltaLobes(Law):
         if exact:
             checks += [_single, _slopes]
         worst: Miss | None = None
+        misses: list[Miss] = []
+        finding.details = misses
         for check in checks:
             wrong = max(check(subject, wo, seen, power, seed), key=lambda one: one.size, default=None)
             if wrong is None or not wrong.size > tolerance:
                 continue
+            misses.append(wrong)
             pair = f"wo at {_angles(wrong.wo)}, wi at {_angles(wrong.wi)} degrees"
             finding.problems.append(f"{wrong.text} ({pair})")
             if worst is None or wrong.size > worst.size:
@@ -75,6 +84,22 @@ class DeltaLobes(Law):
             finding.worst = f"wo at {_angles(worst.wo)}, wi at {_angles(worst.wi)} degrees"
         finding.trials += _frequencies(subject, effort, seed)
         return finding
+
+    def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
+        """The share of a lobe's light that goes astray or is too much or too little; all of what goes elsewhere."""
+        misses: list[Miss] = finding.details  # type: ignore[assignment]
+        pictures = [miss for miss in misses if not miss.slope]
+        if not misses:
+            return severity.of_sampling(subject)  # chosen more or less often than said
+        worst = max(pictures or misses, key=lambda miss: miss.average)
+        where = f"wo at {_angles(worst.wo)} degrees, in its delta lobe"
+        size, average = min(worst.size, 1.0), min(worst.average, 1.0)
+        return severity.Bias(size, average, worst.share, where, "bias" if pictures else "derivatives")
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        for miss in finding.details:  # type: ignore[attr-defined]
+            if miss.cause:
+                yield Cause(miss.cause, miss.cause)
 
 
 def _shown(seen: Lobes) -> str:
@@ -125,9 +150,11 @@ def _direction(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed
             snell = np.abs(i[:, :2] + o[:, :2] / eta[:, None]).max(1) * bends
             other = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * bends
             text = "not refracted by Snell's law with the eta that the sample states"
+            cause = ""
             if snell.max() > SINGLE and other.max() < SINGLE:
-                text += ": it is with 1 / eta, the light is bent the wrong way, or eta is that of the other side"
-            yield _worst(snell, text, o, i)
+                text += ", but with 1 / eta"
+                cause = "Snell's law holds with 1 / eta: bent the wrong way, or `eta` is that of the other side?"
+            yield _worst(snell, text, o, i)._replace(cause=cause)
         flat = through & ~bends
         if flat.any():
             sin_o, sin_i = np.hypot(o[:, 0], o[:, 1]), np.hypot(i[:, 0], i[:, 1])
@@ -135,7 +162,8 @@ def _direction(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed
             index = sin_o[usable] / sin_i[usable]
             if len(index) > 3 and np.ptp(index) < 1e-3 * index.mean() and abs(index.mean() - 1.0) > FLAT:
                 size = np.where(usable, abs(index.mean() - 1.0), 0.0)
-                yield _worst(size, f"bends by an index of {index.mean():.4g}, and states eta = 1", o, i)
+                text = f"bends by an index of {index.mean():.4g}, and states eta = 1"
+                yield _worst(size, text, o, i)._replace(cause="`eta` of transmitted samples is left at 1?")
         mirror = o * [-1.0, -1.0, 1.0]
         # a grating's orders lie beside the mirror direction, and one of them in it
         _, also = lobes.along(lobes.rows_of(seen, rows), mirror)
@@ -197,7 +225,18 @@ def _modes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: in
         ratio = float(radiance[row].mean() / max(carried[row].mean(), 1e-12))
         what = "transmits" if through[row] else "reflects"
         text = f"{what} {ratio:.4g} times as much radiance as power, {factor[row]:.4g} expected (1 / eta^2)"
-        yield Miss(float(off[row]), text, o[row], i[row])
+        yield _worst(off, text, o, i)._replace(cause=_power_of(radiance, carried, seen.eta[rows, n], through & there))
+
+
+def _power_of(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray) -> str:
+    """What the ratio of radiance to power is, where it is one power of the index for all of transmission."""
+    if usable.sum() < 8 or np.all(np.abs(eta[usable] - 1.0) < FLAT):
+        return ""
+    ratio = radiance[usable].sum(1) / np.maximum(power[usable].sum(1), 1e-12)
+    for exponent, words in ((0.0, "is missing"), (2.0, "is upside down"), (-4.0, "stands there twice")):
+        if np.all(np.abs(ratio / eta[usable] ** exponent - 1.0) < 1e-3):
+            return f"radiance over power is {f'eta^{exponent:g}' if exponent else '1'}: the factor 1 / eta^2 {words}?"
+    return ""
 
 
 def _back(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
@@ -239,8 +278,13 @@ def _fresnel(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: 
             return
     row = int(np.argmax(answer))
     wi = wo[row] * [-1.0, -1.0, 1.0]
+    cause = ""
+    for known, words in ((ratio**-1.0, "of the other side's index"), (ratio**2.0, "of the index squared")):
+        curve = _dielectric(cos, known)
+        if np.maximum(_off_constant(reflected, curve), _off_constant(rest, 1.0 - curve)).max() < 1e-4:
+            cause = f"it reflects by Fresnel's equations {words}?"
     text = f"reflects {reflected[row].mean():.4g} where Fresnel's equations for eta = {index:.4g} give {exact[row]:.4g}"
-    yield Miss(float(answer[row]), text, wo[row], wi)
+    yield _worst(answer, text, wo, np.tile(wi, (len(wo), 1)))._replace(cause=cause)
 
 
 def _off_constant(value: np.ndarray, curve: np.ndarray) -> np.ndarray:
@@ -347,7 +391,7 @@ def _slopes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: i
             [np.broadcast_to(backend.to_numpy(m, len(many)), (len(many),)) for m in [lit, *(m for _, m in ends)]],
             axis=0,
         )
-        wide, narrow = (shown[3] - shown[0]) / (2.0 * step), (shown[2] - shown[1]) / step
+        wide, narrow = ((shown[3] - shown[0]) / (2.0 * step), (shown[2] - shown[1]) / step)
         smooth = there & np.all(np.abs(wide - narrow) <= 1e-3 * np.abs(narrow) + 1e-7 / size, axis=1)
         differences = narrow + (narrow - wide) / 3.0
         floor = max(1e-3 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-6 / size)
@@ -367,8 +411,11 @@ def _relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _worst(off: np.ndarray, text: str, wo: np.ndarray, wi: np.ndarray) -> Miss:
     off = np.where(np.isnan(off), np.inf, off)
-    row = int(np.argmax(off)) if len(off) else 0
-    return Miss(float(off[row]) if len(off) else 0.0, text, wo[row], wi[row])
+    if not len(off):
+        return Miss(0.0, text, wo, wi)
+    row = int(np.argmax(off))
+    average, share = float(np.minimum(off, 1.0).mean()), float(np.mean(off > 0.01))
+    return Miss(float(off[row]), text, wo[row], wi[row], average, share)
 
 
 def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:

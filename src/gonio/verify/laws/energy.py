@@ -39,9 +39,7 @@ class Energy(Law):
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         wo = _views(subject, effort)
         finding = Finding(
-            figure=0.0,
-            tolerance=GAIN,
-            reason="a quarter of an 8-bit step; the integrals are ten times more accurate",
+            figure=0.0, tolerance=GAIN, reason="a quarter of an 8-bit step; the integrals are ten times more accurate"
         )
         value, error = _quadrature(subject, wo, effort, seed)
         mean, noise, heavy = _sampling(subject, wo, effort.furnace_samples, seed)

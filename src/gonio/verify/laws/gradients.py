@@ -104,7 +104,7 @@ def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi
         return False
     moved = float(value) * 1.3 if float(value) * 1.3 <= parameter.high else float(value) * 0.7
     try:
-        before, after = subject.eval(wo, wi), subject.replace(**{path: moved}).eval(wo, wi)
+        before, after = (subject.eval(wo, wi), subject.replace(**{path: moved}).eval(wo, wi))
     except InputError:
         return False
     lit = before.max(1) > 0.0

@@ -105,7 +105,7 @@ class Isotropy(Law):
         value = subject.eval(np.tile([0.0, 0.0, 1.0], (len(wi), 1)), wi).mean(1)
         # d omega = sin theta d theta d phi, and geometric steps in theta carry a factor theta
         weight = value * (np.sin(t) * t).ravel() * np.sin(t).ravel() ** 2
-        along, across = np.sum(weight * np.cos(p.ravel() - phi0) ** 2), np.sum(weight * np.sin(p.ravel() - phi0) ** 2)
+        along, across = (np.sum(weight * np.cos(p.ravel() - phi0) ** 2), np.sum(weight * np.sin(p.ravel() - phi0) ** 2))
         if not along + across > 0.0:
             return
         finding.notes.append(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...models import BSDF, models
-from .. import severity
+from .. import directions, severity
 from ..causes import SPREAD, Cause
 from ..effort import Effort
 from ..subject import Subject
@@ -73,7 +73,7 @@ class Linearity(Law):
         lit = (low > 1e-9 * high.max()) & (high > 0.0)
         if lit.sum() < 64:
             return
-        powers = np.log(high[lit] / low[lit]) / np.log(7.0), np.log(middle[lit] / low[lit]) / np.log(2.5)
+        powers = (np.log(high[lit] / low[lit]) / np.log(7.0), np.log(middle[lit] / low[lit]) / np.log(2.5))
         power = float(np.median(powers[0]))
         if abs(power - 1.0) > 0.01 and all(np.percentile(np.abs(p / power - 1.0), 97.0) < SPREAD for p in powers):
             text = f"values follow {name}^{power:.3g}, within 1e-3: a colour decoded or multiplied twice?"
@@ -98,5 +98,9 @@ def _pairs(subject: Subject) -> dict[str, severity.Pair]:
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
     """Whether an albedo changes no value: a cache that forgets it, a parameter that nothing reads."""
-    low, high = (subject.replace(**{name: v}).eval(wo, wi) for v in (0.125, 0.875))
-    return bool(np.array_equal(low, high) and np.any(low > 0.0))
+    low, high = (subject.replace(**{name: v}) for v in (0.125, 0.875))
+    first, second = low.eval(wo, wi), high.eval(wo, wi)
+    if not np.array_equal(first, second) or not np.any(first > 0.0):
+        return False
+    u = directions.numbers(np.random.default_rng(17), len(wo))  # it may belong to a delta lobe, which has no value
+    return bool(np.array_equal(low.sample(wo, u).weight, high.sample(wo, u).weight))

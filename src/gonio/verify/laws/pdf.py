@@ -120,7 +120,7 @@ class _Again:
     """The same test with another seed: other cells, other samples."""
 
     def __init__(self, subject: Subject, wo: np.ndarray, kind: str, effort: Effort, seed: int) -> None:
-        self.subject, self.wo, self.kind, self.effort, self.seed = subject, wo, kind, effort, seed
+        self.subject, self.wo, self.kind, self.effort, self.seed = (subject, wo, kind, effort, seed)
 
     def __call__(self) -> float:
         tested = _chi_square(self.subject, self.effort, self.seed + 7919, self.wo[None])
@@ -177,7 +177,7 @@ def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> N
     if not subject.has_density:
         return
     wo, wi = pairs(subject, effort.pairs, seed)
-    value, pdf = subject.eval(wo, wi, precision=subject.best).max(1), subject.pdf(wo, wi, precision=subject.best)
+    value, pdf = (subject.eval(wo, wi, precision=subject.best).max(1), subject.pdf(wo, wi, precision=subject.best))
     wanting = (value > 0.0) & ~(pdf > 0.0)
     total = float(np.sum(value[np.isfinite(value)]))
     # beside a delta lobe, which carries the light, a density of a millionth is nothing

@@ -72,7 +72,7 @@ class Positivity(Law):
                     changed = changes[row // len(wo)]
                     finding.problems.append(f"the gradient of eval by {name} is not finite{_words(changed)}: {place}")
                     if finding.at is None:
-                        finding.at, finding.settings, finding.worst = (many_o[row], many_i[row]), changed, place
+                        finding.at, finding.settings, finding.worst = ((many_o[row], many_i[row]), changed, place)
         finding.shown = f"{finding.figure:g} of {checked:.3g}"
         del finding.problems[6:]
         return finding
@@ -233,7 +233,7 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
     model = binding.bind(subject.model, watched)
     # values hold to the horizon itself, their slopes, which are powers of the cosine steeper, to 89.9999 degrees
     shallow = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) < 1.5e-6
-    wo, wi = np.where(shallow[:, None], [0.6, 0.0, 0.8], wo), np.where(shallow[:, None], [0.0, 0.6, 0.8], wi)
+    wo, wi = (np.where(shallow[:, None], [0.6, 0.0, 0.8], wo), np.where(shallow[:, None], [0.0, 0.6, 0.8], wi))
     a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
     value = guarded(subject.model, "eval", lambda: model.eval(a, b, "radiance"))
     if not dr.grad_enabled(value):

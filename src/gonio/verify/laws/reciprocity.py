@@ -85,7 +85,7 @@ class Reciprocity(Law):
             text = "f(wo, wi) = f(wi, wo) in transmission too: the factor (eta_o / eta_i)^2 of radiance is missing"
             yield Cause(f"{text}, or `eta` of its samples should be 1?", "eta^2 in transmission")
         wo, wi = pairs(subject, PAIRS, seed, subject.best == "float64")
-        there, back = subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo)
+        there, back = (subject.f(wo, wi) * _scale(wo, wi, eta)[:, None], subject.f(wi, wo))
         yield Ratio("f(wo, wi)", "f(wi, wo)", wo, wi, there, back, subject, antisymmetric=True)
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
