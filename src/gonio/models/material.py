@@ -17,7 +17,7 @@ values, or symbols while recording. Callers hand over NumPy arrays, lists or Dr.
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, dataclass_transform, overload
@@ -248,6 +248,10 @@ class BSDF(Material):
             hint = did_you_mean(str(name), [*known, *(p.title for p in known.values())])
             raise InputError(f"unknown {cls.preset_kind} '{name}'", "preset", hint)
         return cls(**{**known[key].values, **parameters})
+
+    def renderer_calls(self, seed: int) -> Iterable[Any]:
+        """What a renderer asks of it beside eval, pdf and sample, and what comes, for the verifier; here nothing."""
+        return ()
 
     def breaches(self) -> dict[str, Breach]:
         """The laws that it breaks with these parameters, sizes as numbers; those of inner materials may show or not."""

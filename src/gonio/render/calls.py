@@ -7,7 +7,7 @@ anew can be right in every test of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import drjit as dr
@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from .answers import Answer
-from .types import BSDFContext, BSDFSample, MitsubaBSDF, SurfaceInteraction
+from .types import BSDFContext, BSDFSample, MitsubaBSDF, OfVariant, SurfaceInteraction
 
 COUNT = 4096
 SAME = 1e-4  # relative: float32, and kernels that are fused otherwise
@@ -215,7 +215,7 @@ class _Trial:
             "eval on a tilted surface", "eval", self.color(self.bsdf.eval(self.ctx, si, self.wo)), self.value
         )
 
-    def parts(self, contexts: list[tuple[str, BSDFContext, int | None]], words: str) -> str:
+    def parts(self, contexts: Sequence[tuple[str, BSDFContext, int | None]], words: str) -> str:
         """Asked one by one, parts add up to the whole, and what is sampled from one is of that one."""
         total = np.zeros_like(self.value)
         for name, ctx, number in contexts:
@@ -294,7 +294,7 @@ def _vector(rows: np.ndarray) -> mi.Vector3f:
     return mi.Vector3f(*[mi.Float(np.ascontiguousarray(c, dtype=np.float32)) for c in rows.T])
 
 
-def _rows(value: object) -> np.ndarray:
+def _rows(value: OfVariant) -> np.ndarray:
     """(COUNT, k) in float64."""
     parts = (
         [np.asarray(c.numpy(), float) for c in value]

@@ -228,11 +228,11 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
         seen[kind] = make
         register(kind, make, *more)
 
-    mi.register_bsdf = noted
+    vars(mi)["register_bsdf"] = noted
     try:
         module = outside.module_of(path, "TARGET")
     finally:
-        mi.register_bsdf = register
+        vars(mi)["register_bsdf"] = register
     kind = name if name in seen else next((k for k, make in seen.items() if make is vars(module).get(name)), None)
     return None if kind is None else load({"type": kind, **properties})
 

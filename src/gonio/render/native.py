@@ -87,7 +87,7 @@ class Native(BSDF):
 
     # ------------------------------------------------------------------ facts
 
-    def calls(self, seed: int) -> Iterator[Answer]:
+    def renderer_calls(self, seed: int) -> Iterator[Answer]:
         """What else a renderer asks of it, and what comes."""
         front = dr.zeros(mi.Vector3f, calls.COUNT) + mi.Vector3f(0.0, 0.0, 1.0)
         return calls.answers(self.bsdf, self._interaction(front), seed)

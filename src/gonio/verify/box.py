@@ -20,6 +20,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..models import BSDF, Parameter, tree
+from ..models.parameters import pair_of
 from . import directions
 from .effort import Effort
 from .subject import Fault, Subject
@@ -27,7 +28,6 @@ from .subject import Fault, Subject
 SCAN = 64  # values along one parameter
 RAYS = 96  # pairs of directions for each of them
 WIDE = 30.0  # a range whose ends differ by more is scanned and drawn from in equal ratios
-OPEN = 100.0  # how far a range without an upper end is followed, in units of its lower end, or of 1
 JUMP = 6.0  # how many times its neighbours' a step must be
 LEAST = 0.004  # and how large, as a share of the value: what is smaller no one sees
 MARGIN = 0.02  # of a range, where its ends are left out
@@ -108,7 +108,8 @@ def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
     if not math.isfinite(low):
         return None
     if not math.isfinite(high):
-        high = OPEN * max(low, 1.0)
+        # no upper end is declared, and none is invented: up to what was given
+        high = float(np.max(np.asarray(pair_of(value) if parameter.kind == "alpha" else value, float)))
     if not low < high:
         return None
     return low, high, high > WIDE * max(low, 1.0) or parameter.kind == "alpha"

@@ -30,6 +30,7 @@ CELLS = (100, 200)  # rows and columns a side of the surface
 COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
 PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
 DEPTH = 9  # divisions of a cell; a step such as total reflection's divides those that it runs through to the last
+LARGEST = 400_000  # cells of one round, some 10 M directions
 LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
 Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
@@ -218,6 +219,9 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         aside = _step_aside(look(*place, *_RIM), box, low, high)
         divide = (off > allowed) | (aside > allowed) | ((high <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
+        if 4 * divide.sum() > LARGEST:  # a pdf that is rough everywhere: the roughest cells, and the rest as it is
+            worst = np.argsort(-np.where(divide, off / allowed, 0.0))
+            divide[worst[LARGEST // 4 :]] = False
         np.add.at(unsettled, row[owner[~divide]], np.maximum(np.abs(four - three), aside)[~divide])
         np.add.at(cells, owner[~divide], four[~divide])
         if not divide.any():

@@ -133,11 +133,9 @@ class Held(NamedTuple):
         answers = []
         for law, all_ in self.laws:
             begin(law.name)
-            verdicts = [_verdict(law, it, threshold, seed) for it in all_]
-            verdict = _joined(verdicts, all_)
-            place, what, _ = next(it for it, v in zip(all_, verdicts, strict=True) if v is verdict)
-            found = what if isinstance(what, Finding) else None
-            answers.append(diagnosis.Answer(law, verdict, place.subject, found))
+            verdict, asked = _joined(law, all_, threshold, seed)
+            found = asked.what if isinstance(asked.what, Finding) else None
+            answers.append(diagnosis.Answer(law, verdict, asked.place.subject, found))
 
         def judge(law: Law, other: Subject) -> Verdict:
             what = _judge(law, other, ELSEWHERE[effort], seed)
@@ -203,6 +201,8 @@ def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: 
         found.append(Asked(place, what, time.perf_counter() - began))
         if isinstance(what, Verdict) and what.failed:
             break  # an exception, or no end: it would be the same, or take for ever
+        if isinstance(what, Finding) and place.why == "given" and (what.problems or not what.figure <= what.tolerance):
+            break  # it fails, or breaks as declared, as it is
     return found
 
 
@@ -214,22 +214,28 @@ def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
     return verdict
 
 
-def _joined(verdicts: list[Verdict], all_: list[Asked]) -> Verdict:
-    """One verdict of those at all places: the given one, unless the law holds there and fails elsewhere."""
-    first = verdicts[0]
-    failed = [(v, it.place) for v, it in zip(verdicts, all_, strict=True) if v.failed]
-    answer = first
-    if failed and not first.failed:
-        answer, place = failed[0]
-        answer.why = [f"at {place.words}: {line}" for line in answer.why]
-        answer.notes.insert(0, f"at the given values: {first.status}")
+def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[Verdict, Asked]:
+    """One verdict of those at all places, and where it was found: the given one, unless the law holds there and fails
+    elsewhere. Once it is known that it fails, no more tests are repeated."""
+    first = _verdict(law, all_[0], threshold, seed)
+    answer, where = first, all_[0]
+    failed: list[Asked] = []
+    for asked in all_[1:] if not first.failed else ():
+        verdict = _verdict(law, asked, threshold, seed)
+        if not verdict.failed:
+            continue
+        if not failed:
+            answer, where = verdict, asked
+            answer.why = [f"at {asked.place.words}: {line}" for line in answer.why]
+            answer.notes.insert(0, f"at the given values: {first.status}")
+        failed.append(asked)
+        if len(failed) == 3:
+            break
     if len(failed) > 1:
-        where = "; ".join(place.words for _, place in failed[1:4] if place.words)
-        if where:
-            answer.notes.append(f"fails at {len(failed)} of {len(all_)} places, also at {where}")
+        answer.notes.append(f"fails also at {'; '.join(asked.place.words for asked in failed[1:])}")
     answer.places = len(all_)
-    answer.seconds = sum(v.seconds for v in verdicts)
-    return answer
+    answer.seconds += sum(asked.seconds for asked in all_ if asked is not where)
+    return answer, where
 
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:

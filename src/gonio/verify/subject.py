@@ -129,7 +129,10 @@ class Subject:
         wo, wi = (directions.single(directions.uniform(rng, 2048)) for _ in range(2))
         if np.any(self.eval(wo, wi, precision="float32") > 0.0):
             return True
-        drawn = self.sample(wo, directions.numbers(rng, 2048), precision="float32")
+        try:
+            drawn = self.sample(wo, directions.numbers(rng, 2048), precision="float32")
+        except Fault:  # for the laws of sampling to report
+            return True
         return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
 
     @functools.cached_property

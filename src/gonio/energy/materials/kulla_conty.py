@@ -47,7 +47,11 @@ def _off(model: KullaConty) -> float:
     if not model.base.transmits:
         return 0.008 if model.two_widths else 0.0
     surface = model.base.microsurface
-    near = surface is not None and not backend.is_drjit(surface.eta) and np.any(np.abs(np.log(surface.eta)) < 0.06)
+    near = (
+        surface is not None
+        and not backend.is_drjit(surface.eta)
+        and np.any(np.abs(np.log(np.asarray(surface.eta, float))) < 0.06)
+    )
     return 0.02 if near else 0.007
 
 

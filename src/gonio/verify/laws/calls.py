@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
+from ...models import BSDF
 from ...ops import Mode, Precision, backend
 from ...render.answers import Answer
 from .. import directions, severity
@@ -35,7 +36,7 @@ class Calls(Law):
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         finding = Finding(0.0, 0.0, "one wrong answer is one too many", shown="agree")
         asked = []
-        others = subject.model.calls(seed) if hasattr(subject.model, "calls") else ()
+        others: Iterable[Answer] = subject.model.renderer_calls(seed) if isinstance(subject.model, BSDF) else ()
         wrong: list[Answer] = []
         finding.details = wrong
         for answer in (*_checks(subject, effort, seed), *others):

@@ -100,9 +100,11 @@ class Gradients(Law):
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
     """Whether a parameter without derivative changes nearly all values when it is moved by a third."""
     value = tree.value_at(subject.model, path)
-    if parameter.kind not in ("float", "alpha") or np.ndim(value) or isinstance(value, tuple):
+    if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
-    moved = float(value) * 1.3 if float(value) * 1.3 <= parameter.high else float(value) * 0.7
+    given = np.asarray(value, float)
+    moved: Any = given * (1.3 if given.max() * 1.3 <= parameter.high else 0.7)
+    moved = tuple(map(float, moved)) if np.ndim(moved) else float(moved)
     try:
         before, after = (subject.eval(wo, wi), subject.replace(**{path: moved}).eval(wo, wi))
     except InputError:

@@ -174,8 +174,10 @@ def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.n
     theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
     pair = np.array(list(itertools.product(theta, theta, PHI)))
     random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)
-    wo = np.concatenate([directions.at(pair[:, 0], 20.0), random_o])
-    wi = np.concatenate([directions.at(pair[:, 1], 20.0 + pair[:, 2]), random_i])
+    wo, wi = directions.at(pair[:, 0], 20.0), directions.at(pair[:, 1], 20.0 + pair[:, 2])
+    for w, theta in ((wo, pair[:, 0]), (wi, pair[:, 1])):
+        w[theta == 90.0, 2] = 0.0  # the horizon itself, where cosines divide by 0
+    wo, wi = np.concatenate([wo, random_o]), np.concatenate([wi, random_i])
     corners = np.array(list(itertools.product(CORNERS, repeat=3)))
     u = directions.numbers(np.random.default_rng([seed, 9]), len(wo))
     u[: len(pair)] = np.resize(corners, (len(pair), 3))
