@@ -222,8 +222,8 @@ def test_the_chi_square_tells_place_and_size() -> None:
     held = crowding.blocks(tested.cells)
     assert held is not None
     words = crowding.crowd(subject, held)
-    # .55 / .5 where only the wide lobe is
-    assert "10 % more samples than the pdf says" in words or "11 % more" in words or "9." in words, words
+    # .55 / .5 where only the wide lobe is, and the noise of cells with a few hundred samples
+    assert 8.0 < float(words.partition(" % more samples than the pdf says")[0]) < 18.0, words
     assert "of the light" in words
 
 

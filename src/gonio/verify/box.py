@@ -41,16 +41,18 @@ class Place:
     values   what differs from the given material, by path
     why      "given", "corner", "edge", "interior" or "jump"
     subject  the BSDF there
+    along    the parameters that move; those of the subject itself where it is the given one
     """
 
     values: dict[str, Any]
     why: str
     subject: Subject
+    along: tuple[Axis, ...] = ()
 
     def inside(self) -> Place:
         """The point moved in from the ends of the ranges, where values may be clamped and slopes break off."""
         moved = {}
-        for number, axis in enumerate(axes(self.subject)):
+        for number, axis in enumerate(self.along or axes(self.subject)):
             value = tree.value_at(self.subject.model, axis.path)
             # not all by the same: eta = k is a place where a conductor's formula has a kink
             margin = MARGIN * (1.0 + 0.1 * number) * (axis.high - axis.low)
@@ -60,7 +62,7 @@ class Place:
                 moved[axis.path] = axis.high - margin
         if not moved:
             return self
-        values = {path: moved[path] for path in self.values}
+        values = {path: moved.get(path, value) for path, value in self.values.items()}
         return dataclasses.replace(self, values=values, subject=self.subject.replace(**moved))
 
     @property
@@ -143,7 +145,7 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
         values = {path: float(value) for path, value in values.items()}
         if any(values == place.values for place in made):
             continue
-        place = _made(subject, values, why)
+        place = _made(subject, values, why, tuple(along))
         if place is not None:
             made.append(place)
     return made
@@ -162,9 +164,9 @@ def covered(subject: Subject, tried: list[Place]) -> str:
 _PLURAL = {"corner": "corners", "edge": "edges", "interior": "inside", "jump": "jumps"}
 
 
-def _made(subject: Subject, values: dict[str, Any], why: str) -> Place | None:
+def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:
     try:
-        return Place(values, why, subject.replace(**values))
+        return Place(values, why, subject.replace(**values), along)
     except InputError:
         return None  # the material refuses the values: it need not answer for them
 
