@@ -2,15 +2,15 @@
 
 from typing import ClassVar
 
-import drjit as dr
 import gonio as go
+import drjit as dr
 from gonio import ops
-from gonio.ops import backend
-from gonio.optics import frame
 from gonio.energy.compensation import missing
 from gonio.energy.materials import kulla_conty
 from gonio.energy.materials._compensated import lobe_ratio
 from gonio.models.binding import bound_copy
+from gonio.ops import backend
+from gonio.optics import frame
 
 
 def lit(wo, wi):
@@ -105,7 +105,7 @@ class TurquinUndeclared(go.Turquin):
     fault: ClassVar[str] = "the factor sees the viewer alone, and the breach of reciprocity is not declared"
     cause: ClassVar[str] = ""
     kind: ClassVar[str] = "compensated"
-    breaks = {}
+    breaks: ClassVar = {}
     base: go.BSDF = go.bsdf("the material to be compensated", go.Conductor(alpha=0.8))
 
 

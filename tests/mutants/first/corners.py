@@ -2,8 +2,8 @@
 
 from typing import ClassVar, NamedTuple
 
-import drjit as dr
 import gonio as go
+import drjit as dr
 import numpy as np
 from gonio import ops
 from gonio.ops import backend

@@ -1,7 +1,7 @@
 """Mitsuba plugins in Python: wrong ones, and three that are right. Mitsuba's wi is the viewer, its wo the light."""
 
+import gonio.mitsuba  # noqa: F401  chooses llvm_ad_rgb
 import drjit as dr
-import gonio.mitsuba  # chooses llvm_ad_rgb
 import mitsuba as mi
 
 F = mi.BSDFFlags

@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-import drjit as dr
 import gonio as go
+import drjit as dr
 from gonio import ops
 from gonio.ops import backend
 from gonio.optics import frame, warp
@@ -640,7 +640,7 @@ class MatteBreachAbsent(go.BSDF):
     fault: ClassVar[str] = "it declares a breach of reciprocity that is not there: the formula is Lambert's"
     cause: ClassVar[str] = ""
     kind: ClassVar[str] = "smooth"
-    breaks = {"reciprocity": go.Breach("the highlight has no cosine", 1.0)}
+    breaks: ClassVar = {"reciprocity": go.Breach("the highlight has no cosine", 1.0)}
     kd: go.Colour = go.spectrum(0.5, "share of light that is reflected", low=0.0, high=1.0)
 
     def eval(self, wo, wi):

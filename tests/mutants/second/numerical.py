@@ -2,9 +2,8 @@
 
 from typing import ClassVar
 
-import drjit as dr
-
 import gonio as go
+import drjit as dr
 from gonio import ops
 from gonio.models import microfacet
 from gonio.optics import frame, warp

@@ -1,8 +1,7 @@
 """Mitsuba plugins in Python: wrong flags, components, lanes, sides; and two that are right."""
 
+import gonio.mitsuba  # noqa: F401  chooses llvm_ad_rgb
 import drjit as dr
-
-import gonio.mitsuba  # chooses the variant
 import mitsuba as mi
 
 F = mi.BSDFFlags

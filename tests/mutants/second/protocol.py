@@ -2,10 +2,9 @@
 
 from typing import ClassVar
 
+import gonio as go
 import drjit as dr
 import numpy as np
-
-import gonio as go
 from gonio import ops
 from gonio.optics import frame, warp
 

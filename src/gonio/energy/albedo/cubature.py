@@ -56,8 +56,9 @@ class _Seen(NamedTuple):
 def _aside(seen: _Seen, rim: _Seen) -> np.ndarray:
     """What is lost, or taken for lit, between the rim of cells and their nodes, where the rim is quite another: a step
     that runs there is seen by no rule."""
-    more = np.where(rim.most > 4.0 * seen.most, rim.most - seen.most, 0.0)
-    less = np.where(4.0 * rim.least < seen.least, seen.least - rim.least, 0.0)
+    with np.errstate(invalid="ignore"):  # values that are no numbers are for other laws to find
+        more = np.where(rim.most > 4.0 * seen.most, rim.most - seen.most, 0.0)
+        less = np.where(4.0 * rim.least < seen.least, seen.least - rim.least, 0.0)
     return _OUTSIDE * np.maximum(more, less)
 
 

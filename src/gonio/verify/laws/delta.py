@@ -151,7 +151,8 @@ def _direction(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed
             other = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * bends
             text = "not refracted by Snell's law with the eta that the sample states"
             cause = ""
-            if snell.max() > SINGLE and other.max() < SINGLE:
+            wrong = snell > SINGLE
+            if wrong.any() and other[wrong].max() < SINGLE:
                 text += ", but with 1 / eta"
                 cause = "Snell's law holds with 1 / eta: bent the wrong way, or `eta` is that of the other side?"
             yield _worst(snell, text, o, i)._replace(cause=cause)

@@ -1,0 +1,58 @@
+"""At which values of the parameters a material is tried."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gonio as go
+from gonio.verify import box, subject, verify
+from gonio.verify.effort import EFFORTS
+
+
+class BrightCoat(go.BSDF):
+    """Right at its defaults; the albedo is 1.6 times too large where the coat is above .9."""
+
+    albedo: go.Colour = go.spectrum(0.5, "share of light that is reflected", low=0.0, high=1.0)
+    coat: go.Number = go.number(0.2, "share that is coated", low=0.0, high=1.0)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        more = go.ops.where(self.coat > 0.9, 1.6, 1.0)
+        return self.albedo * (more * go.ops.where((wo.z > 0.0) & (wi.z > 0.0), wi.z * go.ops.inv_pi, 0.0))
+
+
+class Unbounded(go.BSDF):
+    """A range without an upper end."""
+
+    tint: go.Colour = go.spectrum(0.8, "share of light that is reflected", low=0.0, high=1.0)
+    gain: go.Number = go.number(0.25, "of what is given back", low=0.0)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return self.tint * (self.gain * go.ops.where((wo.z > 0.0) & (wi.z > 0.0), wi.z * go.ops.inv_pi, 0.0))
+
+
+def test_a_scan_finds_where_something_begins() -> None:
+    one = subject.of(BrightCoat())
+    found = box.jumps(one, box.axes(one), 1)
+    assert any(0.88 < jump.get("coat", 0.0) < 0.95 for jump in found)
+    assert box.jumps(subject.of(go.Lambert(0.5)), box.axes(subject.of(go.Lambert(0.5))), 1) == []
+
+
+def test_a_mistake_in_a_corner_of_the_ranges_is_caught_and_placed() -> None:
+    verdict = verify(BrightCoat(), quick=True, law="energy")["energy"]
+    assert verdict.failed and verdict.why[0].startswith("at ") and "coat = " in verdict.why[0]
+    assert "--param coat=" in verdict.command
+
+
+def test_no_range_is_invented() -> None:
+    (axis,) = [a for a in box.axes(subject.of(Unbounded())) if a.path == "gain"]
+    assert (axis.low, axis.high) == (0.0, 0.25)
+    report = verify(Unbounded(), quick=True)
+    assert report.passed, str(report)
+    assert "gain 0 to 0.25" in report.cards[0].covered
+
+
+def test_inner_materials_are_tried_as_well_and_the_same_seed_tries_the_same() -> None:
+    one = subject.of(go.mix(go.Lambert(0.3), go.Conductor.preset("Au", alpha=0.3), 0.4))
+    first, second = ([place.words for place in box.places(one, EFFORTS["default"], 3)] for _ in range(2))
+    assert first == second and len(first) == EFFORTS["default"].places
+    assert any("b.alpha = " in words for words in first)

@@ -1,0 +1,87 @@
+"""The answers do not depend on how a renderer asks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+import pytest
+from gonio import ops
+from gonio.ops import backend
+from gonio.verify import verify
+
+PLUGIN = """
+import drjit as dr
+import gonio.mitsuba
+import mitsuba as mi
+
+class Matte(mi.BSDF):
+    def __init__(self, props):
+        mi.BSDF.__init__(self, props)
+        flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
+        self.m_components, self.m_flags = [flags], flags
+
+    def eval(self, ctx, si, wo, active=True):
+        asked = ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 0)
+        lit = (si.wi.z > 0) & (wo.z > 0) & active & asked
+        return dr.select(lit, mi.Color3f(0.5 * dr.inv_pi * wo.z), mi.Color3f(0))
+
+    def pdf(self, ctx, si, wo, active=True):
+        asked = ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 0)
+        return dr.select((si.wi.z > 0) & (wo.z > 0) & active & asked, dr.inv_pi * wo.z, mi.Float(0))
+
+    def eval_pdf(self, ctx, si, wo, active=True):
+        return self.eval(ctx, si, wo, active) * FACTOR, self.pdf(ctx, si, wo, active)
+
+    def sample(self, ctx, si, u1, u2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f, dr.width(si.wi))
+        bs.wo = mi.warp.square_to_cosine_hemisphere(u2)
+        bs.pdf, bs.eta = self.pdf(ctx, si, bs.wo, active), 1.0
+        bs.sampled_type, bs.sampled_component = mi.UInt32(+mi.BSDFFlags.DiffuseReflection), mi.UInt32(0)
+        return bs, dr.select(bs.pdf > 0, mi.Color3f(0.5), mi.Color3f(0))
+
+mi.register_bsdf("NAME", lambda props: Matte(props))
+"""
+
+
+class OfTheBatch(go.Lambert):
+    """Normalized by the brightest of all rays that are asked together."""
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        if backend.is_drjit(wi):
+            largest = backend.drjit().max(wi.z)
+            return super().eval(wo, wi, mode) * (1.0 / ops.maximum(largest, 0.1))
+        return super().eval(wo, wi, mode)
+
+
+class SaysOpaque(go.Dielectric):
+    """Glass that declares to let nothing through."""
+
+    @property
+    def transmits(self) -> bool:
+        return False
+
+
+def test_an_answer_that_depends_on_the_batch_is_caught() -> None:
+    verdict = verify(OfTheBatch(), quick=True, law="calls")["calls"]
+    assert verdict.failed and any(line.startswith("one row at a time") for line in verdict.why)
+
+
+def test_a_declared_fact_is_held_to() -> None:
+    why = verify(SaysOpaque(alpha=0.3), quick=True, law="calls")["calls"].why
+    assert any("`transmits` says that none does" in line for line in why), why
+
+
+@pytest.mark.parametrize("material", [go.Lambert(), go.Dielectric(alpha=0.2), go.Conductor(alpha=0.01), go.Mirror()])
+def test_sound_materials_pass(material: go.BSDF) -> None:
+    assert verify(material, quick=True, law="calls")["calls"].status == "pass"
+
+
+def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) -> None:
+    for name, factor in (("calls_sound", "1.0"), ("calls_wrong", "2.0")):
+        (tmp_path / f"{name}.py").write_text(PLUGIN.replace("NAME", name).replace("FACTOR", factor))
+    assert verify(f"{tmp_path}/calls_sound.py:calls_sound", quick=True).passed
+    verdict = verify(f"{tmp_path}/calls_wrong.py:calls_wrong", quick=True, law="calls")["calls"]
+    assert verdict.failed and "eval_pdf's value is not eval: 2 times as much" in verdict.why[0]
+    assert verdict.grade == "broken" and "2" in verdict.cause

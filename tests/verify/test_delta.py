@@ -1,0 +1,73 @@
+"""Delta lobes are judged like any other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gonio as go
+import pytest
+from gonio import ops
+from gonio.verify import verify
+
+
+class NoRadianceFactor(go.Dielectric):
+    """Smooth glass whose radiance is not divided by eta^2."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        return super().sample(wo, u, "importance")
+
+
+class BentTheWrongWay(go.Dielectric):
+    """Smooth glass that refracts by 1 / eta."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        s = super().sample(wo, u, mode)
+        through = wo.z * s.wi.z < 0.0
+        x, y = -wo.x * s.eta, -wo.y * s.eta
+        z = ops.sqrt(ops.maximum(1.0 - x * x - y * y, 0.0))
+        bent = ops.vec3(x, y, ops.copysign(z, s.wi.z))
+        fine = through & (x * x + y * y < 1.0)
+        return s._replace(wi=ops.where(fine, bent, s.wi))
+
+
+class DimmerFromBehind(go.Mirror):
+    """A mirror that reflects less along one azimuth."""
+
+    def sample(self, wo: Any, u: Any, mode: str = "radiance") -> Any:
+        s = super().sample(wo, u, mode)
+        return s._replace(weight=s.weight * ops.where(wo.x > 0.0, 1.0, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("mistake", "why", "cause"),
+    [
+        (NoRadianceFactor(alpha=0.0), "1 times as much radiance as power", "the factor 1 / eta^2 is missing"),
+        (BentTheWrongWay(alpha=0.0), "not refracted by Snell's law", "Snell's law holds with 1 / eta"),
+        (DimmerFromBehind(), "a turn of the view changes what the lobe carries", ""),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, go.BSDF) else None,
+)
+def test_a_mistake_is_named(mistake: go.BSDF, why: str, cause: str) -> None:
+    verdict = verify(mistake, quick=True, law="delta")["delta"]
+    assert verdict.failed and any(why in line for line in verdict.why), verdict.why
+    assert cause in verdict.cause and verdict.grade == "broken"
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [
+        go.Mirror(0.8),
+        go.Dielectric(1.5, 0.0),
+        go.Dielectric(0.7, 0.0, albedo=(0.2, 0.5, 0.9)),
+        go.Dielectric(1.0, 0.0),
+        go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
+    ],
+    ids=str,
+)
+def test_sound_lobes_pass(sound: go.BSDF) -> None:
+    verdict = verify(sound, quick=True, law="delta")["delta"]
+    assert verdict.status == "pass", verdict.why
+
+
+def test_a_material_without_one_is_not_asked() -> None:
+    assert verify(go.Lambert(), quick=True, law="delta")["delta"].status == "does not apply"

@@ -1,0 +1,55 @@
+"""Mistakes by people who had not read the laws, and sound materials that look strange; see `tests/mutants`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from gonio.verify import verify
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from referee import Case, cases
+
+ALL = cases()
+# what no trial of values can tell, and why
+MISSES = {
+    "second.delta.CoatWeightUnshared": "a coat that is dimmer by a constant is a tinted one",
+    "second.protocol.GlossCached": "the copy that is judged fills the cache anew",
+}
+# one of each kind, whose law is fast
+FEW = (
+    "first.smooth.MatteCosineTwice",
+    "first.corners.CoatAtOne",
+    "first.plugins.EvalPdfBare",
+    "second.delta.MirrorDeclaredNever",
+    "second.plugins.GlassOneComponent",
+    "second.sound.CornerCube",
+    "second.sound.Grating",
+    "first.sound.Checker",
+)
+
+
+def by_name(name: str) -> Case:
+    return next(case for case in ALL if case.name == name)
+
+
+def test_there_are_enough_of_both() -> None:
+    assert sum(not case.sound for case in ALL) >= 120
+    assert sum(case.sound for case in ALL) >= 40
+    assert all(case.fault for case in ALL if not case.sound)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_a_mistake_is_caught_and_a_sound_material_passes(name: str) -> None:
+    case = by_name(name)
+    report = verify(case.target, quick=True)  # type: ignore[arg-type]
+    assert report.passed == case.sound, f"{case.fault}\n{report}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
+def test_every_mistake_is_caught_and_every_sound_material_passes(case: Case) -> None:
+    report = verify(case.target)  # type: ignore[arg-type]
+    assert report.passed == (case.sound or case.name in MISSES), f"{case.fault}\n{report}"
