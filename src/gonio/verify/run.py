@@ -81,7 +81,8 @@ def verify(
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
     if isolated is None:
         # what a program has registered, it alone knows
-        isolated = all(isinstance(one, str) for one in all_) and not members.registered and bool(sys.executable)
+        own = any(name in one for one in all_ if isinstance(one, str) for name in members.registered)
+        isolated = all(isinstance(one, str) for one in all_) and not own and bool(sys.executable)
     if isolated:
         from . import child
 
