@@ -30,6 +30,7 @@ RAYS = 96  # pairs of directions for each of them
 WIDE = 30.0  # a range whose ends differ by more is scanned and drawn from in equal ratios
 JUMP = 6.0  # how many times its neighbours' a step must be
 LEAST = 0.004  # and how large, as a share of the value: what is smaller no one sees
+DEAR = 1  # place of a material whose values must not vary from ray to ray
 MARGIN = 0.02  # of a range, where its ends are left out
 SMALLEST = 1e-4  # of a range that starts at 0, where equal ratios have no first step
 
@@ -122,10 +123,13 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     along = axes(subject)
     if not along or effort.places <= 0:
         return []
+    # what must be the same for all rays is worked out anew for each value, which takes seconds
+    most = min(effort.places, DEAR) if subject.model.needs_uniform else effort.places
     rng = np.random.default_rng([seed, 71])
     wanted: list[tuple[str, dict[str, Any]]] = []
-    for jump in jumps(subject, along, seed)[: max(2, effort.places // 3)]:
-        wanted.append(("jump", jump))
+    if not subject.model.needs_uniform:
+        for jump in jumps(subject, along, seed)[: max(2, most // 3)]:
+            wanted.append(("jump", jump))
     corners = [{axis.path: axis.at(float(end)) for axis in along} for end in (0, 1)]
     if len(along) > 1:
         for _ in range(2):
@@ -140,7 +144,7 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
                 wanted.append((why, rest.pop(0)))
     made: list[Place] = []
     for why, values in wanted:
-        if len(made) >= effort.places:
+        if len(made) >= most:
             break
         values = {path: float(value) for path, value in values.items()}
         if any(values == place.values for place in made):

@@ -113,7 +113,7 @@ def measured(base: BSDF) -> Measured:
         inverse=types.float(_inverse(np.asarray(dr.detach(lost).numpy(), float))),
         scale=lobe.over_pi(average),
         average=average,
-        F_avg=clamp(mean_albedo / (1.0 - average), 0.0, 1.0),
+        F_avg=clamp(mean_albedo / maximum(1.0 - average, 1e-6), 0.0, 1.0),  # a black base has none
     )
 
 

@@ -81,6 +81,11 @@ class KullaConty(_Compensated):
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
+        "precision": Breach(
+            "a measured base is drawn from anew in each precision",
+            lambda model: 0.01 if model.needs_uniform else 0.0,
+            certain=False,
+        ),
         "energy": Breach(
             "tables of rough glass, and of two widths, are met to so much (benchmarks/energy.py)",
             _off,

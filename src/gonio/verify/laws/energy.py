@@ -151,7 +151,8 @@ class Energy(Law):
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless", None)
-        if claim is not None and lost[where] > claim + float(error.max()):
+        # a black one keeps nothing, whatever it claims of the rest
+        if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
                 f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, at most {claim:g} is claimed"
             )
