@@ -99,7 +99,10 @@ def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):
 
 @pytest.mark.parametrize("base", [go.OrenNayar(0.8, 0.5), go.Phong(0.1, 0.4, 30.0)], ids=lambda m: m.name)
 def test_every_law_holds_or_is_declared(base):
-    assert go.verify(go.KullaConty(base), quick=True).passed
+    # not gradients, for which the base is measured a dozen times: they are tested below
+    laws = ["positivity", "reciprocity", "energy", "pdf", "weight", "isotropy", "precision", "calls"]
+    report = go.verify(go.KullaConty(base), quick=True, law=laws)
+    assert report.passed, str(report)
 
 
 def test_a_new_value_compiles_no_kernel():

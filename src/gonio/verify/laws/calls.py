@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...models import BSDF
-from ...ops import Mode, Precision, backend
+from ...ops import Precision, backend
 from ...render.answers import Answer
 from .. import directions, severity
 from ..causes import Ratio
@@ -78,22 +78,24 @@ def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
 
 
 def _answers(
-    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision, mode: Mode = "radiance"
-) -> dict[str, np.ndarray]:
-    """eval, pdf and all of sample, rows (N, ...), asked as a renderer does: of Dr.Jit vectors, rows may be anything."""
+    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision, times: int = 1
+) -> list[dict[str, np.ndarray]]:
+    """eval, pdf and all of sample, rows (N, ...), asked as a renderer does: of Dr.Jit vectors, rows may be anything.
+
+    times  that each is asked, one time straight after the other: an answer for each
+    """
     types = backend.types(precision)
     model = subject.bound(precision)
     a, b, c = (backend.vector_of(w, 3, types) for w in (wo, wi, u))
-    s = guarded(subject.model, "sample", lambda: model.sample(a, c, mode))
-    asked: dict[str, Any] = {
-        "eval": guarded(subject.model, "eval", lambda: model.eval(a, b, mode)),
-        "pdf": guarded(subject.model, "pdf", lambda: model.pdf(a, b)),
-        "sample's weight": s[1],
-        "sample's pdf": s[2],
-        "sample's wi": s[0],
-        "sample's eta": s[4],
-    }
-    return {name: _rows(value, len(wo)) for name, value in asked.items()}
+    values: list[dict[str, Any]] = [{} for _ in range(times)]
+    for found in values:
+        found["eval"] = guarded(subject.model, "eval", lambda: model.eval(a, b, "radiance"))
+    for found in values:
+        found["pdf"] = guarded(subject.model, "pdf", lambda: model.pdf(a, b))
+    for found in values:
+        s = guarded(subject.model, "sample", lambda: model.sample(a, c, "radiance"))
+        found |= {"sample's weight": s[1], "sample's pdf": s[2], "sample's wi": s[0], "sample's eta": s[4]}
+    return [{name: _rows(value, len(wo)) for name, value in found.items()} for found in values]
 
 
 def _rows(value: Any, count: int) -> np.ndarray:
@@ -102,7 +104,7 @@ def _rows(value: Any, count: int) -> np.ndarray:
 
 
 def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision) -> Iterator[Answer]:
-    whole = _answers(subject, wo, wi, u, precision)
+    whole, second = _answers(subject, wo, wi, u, precision, 2)
     if subject.stochastic:
         return
     same = SAME[precision]
@@ -110,14 +112,14 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
     def some(rows: Any, answers: dict[str, np.ndarray] = whole) -> dict[str, np.ndarray]:
         return {name: value[rows] for name, value in answers.items()}
 
-    twice = _unlike("asked twice", whole, _answers(subject, wo, wi, u, precision), wo, wi, 0.0)
+    twice = _unlike("asked twice", whole, second, wo, wi, 0.0)
     if twice.wrong:
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return
     yield twice
     for row in range(5):
         one = slice(row, row + 1)
-        alone = _answers(subject, wo[one], wi[one], u[one], precision)
+        (alone,) = _answers(subject, wo[one], wi[one], u[one], precision)
         answer = _unlike("one row at a time", some(one), alone, wo[one], wi[one], same)
         if answer.wrong:
             break
@@ -125,14 +127,14 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
     if precision == "float32":
         times = LARGE // len(wo)
         a, b, c = (np.tile(w, (times, 1)) for w in (wo, wi, u))
-        many = _answers(subject, a, b, c, precision)
+        (many,) = _answers(subject, a, b, c, precision)
         yield _unlike("a million rows", whole, some(slice(-len(wo), None), many), wo, wi, same)
     order = np.random.default_rng(5).permutation(len(wo))
-    mixed = _answers(subject, wo[order], wi[order], u[order], precision)
+    (mixed,) = _answers(subject, wo[order], wi[order], u[order], precision)
     yield _unlike("rows in another order", some(order), mixed, wo[order], wi[order], same)
     live = np.arange(len(wo)) % 2 == 0
     a, b, c = (np.where(live[:, None], w, np.nan) for w in (wo, wi, u))
-    half = _answers(subject, a, b, c, precision)
+    (half,) = _answers(subject, a, b, c, precision)
     yield _unlike("half the rows dead", some(live), some(live, half), wo[live], wi[live], same)
 
 
