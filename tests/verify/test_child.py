@@ -112,9 +112,9 @@ def judged(file: Path, name: str, **more: object) -> Report:
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("LoopsInPython", "no end after 2 s"),
-        ("IsDeaf", "no end after 2 s"),
-        ("LoopsInAKernel", "no end after 2 s"),
+        ("LoopsInPython", "no end after 6 s"),
+        ("IsDeaf", "no end after 6 s"),
+        ("LoopsInAKernel", "no end after 6 s"),
         ("Allocates", "more than 1 GB of memory"),
         ("Aborts", "the process died: SIGABRT"),
         ("Leaves", "the process ended itself with exit code 0"),
@@ -123,7 +123,8 @@ def judged(file: Path, name: str, **more: object) -> Report:
     ],
 )
 def test_what_brings_the_process_down_fails_the_laws_that_need_it(file: Path, name: str, words: str) -> None:
-    report = judged(file, name, limit=2.0, memory=1.0)
+    # the laws that hold must be done by then on a slow machine, and so must what takes memory before it takes time
+    report = judged(file, name, limit=6.0 if "no end" in words else 60.0, memory=1.0)
     statuses = {verdict.law: verdict.status for verdict in report.cards[0].verdicts}
     assert statuses == {"reciprocity": "pass", "weight": "fail", "isotropy": "pass"}
     assert words in report["weight"].why[0]
