@@ -115,7 +115,7 @@ def _card(card: Card, number: int) -> str:
         rows.append(f"<tr><td>{v.number}<td><a href='#{anchor}'>{v.law}</a><td>{_pill(v)}<td>{figure}<td>{allowed}")
         if v.status != NOT_APPLICABLE:
             details.append(_detail(v, anchor))
-    below = [*card.notes, *([card.quality.words] if card.quality else [])]
+    below = [*filter(None, [card.covered]), *card.notes, *([card.quality.words] if card.quality else [])]
     lines = "".join(f"<p class=soft>{html.escape(line)}</p>" for line in below)
     return (
         f"<h2>{html.escape(card.title)}</h2>"
