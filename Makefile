@@ -43,11 +43,14 @@ browser: .venv/installed
 	|| $(BIN)/playwright install chromium \
 	|| echo "NO BROWSER could be found or installed: tests in WebGL and WebGPU will be skipped, nothing is tried there" >&2
 
+# two processes, each with files of its own: Python traces kernels on one core, whatever Dr.Jit does with the others
+PARALLEL := -n 2 --dist loadfile
+
 test: .venv/installed browser lint
-	$(BIN)/python -m pytest -m 'not slow'
+	$(BIN)/python -m pytest $(PARALLEL) -m 'not slow'
 
 test-all: .venv/installed browser lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PARALLEL)
 
 bench: .venv/installed
 	$(BIN)/python benchmarks/startup.py

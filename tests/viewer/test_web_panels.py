@@ -28,6 +28,7 @@ MODELS = (
     go.OrenNayar(albedo=(0.7, 0.5, 0.2), sigma=0.4),
 )
 TIGHT = 1e-5  # relative error that is always allowed
+SMALLER = {"width": 960, "height": 540}  # where a whole picture is awaited, or carried over to Python
 MOVES = 8  # times the change of the float64 value when the directions move by one float32: narrow lobes are steep
 
 
@@ -309,6 +310,7 @@ def test_wipe_shows_one_picture_on_each_side(fresh: Opened) -> None:
 
 
 def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
+    fresh.tab.set_viewport_size(SMALLER)
     open_panel(fresh, "compare")
     fresh.tab.evaluate("gonio.app.store.setPanel('compare', { pixels: 'all', kind: 'relative' })")
     fresh.tab.evaluate("gonio.app.store.set('compare.mode', 'difference')")
@@ -346,6 +348,7 @@ def test_smaller_reference_is_compared_with_averages(fresh: Opened) -> None:
 
 
 def test_probe_reads_the_pixel(fresh: Opened) -> None:
+    fresh.tab.set_viewport_size(SMALLER)
     body = open_panel(fresh, "probe")
     # opening the dock makes the canvas lower, and the picture begins anew when the browser says so
     fresh.tab.wait_for_timeout(300)
