@@ -19,10 +19,10 @@ from typing import NamedTuple
 from gonio.verify import Report, verify
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
-FILES = ("first", "second")
+FILES = ("first", "second", "third", "fourth")
 PARTS = (
     "smooth", "anisotropic", "corners", "compensated", "plugins", "sound", "delta", "transmitting", "numerical",
-    "protocol",
+    "protocol", "sound_plugins",
 )  # fmt: skip
 
 
