@@ -10,18 +10,20 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from ..energy.albedo import cubature
-from . import causes, directions, severity
-from .causes import Cause
+from . import directions, factors, severity
 from .figures import SampleCells
+from .ratio import NUMBERS, Cause, written
 
 if TYPE_CHECKING:
     from .subject import Subject
+
+Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of (wo, wi), (N, 3) each: (N,)
 
 BLOCK = 10  # rows and columns of cells that are joined: a difference is told from noise in few, well-filled ones
 FULL = 25.0  # expectation of a block that counts
@@ -118,15 +120,15 @@ def named(subject: Subject, held: Blocks) -> Cause | None:
                 continue
         if left > max(EFFECT, 0.0) or left > 0.1 * before:
             continue
-        text = causes.written(scale, KNOWN)
-        if text not in causes.NUMBERS:
+        text = written(scale, KNOWN)
+        if text not in NUMBERS:
             text = f"{scale:.3g}"
         plain = abs(scale - 1.0) < 0.01
-        if not plain and formula != "1" and text not in causes.NUMBERS:
+        if not plain and formula != "1" and text not in NUMBERS:
             continue
-        known = causes.NUMBERS.get(text, 1.0 if plain else scale)
+        known = NUMBERS.get(text, 1.0 if plain else scale)
 
-        def weighed_pdf(o: np.ndarray, i: np.ndarray, k: float = known, by: causes.Field = field) -> np.ndarray:
+        def weighed_pdf(o: np.ndarray, i: np.ndarray, k: float = known, by: Field = field) -> np.ndarray:
             value = np.nan_to_num(subject.pdf(o, i) * by(o, i) * k, posinf=0.0, neginf=0.0)
             return value[:, None]
 
@@ -154,7 +156,7 @@ def _effect(expected: np.ndarray, seen: np.ndarray) -> float:
     return float(np.sqrt(max(square, 0.0) / max(seen.sum(), 1.0)))
 
 
-def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
+def _fields(subject: Subject) -> Iterator[tuple[str, str, Field]]:
     """Factors from simple to less so."""
     yield "1", "a constant of the pdf", lambda o, i: np.ones(len(o))
 
@@ -171,7 +173,7 @@ def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
     names = ("(o.m)", "cos_m", "cos_i")
 
     def product(o: np.ndarray, i: np.ndarray, powers: tuple[int, ...]) -> np.ndarray:
-        m = causes.half_vector(o, i)
+        m = factors.half_vector(o, i)
         values = np.stack([np.sum(o * m, axis=1), m[:, 2], i[:, 2]], axis=1)
         return np.prod(np.maximum(np.abs(values), 1e-9) ** np.array(powers), axis=1)
 
@@ -181,28 +183,28 @@ def _fields(subject: Subject) -> Iterator[tuple[str, str, causes.Field]]:
                 if np.count_nonzero(powers) != count:
                     continue
                 powers_of = dict(zip(names, powers, strict=True))
-                guess = " and ".join(causes.Cosines.GUESSES[name] for name, p in powers_of.items() if p)
-                yield (causes.product("", powers_of), guess, functools.partial(product, powers=powers))
-    for eta in causes.index_below(subject):
+                guess = " and ".join(factors.Cosines.GUESSES[name] for name, p in powers_of.items() if p)
+                yield (factors.product("", powers_of), guess, functools.partial(product, powers=powers))
+    for eta in factors.index_below(subject):
         for place, side in (("", 0.0), (" from outside", 1.0), (" from inside", -1.0)):
             for power in (2, -2, 4, -4):
-                formula = f"{causes.product('', {'eta': power})} in transmission{place}"
+                formula = f"{factors.product('', {'eta': power})} in transmission{place}"
                 field = functools.partial(_through, eta=eta, side=side, power=float(power))
                 yield formula, "eta^2 of the Jacobian of refraction", field
-    for text, guess, other in causes.widths(subject):
+    for text, guess, other in factors.widths(subject):
 
         def replaced(o: np.ndarray, i: np.ndarray, other: Subject = other) -> np.ndarray:
             plain = subject.pdf(o, i)
             return np.divide(other.pdf(o, i), plain, out=np.zeros(len(o)), where=plain > 0.0)
 
         yield f"those of {text}", guess, replaced
-    width = causes.width_of(subject)
+    width = factors.width_of(subject)
     if width is not None and not subject.transmits:
-        for text, exponent in causes.POWERS.items():
+        for text, exponent in factors.POWERS.items():
 
             def narrower(o: np.ndarray, i: np.ndarray, exponent: float = exponent) -> np.ndarray:
-                m = causes.half_vector(o, i)
-                return causes.ggx(m, width**exponent) / causes.ggx(m, width)
+                m = factors.half_vector(o, i)
+                return factors.ggx(m, width**exponent) / factors.ggx(m, width)
 
             yield f"D({text}) / D(alpha) of GGX", "alpha against alpha^2", narrower
 

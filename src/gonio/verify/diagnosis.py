@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import GonioError, GonioWarning
 from . import causes
-from .causes import Cause, Ratio
 from .effort import Effort
 from .laws import Law
+from .ratio import Cause, Ratio
 from .severity import Grade
 from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, Finding, Verdict

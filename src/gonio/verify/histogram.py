@@ -19,9 +19,9 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
+from ..energy.albedo.cells import Seen, product, rim, step_aside
 from ..ops import backend
 from ..ops.backend import Array, Types
-from ..optics.special import gauss
 from ..render.sampler import mix, unit
 from . import directions, statistics
 from .subject import Subject, guarded
@@ -211,18 +211,21 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     unsettled = np.zeros(len(grid.wo))
     for depth in range(DEPTH):
         place = row[owner], side[owner], box
-        (two, _, _), (three, _, _), (four, low, high) = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
+        two, three, seen = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
+        four = seen.integral
         # the error of four nodes is far below the difference from two: for smooth cells its square, over the value.
         # Where a step runs through the middle, two and four agree by chance, and three does not.
-        off = np.maximum(0.3 * np.abs(four - two), np.abs(four - three))
+        rough = np.abs(four - three.integral)
+        off = np.maximum(0.3 * np.abs(four - two.integral), rough)
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
-        aside = _step_aside(look(*place, *_RIM), box, low, high)
-        divide = (off > allowed) | (aside > allowed) | ((high <= 0.0) & (aside > 0.0))
+        area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
+        aside = area * step_aside(seen, look(*place, *_RIM))
+        divide = (off > allowed) | (aside > allowed) | ((seen.most <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
         if 4 * divide.sum() > LARGEST:  # a pdf that is rough everywhere: the roughest cells, and the rest as it is
             worst = np.argsort(-np.where(divide, off / allowed, 0.0))
             divide[worst[LARGEST // 4 :]] = False
-        np.add.at(unsettled, row[owner[~divide]], np.maximum(np.abs(four - three), aside)[~divide])
+        np.add.at(unsettled, row[owner[~divide]], np.maximum(rough, aside)[~divide])
         np.add.at(cells, owner[~divide], four[~divide])
         if not divide.any():
             break
@@ -237,43 +240,8 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
     return Expectation(shaped, shaped.sum((1, 2, 3)), unsettled)
 
 
-class _Nodes(NamedTuple):
-    """Places (s, t) in [0, 1]^2 of a cell, and their weights, (K,) each."""
-
-    s: np.ndarray
-    t: np.ndarray
-    weight: np.ndarray
-
-
-def _gauss(order: int) -> _Nodes:
-    x, w = gauss(order)
-    s, t = np.meshgrid(x, x, indexing="ij")
-    return _Nodes(s.ravel(), t.ravel(), np.outer(w, w).ravel())
-
-
-_GAUSS = {order: _gauss(order) for order in (2, 3, 4)}
-_OUTSIDE = 0.07  # the share of a cell's width beyond the first of four nodes
-# just inside a cell's corners and the middles of its sides, as shares of its width
-_NEAR = np.array([(a, b) for a in (1e-4, 0.5, 0.9999) for b in (1e-4, 0.5, 0.9999) if (a, b) != (0.5, 0.5)])
-_RIM = _Nodes(_NEAR[:, 0], _NEAR[:, 1], np.zeros(len(_NEAR)))
-
-
-def _step_aside(rim: Seen, box: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """What is lost, or taken for lit, between a cell's rim and its nodes, whose values span [low, high], where the pdf
-    on the rim is quite another: total reflection and the horizon end a density with a step."""
-    a, b, c, d = box.T
-    strip = _OUTSIDE * (b - a) * (d - c)
-    more = np.where(rim.most > 4.0 * high, rim.most - high, 0.0)
-    less = np.where(4.0 * rim.least < low, low - rim.least, 0.0)
-    return strip * np.maximum(more, less)
-
-
-class Seen(NamedTuple):
-    """Of each box: its integral by the nodes' weights, and the least and the most pdf at them."""
-
-    integral: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
+_GAUSS = {order: product(order) for order in (2, 3, 4)}
+_RIM = rim(1e-4)
 
 
 class _Look(Protocol):

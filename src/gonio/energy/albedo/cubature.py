@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from ...ops import Direction, Scalar, backend
-from ...optics.special import gauss
+from .cells import Nodes, Seen, product, rim, step_aside
 
 ORDER = 4  # nodes a side: exact for polynomials of degree 7, and cheap enough to divide further instead
 ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
@@ -24,43 +24,7 @@ SEEDED = 17  # halvings around samples
 LARGEST = 600_000  # cells evaluated in one round, some 10 M directions
 
 
-class _Nodes(NamedTuple):
-    """Places in [0, 1]^2 of a cell, and their weights, (K,) each."""
-
-    s: np.ndarray
-    t: np.ndarray
-    weight: np.ndarray
-
-
-def _product(order: int) -> _Nodes:
-    x, w = gauss(order)
-    s, t = np.meshgrid(x, x, indexing="ij")
-    return _Nodes(s.ravel(), t.ravel(), np.outer(w, w).ravel())
-
-
-_GAUSS, _FEWER = _product(ORDER), _product(ORDER - 1)
-_OUTSIDE = 0.07  # the share of a cell's width beyond the first of four nodes
-# just inside a cell's corners and the middles of its sides; no integral, so an even weight, to compare with the nodes'
-_NEAR = np.array([(a, b) for a in (1e-3, 0.5, 0.999) for b in (1e-3, 0.5, 0.999) if (a, b) != (0.5, 0.5)])
-_RIM = _Nodes(_NEAR[:, 0], _NEAR[:, 1], np.full(len(_NEAR), 1.0 / len(_NEAR)))
-
-
-class _Seen(NamedTuple):
-    """Of each cell: the integral (cells, channels), and the least and the most of its integrand times its area."""
-
-    integral: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
-
-
-def _aside(seen: _Seen, rim: _Seen) -> np.ndarray:
-    """What is lost, or taken for lit, between the rim of cells and their nodes, where the rim is quite another: a step
-    that runs there is seen by no rule."""
-    with np.errstate(invalid="ignore"):  # values that are no numbers are for other laws to find
-        more = np.where(rim.most > 4.0 * seen.most, rim.most - seen.most, 0.0)
-        less = np.where(4.0 * rim.least < seen.least, seen.least - rim.least, 0.0)
-    return _OUTSIDE * np.maximum(more, less)
-
+_GAUSS, _FEWER, _RIM = product(ORDER), product(ORDER - 1), rim(1e-3)
 
 Integrand: TypeAlias = Callable[[Direction, Direction], Iterable[Scalar]]  # of Dr.Jit vectors of 64 bits
 # (wo, u) of rows (N, 3) -> a Sample of arrays: where cells are divided first
@@ -121,12 +85,12 @@ def integrate(
     allowed = tolerance / 400.0  # some hundreds of cells carry an integral's error
     for depth in range(DEPTH):
         fine_cells = cells.quarters()
-        seen, other, rim = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
+        seen, other, around = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
         fine = seen.integral.reshape(-1, 4, channels)
         difference = np.abs(coarse - fine.sum(1))
         # a step that many cells share, such as the rim of a cone about the normal, may fool one rule by chance in all
         difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
-        difference += 0.02 * _aside(seen, rim).reshape(-1, 4, 1).sum(1)  # steps err both ways, and cancel
+        difference += 0.02 * step_aside(seen, around).reshape(-1, 4, 1).sum(1)  # steps err both ways, and cancel
         divide = difference.max(1) > allowed
         if depth == DEPTH - 1 or 16 * divide.sum() > LARGEST:
             divide[:] = False
@@ -182,7 +146,7 @@ def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: 
     return ((row.astype(np.int64) * 2 + below) * n_a + a) * n_b + b
 
 
-def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: _Nodes) -> _Seen:
+def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: Nodes) -> Seen:
     """The integrand at nodes of every cell."""
     dr = backend.drjit()
     types = backend.types("float64")
@@ -210,5 +174,5 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: _Nodes) -> 
         whole = sum(value[1:], start=value[0]) * area
         ends = [dr.block_reduce(op, whole, many) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         dr.eval(sums, ends)
-        parts.append(_Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))
-    return _Seen(*[np.concatenate(column) for column in zip(*parts, strict=True)])
+        parts.append(Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))
+    return Seen(*[np.concatenate(column) for column in zip(*parts, strict=True)])

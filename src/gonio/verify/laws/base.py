@@ -9,8 +9,8 @@ import numpy as np
 
 from ...members import Family, instances_of
 from .. import directions
-from ..causes import Cause, Ratio
 from ..effort import Effort
+from ..ratio import Cause, Ratio
 from ..severity import Bias
 from ..subject import Fault, Subject
 from ..verdict import Finding

@@ -11,8 +11,8 @@ from ...models import BSDF
 from ...ops import Precision, backend
 from ...render.answers import Answer
 from .. import directions, severity
-from ..causes import Ratio
 from ..effort import Effort
+from ..ratio import Ratio
 from ..subject import Subject, guarded
 from ..verdict import Finding
 from .base import Law, pair_in_words, pairs

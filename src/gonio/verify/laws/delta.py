@@ -12,9 +12,9 @@ import numpy as np
 from ...models import BSDF, binding, tree
 from ...ops import backend
 from .. import directions, lobes, severity, statistics
-from ..causes import Cause
 from ..effort import Effort
 from ..lobes import Lobes
+from ..ratio import Cause
 from ..subject import Subject, guarded
 from ..verdict import DoesNotApply, Finding, Trial
 from .base import Law

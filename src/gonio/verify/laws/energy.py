@@ -12,9 +12,10 @@ from ...errors import InputError
 from ...models import BSDF
 from ...ops import Mode, backend
 from .. import directions, histogram, lobes, severity, statistics
-from ..causes import SPREAD, Cause, factor_key, place_of, written
+from ..causes import place_of
 from ..effort import Effort
 from ..figures import AlbedoCurves
+from ..ratio import SPREAD, Cause, factor_key, written
 from ..subject import Subject, guarded
 from ..verdict import Finding, Trial
 from .base import Law

@@ -10,8 +10,8 @@ import numpy as np
 from ...errors import InputError
 from ...models import BSDF, Parameter, binding, tree
 from ...ops import backend
-from ..causes import Ratio
 from ..effort import Effort
+from ..ratio import Ratio
 from ..severity import Bias
 from ..subject import Subject, guarded
 from ..verdict import DoesNotApply, Finding

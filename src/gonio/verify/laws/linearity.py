@@ -8,8 +8,8 @@ import numpy as np
 
 from ...models import BSDF, models
 from .. import directions, severity
-from ..causes import SPREAD, Cause
 from ..effort import Effort
+from ..ratio import SPREAD, Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of

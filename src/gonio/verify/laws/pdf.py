@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import crowding, directions, histogram, severity
-from ..causes import Cause, nothing_below
+from ..causes import nothing_below
 from ..effort import Effort
 from ..figures import SampleCells
+from ..ratio import Cause
 from ..subject import Subject
 from ..verdict import Finding, Trial
 from .base import Law, pair_in_words, pairs, where_found

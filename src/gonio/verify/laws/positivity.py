@@ -12,8 +12,9 @@ from ...errors import InputError
 from ...models import BSDF, binding
 from ...ops import Precision, backend
 from .. import box, directions, severity
-from ..causes import Cause, place_of
+from ..causes import place_of
 from ..effort import Effort
+from ..ratio import Cause
 from ..subject import Fault, Subject, guarded
 from ..verdict import Finding
 from .base import Law, pair_in_words, pairs, where_found

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from .. import directions, severity, statistics
-from ..causes import Cause, Ratio, index_below
 from ..effort import Effort
+from ..factors import index_below
 from ..figures import ReciprocityMap
+from ..ratio import Cause, Ratio
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding, Trial
 from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
