@@ -49,6 +49,7 @@ class _Described(Native):
     """A BSDF that is built from a dictionary, and built anew where a parameter changes."""
 
     description: ClassVar[PluginDict] = {}
+    plugin: ClassVar[PluginDict] = {}  # of an instance: the description with the values of its parameters
 
     @property
     def by_nature(self) -> Mapping[str, str]:
@@ -59,6 +60,10 @@ class _Described(Native):
     def held(self) -> dict[str, Native]:
         """The BSDFs inside, as materials of their own."""
         return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
+
+    def anew(self) -> Native:
+        """The plugin built once more."""
+        return load(self.plugin)
 
     def around_diffuse(self) -> Native:
         """The same around plain diffuse ones."""
@@ -74,7 +79,8 @@ class _Described(Native):
             if not np.array_equal(value, np.asarray(parameter.default)):
                 rgb = {"type": "rgb", "value": np.broadcast_to(value, 3).tolist()}
                 changed[name] = rgb if name in ALBEDOS else float(value)
-        object.__setattr__(self, "bsdf", _built({**self.description, **changed}))
+        object.__setattr__(self, "plugin", {**self.description, **changed})
+        object.__setattr__(self, "bsdf", _built(self.plugin))
 
 
 def load(description: PluginDict) -> Native:

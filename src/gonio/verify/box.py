@@ -12,6 +12,7 @@ No range is invented: a parameter that declares none stays at its value.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections import Counter
 from typing import Any
@@ -31,7 +32,9 @@ WIDE = 30.0  # a range whose ends differ by more is scanned and drawn from in eq
 JUMP = 6.0  # how many times its neighbours' a step must be
 LEAST = 0.004  # and how large, as a share of the value: what is smaller no one sees
 DEAR = 1  # place of a material whose values must not vary from ray to ray
+MANY = 9  # places for each choice of names that is tried
 MARGIN = 0.02  # of a range, where its ends are left out
+DARK = 0.01  # least albedo of what tells of a failed sample by a weight of 0: a black sample is no failure
 SMALLEST = 1e-4  # of a range that starts at 0, where equal ratios have no first step
 
 
@@ -40,7 +43,7 @@ class Place:
     """A point of the box.
 
     values   what differs from the given material, by path
-    why      "given", "corner", "edge", "interior" or "jump"
+    why      "given", "choice", "corner", "edge", "interior" or "jump"
     subject  the BSDF there
     along    the parameters that move; those of the subject itself where it is the given one
     """
@@ -97,8 +100,12 @@ def axes(subject: Subject) -> list[Axis]:
     found = []
     for leaf in tree.leaves(subject.model):
         ends = _ends(leaf.parameter, leaf.value)
-        if ends is not None:
-            found.append(Axis(leaf.path, *ends))
+        if ends is None:
+            continue
+        low, high, ratio = ends
+        if leaf.parameter.kind == "spectrum" and subject.black_fails:
+            low = max(low, min(DARK, high))
+        found.append(Axis(leaf.path, low, high, ratio))
     return found
 
 
@@ -120,8 +127,8 @@ def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
 
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     """The points to try besides the given one, each once, in order of importance."""
-    along = axes(subject)
-    if not along or effort.places <= 0:
+    along, others = axes(subject), _choices(subject)
+    if not (along or others) or effort.places <= 0:
         return []
     # what must be the same for all rays is worked out anew for each value, which takes seconds
     most = min(effort.places, DEAR) if subject.model.needs_uniform else effort.places
@@ -130,13 +137,14 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     if not subject.model.needs_uniform:
         for jump in jumps(subject, along, seed)[: max(2, most // 3)]:
             wanted.append(("jump", jump))
-    corners = [{axis.path: axis.at(float(end)) for axis in along} for end in (0, 1)]
+    wanted += [("choice", other) for other in others[: max(1, most // MANY)]]
+    corners = [{axis.path: axis.at(float(end)) for axis in along} for end in (0, 1)] if along else []
     if len(along) > 1:
         for _ in range(2):
             corners.append({axis.path: axis.at(float(rng.integers(2))) for axis in along})
     edges = [{axis.path: axis.at(end)} for axis in along for end in (1.0, 0.0)]
     rng.shuffle(edges)  # type: ignore[arg-type]
-    interior = [{axis.path: axis.at(rng.uniform()) for axis in along} for _ in range(effort.places)]
+    interior = [{axis.path: axis.at(rng.uniform()) for axis in along} for _ in range(effort.places) if along]
     kinds = {"corner": corners, "edge": edges, "interior": interior}
     while any(kinds.values()):
         for why, rest in kinds.items():
@@ -146,13 +154,25 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     for why, values in wanted:
         if len(made) >= most:
             break
-        values = {path: float(value) for path, value in values.items()}
+        values = {path: value if isinstance(value, str) else float(value) for path, value in values.items()}
         if any(values == place.values for place in made):
             continue
         place = _made(subject, values, why, tuple(along))
         if place is not None:
             made.append(place)
     return made
+
+
+def _choices(subject: Subject) -> list[dict[str, str]]:
+    """Each name that a choice has besides the one that was given; of several choices the first of each, then the next,
+    as a change of code costs more than one of a number."""
+    if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
+        return []
+    turns: list[list[dict[str, str]]] = []
+    for leaf in tree.leaves(subject.model):
+        if leaf.parameter.kind == "choice":
+            turns.append([{leaf.path: name} for name in leaf.parameter.choices if name != leaf.value])
+    return [one for turn in itertools.zip_longest(*turns) for one in turn if one is not None]
 
 
 def covered(subject: Subject, tried: list[Place]) -> str:
@@ -162,10 +182,12 @@ def covered(subject: Subject, tried: list[Place]) -> str:
     kinds = Counter(place.why for place in tried)
     words = ", ".join(f"{count} {_PLURAL[why] if count > 1 else why}" for why, count in sorted(kinds.items()))
     ranges = ", ".join(f"{axis.path} {axis.low:g} to {axis.high:.4g}" for axis in axes(subject))
-    return f"judged at the given values and {len(tried)} others ({words}) of {ranges}"
+    named = "; ".join(place.words for place in tried if place.why == "choice")
+    ranges = ", with ".join(filter(None, [ranges and f" of {ranges}", named and f" {named}"])).lstrip()
+    return f"judged at the given values and {len(tried)} others ({words}) {ranges}"
 
 
-_PLURAL = {"corner": "corners", "edge": "edges", "interior": "inside", "jump": "jumps"}
+_PLURAL = {"choice": "choices", "corner": "corners", "edge": "edges", "interior": "inside", "jump": "jumps"}
 
 
 def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis, ...]) -> Place | None:

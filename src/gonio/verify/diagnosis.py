@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import GonioError, GonioWarning
-from . import causes
+from . import causes, reproduction
 from .effort import Effort
 from .laws import Law
 from .ratio import Cause, Ratio
@@ -55,6 +55,7 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", GonioWarning)
             _measure(law, verdict, subject, finding, effort, seed)
+            verdict.reproduction = reproduction.script(law.name, subject, finding)
             if verdict.status == DECLARED:
                 continue
             foreign = _convention(law, subject, judge)

@@ -141,6 +141,9 @@ def _detail(v: Verdict, anchor: str) -> str:
             rows.append(("means", html.escape(v.meaning)))
     if v.cause:
         rows.append(("cause", html.escape(v.cause)))
+    if v.reproduction:
+        program = f"<summary>a program of Mitsuba alone</summary><pre>{html.escape(v.reproduction)}</pre>"
+        rows.append(("without Gonio", f"<details>{program}</details>"))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
     drawn = ""
     if v.evidence is not None:

@@ -139,7 +139,7 @@ class Held(NamedTuple):
             answers.append(diagnosis.Answer(law, verdict, asked.place.subject, found))
 
         def judge(law: Law, other: Subject) -> Verdict:
-            what = _judge(law, other, ELSEWHERE[effort], seed)
+            what = _judge(law, other, EFFORTS[effort], seed)
             return what if isinstance(what, Verdict) else decide(law, other, what, threshold, seed)
 
         diagnosis.explain(answers, EFFORTS[effort], seed, judge)

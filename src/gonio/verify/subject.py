@@ -70,6 +70,11 @@ class Subject:
         return bool(getattr(self.model, "stochastic", False))
 
     @property
+    def black_fails(self) -> bool:
+        """Whether a sample that carries nothing counts as failed: Mitsuba's plugins tell a failure by that alone."""
+        return bool(getattr(self.model, "black_fails", False))
+
+    @property
     def precisions(self) -> tuple[Precision, ...]:
         """The precisions it can be evaluated in, the most precise last."""
         return tuple(getattr(self.model, "precisions", backend.PRECISIONS))
@@ -159,6 +164,11 @@ class Subject:
         model = self.model
         changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
         return Subject(changed, self.target, {**self.settings, **values})
+
+    def anew(self) -> Subject | None:
+        """The same BSDF made again, which has answered nobody; None where that cannot be done."""
+        make = getattr(self.model, "anew", None)
+        return None if make is None else Subject(make(), self.target, self.settings)
 
     def command(self, *more: str) -> str:
         """A command line that puts this BSDF on trial again."""

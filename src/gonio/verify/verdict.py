@@ -81,6 +81,7 @@ class Verdict:
     bias    of a failure or a declared breach, what it does to a picture; None where the law cannot say
     grade   what that is worth; None likewise
     cause   of a failure, what it probably comes from; "" where nothing is clean
+    reproduction  of a failure of one of Mitsuba's plugins, a program that shows it without Gonio
     """
 
     number: int
@@ -102,6 +103,7 @@ class Verdict:
     bias: Bias | None = None
     grade: Grade | None = None
     cause: str = ""
+    reproduction: str = ""
     evidence: Evidence | None = dataclasses.field(default=None, repr=False)
 
     @property

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...models import BSDF
-from ...ops import Precision, backend
+from ...ops import Mode, Precision, backend
 from ...render.answers import Answer
 from .. import directions, severity
 from ..effort import Effort
@@ -72,13 +72,19 @@ def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
     u = directions.numbers(np.random.default_rng([seed, 101]), len(wo))
     for precision in subject.precisions:
         yield from _batches(subject, wo, wi, u, precision)
-    if subject.transmits and not subject.stochastic:
-        yield Answer("mode", _mode(subject, wo, wi))
+    if not subject.stochastic:
+        yield Answer("mode", _mode(subject, wo, wi) if subject.transmits else _one_mode(subject, wo, wi, u))
     yield Answer("declared facts", _facts(subject, wo, wi, u))
 
 
 def _answers(
-    subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision, times: int = 1
+    subject: Subject,
+    wo: np.ndarray,
+    wi: np.ndarray,
+    u: np.ndarray,
+    precision: Precision,
+    times: int = 1,
+    mode: Mode = "radiance",
 ) -> list[dict[str, np.ndarray]]:
     """eval, pdf and all of sample, rows (N, ...), asked as a renderer does: of Dr.Jit vectors, rows may be anything.
 
@@ -89,11 +95,11 @@ def _answers(
     a, b, c = (backend.vector_of(w, 3, types) for w in (wo, wi, u))
     values: list[dict[str, Any]] = [{} for _ in range(times)]
     for found in values:
-        found["eval"] = guarded(subject.model, "eval", lambda: model.eval(a, b, "radiance"))
+        found["eval"] = guarded(subject.model, "eval", lambda: model.eval(a, b, mode))
     for found in values:
         found["pdf"] = guarded(subject.model, "pdf", lambda: model.pdf(a, b))
     for found in values:
-        s = guarded(subject.model, "sample", lambda: model.sample(a, c, "radiance"))
+        s = guarded(subject.model, "sample", lambda: model.sample(a, c, mode))
         found |= {"sample's weight": s[1], "sample's pdf": s[2], "sample's wi": s[0], "sample's eta": s[4]}
     return [{name: _rows(value, len(wo)) for name, value in found.items()} for found in values]
 
@@ -117,6 +123,10 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return
     yield twice
+    fresh = subject.anew()
+    if fresh is not None:
+        (new,) = _answers(fresh, wo, wi, u, precision)
+        yield _unlike("of one that nobody has used", whole, new, wo, wi, same)
     for row in range(5):
         one = slice(row, row + 1)
         (alone,) = _answers(subject, wo[one], wi[one], u[one], precision)
@@ -189,6 +199,18 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
         if np.ptp(ratio) > max(10.0 * same, 1e-3) * np.median(ratio):
             ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
             return f"radiance over power in transmission runs {ends}: one index, one factor"
+    return ""
+
+
+def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
+    """Reflection knows nothing of the mode."""
+    radiance, power = (_answers(subject, wo, wi, u, subject.best, mode=mode)[0] for mode in ("radiance", "importance"))
+    for name in ("eval", "sample's weight"):
+        a, b = radiance[name], power[name]
+        off = np.abs(a - b) / np.maximum(np.maximum(np.abs(a), np.abs(b)), SMALL * np.abs(a).max(initial=1e-3))
+        row = int(np.argmax(off.max(1)))
+        if off[row].max() > SAME[subject.best]:
+            return f"{name} changes by {off[row].max():.2g} with the mode, {pair_in_words(wo[row], wi[row])}"
     return ""
 
 

@@ -62,7 +62,7 @@ class Energy(Law):
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
             finding.trials.append(Trial(p, text, again))
         self._known(subject, wo, value, error, finding)
-        white = _white(subject)
+        white = white_twin(subject)
         if white is None and getattr(subject.model, "lossless", None) is not None:
             white = subject  # nothing in it can be whitened, and it claims to lose nothing
         if white is not None:
@@ -76,11 +76,11 @@ class Energy(Law):
         found = [severity.of_sampling(subject)]
         if finding.figure > finding.tolerance:
             found.append(severity.gain(subject))
-            white = _white(subject)
+            white = white_twin(subject)
             if white is not None and found[-1].average == 0.0:
                 gained = severity.gain(white)
                 found.append(dataclasses.replace(gained, where=f"{gained.where}, where nothing is absorbed"))
-        if finding.problems and (white := _white(subject)) is not None:
+        if finding.problems and (white := white_twin(subject)) is not None:
             found.append(severity.loss(white))
         return max(found, key=lambda bias: bias.average)
 
@@ -173,7 +173,8 @@ def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
     """Equal steps in the cosine, and grazing ones, from each side that answers."""
     mu = (np.arange(effort.furnace) + 0.5) / effort.furnace
-    theta = np.concatenate([np.degrees(np.arccos(mu)), GRAZING if effort.full else ()])
+    # the normal itself as well, where tangents and azimuths have no value
+    theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else ()])
     found = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
     return directions.single(np.concatenate(found))
 
@@ -254,7 +255,7 @@ def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np
     return statistics.normal_two_sided(distance / spread)
 
 
-def _white(subject: Subject) -> Subject | None:
+def white_twin(subject: Subject) -> Subject | None:
     """The subject's white twin, every albedo 1 and F = 1; None where it has neither."""
     try:
         twin = subject.model.white()
