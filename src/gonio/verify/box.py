@@ -183,7 +183,7 @@ def covered(subject: Subject, tried: list[Place]) -> str:
     words = ", ".join(f"{count} {_PLURAL[why] if count > 1 else why}" for why, count in sorted(kinds.items()))
     ranges = ", ".join(f"{axis.path} {axis.low:g} to {axis.high:.4g}" for axis in axes(subject))
     named = "; ".join(place.words for place in tried if place.why == "choice")
-    ranges = ", with ".join(filter(None, [ranges and f" of {ranges}", named and f" {named}"])).lstrip()
+    ranges = ", with ".join(filter(None, [ranges and f" of {ranges}", named])).lstrip()
     return f"judged at the given values and {len(tried)} others ({words}) {ranges}"
 
 

@@ -52,6 +52,8 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
     for law, verdict, subject, finding in sorted(failed, key=lambda a: rank.get(a.law.name, len(rank))):
         if finding is None:
             continue  # an exception, or no end: the verdict says so
+        if verdict.status == DECLARED and effort.name == "quick":
+            continue  # what is known needs no half second of a first look
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", GonioWarning)
             _measure(law, verdict, subject, finding, effort, seed)

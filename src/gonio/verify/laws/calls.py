@@ -85,14 +85,23 @@ def _answers(
     precision: Precision,
     times: int = 1,
     mode: Mode = "radiance",
+    lanes: int = 0,
 ) -> list[dict[str, np.ndarray]]:
     """eval, pdf and all of sample, rows (N, ...), asked as a renderer does: of Dr.Jit vectors, rows may be anything.
 
     times  that each is asked, one time straight after the other: an answer for each
+    lanes  a multiple of N: the rows again and again; the answer is that of the last N
     """
+    dr = backend.drjit()
     types = backend.types(precision)
     model = subject.bound(precision)
-    a, b, c = (backend.vector_of(w, 3, types) for w in (wo, wi, u))
+    count = len(wo)
+    given = [backend.vector_of(w, 3, types) for w in (wo, wi, u)]
+    if lanes:
+        index = dr.arange(types.module.UInt32, lanes) % count
+        given = [types.vec3(*[dr.gather(types.float, part, index) for part in w]) for w in given]
+        dr.eval(given)
+    a, b, c = given
     values: list[dict[str, Any]] = [{} for _ in range(times)]
     for found in values:
         found["eval"] = guarded(subject.model, "eval", lambda: model.eval(a, b, mode))
@@ -101,7 +110,21 @@ def _answers(
     for found in values:
         s = guarded(subject.model, "sample", lambda: model.sample(a, c, mode))
         found |= {"sample's weight": s[1], "sample's pdf": s[2], "sample's wi": s[0], "sample's eta": s[4]}
-    return [{name: _rows(value, len(wo)) for name, value in found.items()} for found in values]
+    dr.eval([list(found.values()) for found in values])
+    if lanes:
+        last = dr.arange(types.module.UInt32, count) + (lanes - count)
+        values = [{name: _lanes(value, last, lanes) for name, value in found.items()} for found in values]
+    return [{name: _rows(value, count) for name, value in found.items()} for found in values]
+
+
+def _lanes(value: Any, last: Any, lanes: int) -> Any:
+    """Some lanes of a value; as it is where it has one for all."""
+    dr = backend.drjit()
+    if not dr.is_array_v(value) or dr.width(value) != lanes:
+        return value
+    if dr.is_vector_v(value):
+        return type(value)(*[_lanes(part, last, lanes) for part in value])
+    return dr.gather(type(value), value, last)
 
 
 def _rows(value: Any, count: int) -> np.ndarray:
@@ -135,10 +158,8 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
             break
     yield answer
     if precision == "float32":
-        times = LARGE // len(wo)
-        a, b, c = (np.tile(w, (times, 1)) for w in (wo, wi, u))
-        (many,) = _answers(subject, a, b, c, precision)
-        yield _unlike("a million rows", whole, some(slice(-len(wo), None), many), wo, wi, same)
+        (many,) = _answers(subject, wo, wi, u, precision, lanes=LARGE // len(wo) * len(wo))
+        yield _unlike("a million rows", whole, many, wo, wi, same)
     order = np.random.default_rng(5).permutation(len(wo))
     (mixed,) = _answers(subject, wo[order], wi[order], u[order], precision)
     yield _unlike("rows in another order", some(order), mixed, wo[order], wi[order], same)
