@@ -2,15 +2,18 @@
 
     python docs/make_report_cards.py [--effort quick|default] [--only NAME,...] [--seed 1]
 
-One page a material (README.md is the overview) and cards.json with every figure. Nothing here judges: a cell says which
-law does not hold and by how much, and the command beside it shows it again.
+One page a material, README.md with all that fails in order of severity, cards.json with every figure, and in programs/
+a program of Mitsuba alone for each failure of its plugins. Nothing here judges.
 """
 
 from __future__ import annotations
 
 import argparse
+import datetime
 import json
+import shutil
 import sys
+import time
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,34 +22,61 @@ import gonio as go
 from gonio.render import foreign
 from gonio.verify import Report, verify
 from gonio.verify.laws import laws
+from gonio.verify.severity import Grade, percent
 from gonio.verify.targets import resolve
 from gonio.verify.verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Verdict
 
 FOLDER = Path(__file__).parent / "report-cards"
-WIDTHS = "0.05,0.2,0.5,1"
+PROGRAMS = FOLDER / "programs"
 MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: "-"}
-SHORT = [name for name in laws() if name != "shader"]  # which the browser judges
+SHORT = [name for name, law in laws().items() if not law.on_request]
 
-# what is judged besides the defaults: roughness, and the distribution that a user of either renderer picks
-SWEPT = {
-    "conductor": [[], ["ndf=beckmann"]],
-    "dielectric": [[], ["ndf=beckmann"]],
-    "mitsuba:roughconductor": [[f"distribution={d}", "specular_reflectance=1"] for d in ("ggx", "beckmann")],
-    "mitsuba:roughdielectric": [[f"distribution={d}", "specular_reflectance=1"] for d in ("ggx", "beckmann")],
-    "mitsuba:roughplastic": [["distribution=ggx"], ["distribution=beckmann"]],
-    "mitsuba:principled": [["roughness=0.2"], ["roughness=0.5"], ["roughness=0.5", "metallic=1"]],
+# besides the defaults, what is no number and no choice that the verifier itself would try
+SETTINGS = {
+    "mitsuba:roughconductor": [["distribution=ggx"]],
+    "mitsuba:roughdielectric": [["distribution=ggx"]],
+    "mitsuba:roughplastic": [["distribution=ggx"]],
+}
+
+# worst first; what is no bias of a picture after what is one, what is not its own fault last
+ORDER = [
+    *(Grade.BROKEN, Grade.VISIBLE, Grade.SMALL, Grade.INVISIBLE, Grade.NAN),
+    *(Grade.NOISE, Grade.FITTING, Grade.INTERFACE, Grade.INNER, Grade.BY_NATURE),
+]
+
+# what its authors know of it, or have said of something near: issues and pull requests by number
+UPSTREAM = {
+    ("principled", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
+    ("principledthin", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
+    ("principled", "energy"): "mitsuba3 #465 (closed) is about what its transmission loses",
+    ("blendbsdf", "calls"): "mitsuba2 #151 (open): the component is always 0",
+    ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) mended its pdf and null lobes",
+    ("roughplastic", "positivity"): "mitsuba2 #32 (open): NaN where the cosine is 0",
+    ("roughplastic", "energy"): "mitsuba3 #1155 (closed) is about what it loses when rough",
+    ("hair", "pdf"): "mitsuba3 #871 (merged 2023): its own chi-square test covers few parameters",
 }
 
 EXPLANATION = """
-- *pass*: the law holds within its tolerance. *declared*: the model states that it breaks the law, and how far.
-- **fails** 2/9: the law does not hold for 2 of 9 settings; the page gives each figure and a command that shows it.
+- *pass*: the law holds within its tolerance, at the given values and at those that the page names. *declared*: the
+  model states that it breaks the law, and how far. **fails**, with the grade: *invisible* (under .1 % of the reflected
+  light on average and under 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %), *broken*; *NaN*; *noise* (costs
+  samples, biases nothing); *interface* (calls that plain path tracers do not make); *inner* (what it holds fails, and
+  around a sound one the law holds); *by nature* (what the plugin is meant to be breaks the law).
 - *-*: the law does not apply; the page says why. Mitsuba's plugins are float32, with wider tolerances, and have no
   64-bit twin for `gradients` and `precision`.
 - A sample of weight 0 counts as failed, as in Mitsuba's own chi-square test.
 - BSDFs of BSDFs are judged with plain ones inside: blendbsdf = diffuse + roughconductor, mask, bumpmap and normalmap
   over diffuse, twosided over roughconductor. bumpmap is a uniform slope: a turned normal is by nature neither
   isotropic nor reciprocal about the geometric one. hair is defined about a fibre, not about a surface's normal.
-- Mitsuba's microfacet plugins take Beckmann's distribution by default.
+- Mitsuba's microfacet plugins take Beckmann's distribution by default; here GGX too.
+"""
+
+BLIND = """
+## What this cannot see
+
+One point of a surface (uv = .5, .5) without textures, unpolarized light in three channels, the parameter values above
+and no others, figures below the tolerances; what an integrator does between two surfaces; and whether the formula is
+the right one for the material: a law holds for many wrong formulas.
 """
 
 
@@ -56,12 +86,8 @@ def targets() -> list[str]:
 
 
 def trials(target: str) -> list[Any]:
-    """The subjects of a target: its defaults, and its sweeps."""
-    found = resolve(target)
-    for settings in SWEPT.get(target, []):
-        sweep = f"alpha={WIDTHS}" if "principled" not in target else ""
-        found += resolve(target, settings, sweep)
-    return found
+    """The subjects of a target: its defaults, and other settings."""
+    return [one for settings in ([], *SETTINGS.get(target, [])) for one in resolve(target, settings)]
 
 
 def losses(report: Report) -> dict[str, str]:
@@ -74,36 +100,84 @@ def losses(report: Report) -> dict[str, str]:
 def summary(report: Report, law: str) -> str:
     """One cell: the worst of a law over all settings."""
     verdicts = [card[law] for card in report.cards]
-    for status in (FAIL, DECLARED, PASS):
-        hit = [v for v in verdicts if v.status == status]
-        if hit:
-            return (
-                MARKS[status]
-                if status != FAIL or len(hit) == len(verdicts)
-                else f"**fails** {len(hit)}/{len(verdicts)}"
+    failed = sorted((v for v in verdicts if v.failed), key=_rank)
+    if failed:
+        return f"**{failed[0].grade or 'fails'}**"
+    found = {v.status for v in verdicts}
+    return next(MARKS[status] for status in (DECLARED, PASS, NOT_APPLICABLE) if status in found)
+
+
+def _rank(verdict: Verdict) -> tuple[int, float]:
+    average = -verdict.bias.average if verdict.bias else 0.0
+    return (ORDER.index(verdict.grade) if verdict.grade in ORDER else len(ORDER), average)
+
+
+def findings(target: str, report: Report) -> list[dict[str, Any]]:
+    """All that fails, and the programs that show it."""
+    found = []
+    for card in report.cards:
+        for v in card.verdicts:
+            if not v.failed:
+                continue
+            name = "-".join([target.removeprefix("mitsuba:"), *map(str, card.subject.settings.values()), v.law])
+            if v.reproduction:
+                PROGRAMS.mkdir(exist_ok=True)
+                about = f"# {card.title}: {v.law}. Mitsuba {version('mitsuba')}, {datetime.date.today()}.\n"
+                (PROGRAMS / f"{name}.py").write_text(about + v.reproduction)
+            found.append(
+                {
+                    "rank": _rank(v),
+                    "grade": str(v.grade or "ungraded"),
+                    "title": card.title,
+                    "target": target,
+                    "law": v.law,
+                    "size": _size(v),
+                    "cause": v.cause or "unexplained",
+                    "upstream": UPSTREAM.get((target.removeprefix("mitsuba:"), v.law), ""),
+                    "program": f"programs/{name}.py" if v.reproduction else "",
+                }
             )
-    return MARKS[NOT_APPLICABLE]
+    return found
+
+
+def _size(v: Verdict) -> str:
+    if v.bias is None:
+        return v.shown
+    if v.bias.kind in ("bias", "lost", "gained"):
+        verb = {"bias": "wrong by", "lost": "loses", "gained": "gains"}[v.bias.kind]
+        return f"{verb} {percent(v.bias.average)} on average, {percent(v.bias.worst)} at worst"
+    if v.bias.kind == "interface":
+        return _clean("; ".join(why for why in v.why if "at most" not in why))
+    return _clean(v.bias.where)
 
 
 def page(target: str, report: Report) -> str:
     """The page of one target."""
+    made = f"Mitsuba {version('mitsuba')}, " if ":" in target else ""
     lines = [
         f"# {target}",
         "",
-        f"`gonio verify`, effort {report.effort}, seed {report.seed}; {report.tests} statistical ",
+        f"`gonio verify`, {made}Gonio {go.__version__}, {datetime.date.today()}, effort {report.effort}, seed "
+        f"{report.seed}; {report.tests} statistical tests at {report.threshold:.1e} each (.01 over all, Sidak), "
+        "rejections confirmed with a second seed.",
     ]
-    lines[-1] += f"tests at {report.threshold:.1e} each (.01 over all, Sidak), rejections confirmed with a second seed."
     for card in report.cards:
         lines += ["", f"## {card.title}", "", "| law | verdict | figure | allowed | remark |", "|---|---|---|---|---|"]
         for v in card.verdicts:
             allowed = "" if v.tolerance is None or v.tolerance == float("inf") else f"{v.tolerance:.0e}"
-            lines.append(f"| {v.law} | {MARKS[v.status]} | {v.shown} | {allowed} | {_remark(v)} |")
+            grade = f": {v.grade}" if v.failed and v.grade else ""
+            lines.append(f"| {v.law} | {MARKS[v.status]}{grade} | {v.shown} | {allowed} | {_remark(v)} |")
+        lines += ["", card.covered[:1].upper() + card.covered[1:] + "."]
         if card.quality is not None:
             lines += ["", card.quality.words.capitalize() + "."]
-        failed = [v for v in card.verdicts if v.failed]
-        for v in failed:
-            lines += ["", f"**{v.law}**: {'; '.join(_clean(w) for w in v.why)}.", "", f"    {v.command}"]
-    return "\n".join(lines) + "\n"
+        for v in sorted((v for v in card.verdicts if v.failed), key=_rank):
+            lines += ["", f"**{v.law}**: {'; '.join(_clean(w) for w in v.why)}."]
+            if v.bias is not None:
+                lines += [f"In a picture: {_clean(v.bias.words)}."]
+            lines += [f"Cause: {_clean(v.cause) or 'unexplained'}.", "", f"    {v.command}"]
+            if v.reproduction:
+                lines += ["", "```python", v.reproduction.rstrip(), "```"]
+    return "\n".join(lines) + "\n" + BLIND
 
 
 def _remark(v: Verdict) -> str:
@@ -119,7 +193,7 @@ def _clean(text: str) -> str:
 def main() -> int:
     """Write all pages; returns the exit code, 0 whatever the laws say."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--effort", default="quick", choices=("quick", "default"))
+    parser.add_argument("--effort", default="default", choices=("quick", "default"))
     parser.add_argument("--only", default="")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
@@ -127,9 +201,12 @@ def main() -> int:
     FOLDER.mkdir(exist_ok=True)
     stored = FOLDER / "cards.json"
     results: dict[str, Any] = json.loads(stored.read_text()) if options.only and stored.exists() else {}
+    if not options.only:
+        shutil.rmtree(PROGRAMS, ignore_errors=True)
+    started = time.perf_counter()
     for target in chosen:
-        print(target, flush=True)
         name = target.replace(":", "-")
+        began = time.perf_counter()
         try:
             report = verify(trials(target), quick=options.effort == "quick", seed=options.seed)
         except go.GonioError as error:
@@ -143,15 +220,20 @@ def main() -> int:
             "worst": {law: report[law].shown for law in SHORT},
             "losses": losses(report),
             "settings": [card.title for card in report.cards],
+            "findings": findings(target, report),
+            "quality": {card.title: card.quality.texts if card.quality else None for card in report.cards},
         }
+        print(f"{target}: {time.perf_counter() - began:.1f} s", flush=True)
     stored.write_text(json.dumps(dict(sorted(results.items())), indent=1) + "\n")
     (FOLDER / "README.md").write_text(overview(results, options.effort, options.seed))
+    print(f"all: {time.perf_counter() - started:.0f} s")
     return 0
 
 
 def overview(results: dict[str, Any], effort: str, seed: int) -> str:
-    """The table of all targets."""
-    renderers = f"Gonio {go.__version__} and Mitsuba {version('mitsuba')} (llvm_ad_rgb)"
+    """All that fails, the worst first, and the tables of all targets."""
+    renderers = f"Gonio {go.__version__} and Mitsuba {version('mitsuba')} (llvm_ad_rgb), {datetime.date.today()}"
+    ordered = sorted(results.items(), key=lambda item: (":" in item[0], item[0]))
     lines = [
         "# Report cards",
         "",
@@ -160,17 +242,47 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
         "",
         *EXPLANATION.strip().splitlines(),
         "",
+        "## What fails, the worst first",
+        "",
+        "Shares are of the reflected light. A program needs Mitsuba alone, and ends with an AssertionError that gives",
+        "the figure for as long as the fault is there.",
+        "",
+        "| grade | BSDF | law | what it does | probable cause | known upstream | program |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    failures = [one for _, result in ordered for one in result.get("findings", [])]
+    for one in sorted(failures, key=lambda one: tuple(one["rank"])):
+        link = f"[{one['title'].removeprefix('mitsuba:')}]({one['target'].replace(':', '-')}.md)"
+        program = f"[program]({one['program']})" if one["program"] else ""
+        cells = one["grade"], link, one["law"], one["size"], _clean(one["cause"]), one["upstream"], program
+        lines.append(f"| {' | '.join(cells)} |")
+    lines += [
+        "",
+        "## All laws",
+        "",
         "| target | " + " | ".join(SHORT) + " |",
         "|---" * (len(SHORT) + 1) + "|",
     ]
-    for target, result in sorted(results.items(), key=lambda item: (":" in item[0], item[0])):
+    for target, result in ordered:
         link = f"[{target}]({target.replace(':', '-')}.md)"
         if "not judged" in result:
-            lines.append(
-                f"| {link} | not judged: {result['not judged'].split(': ', 1)[-1][-70:]} |" + " |" * (len(SHORT) - 1)
-            )
+            reason = result["not judged"].split(": ", 1)[-1][-70:]
+            lines.append(f"| {link} | not judged: {reason} |" + " |" * (len(SHORT) - 1))
         else:
             lines.append(f"| {link} | " + " | ".join(result["laws"][law] for law in SHORT) + " |")
+    lines += [
+        "",
+        "## How well they sample",
+        "",
+        "No verdict: two can hold all laws and differ here. Means over the hemisphere of wo.",
+        "",
+        "| target, setting | samples that fail | variance of the weight | against cosine sampling | of the ideal |",
+        "|---|---|---|---|---|",
+    ]
+    for _, result in ordered:
+        for setting, texts in result.get("quality", {}).items():
+            if texts:
+                lines.append(f"| {setting} | {' | '.join(text.split('fail')[0].strip() for text in texts)} |")
     lines += [
         "",
         "## What a white furnace loses",
@@ -181,10 +293,10 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
         "| target, setting | loss |",
         "|---|---|",
     ]
-    for _, result in sorted(results.items(), key=lambda item: (":" in item[0], item[0])):
+    for _, result in ordered:
         for setting, text in result.get("losses", {}).items():
             lines.append(f"| {setting} | {text} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + BLIND
 
 
 if __name__ == "__main__":

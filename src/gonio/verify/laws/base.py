@@ -90,20 +90,26 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
 
 
 ROUNDINGS = 4
+ALLOWED = 8.0  # roundings of the directions that float32 code may show
 
 
 def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray, seed: int = 0) -> np.ndarray:
-    """How far a value moves when both directions are turned by one rounding of float32 (6e-8), (N, channels).
+    """How far a value may move by ALLOWED roundings of both directions in float32 (6e-8 each), (N, channels).
 
-    Narrow lobes magnify the rounding of a half vector by 1 / alpha; no float32 code can do better than this.
+    Narrow lobes magnify the rounding of a half vector by 1 / alpha, and a step that is so near may be crossed; no
+    float32 code can do better than this.
     """
     rng = np.random.default_rng([seed, 2])
     value = function(wo, wi)
-    moved = np.zeros_like(value)
+    slope, step = np.zeros_like(value), np.zeros_like(value)
     for _ in range(ROUNDINGS):
-        a, b = (w + 2.0**-24 * rng.uniform(-1.0, 1.0, w.shape) for w in (wo, wi))
-        moved = np.maximum(moved, np.abs(function(a, b) - value))
-    return moved
+        turns = [rng.uniform(-1.0, 1.0, w.shape) for w in (wo, wi)]
+        a, b = (w + 2.0**-24 * turn for w, turn in zip((wo, wi), turns, strict=True))
+        slope = np.maximum(slope, np.abs(function(a, b) - value))
+        for side in (ALLOWED, -ALLOWED):  # one of the two crosses whatever step is that near
+            a, b = (w + 2.0**-24 * side * np.sign(turn) for w, turn in zip((wo, wi), turns, strict=True))
+            step = np.maximum(step, np.abs(function(a, b) - value))
+    return np.where(step > 4.0 * ALLOWED * slope, step, ALLOWED * slope)
 
 
 def relative(a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floor: float = 0.0) -> np.ndarray:

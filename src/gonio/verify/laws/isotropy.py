@@ -89,7 +89,7 @@ class Isotropy(Law):
             return relative(there, back, 0.0, floor).max(1)
         noise = rounding(subject.eval, *first) + rounding(subject.eval, *second)
         floor = 1e-6 * float(np.percentile(np.abs(there[np.isfinite(there)]), 99.0))
-        return relative(there, back, 8.0 * noise, floor).max(1)
+        return relative(there, back, noise, floor).max(1)
 
     def _axes(self, subject: Subject, finding: Finding) -> None:
         """Second moments of eval over wi, seen from the normal, along the two axes: ordered as the two widths are."""

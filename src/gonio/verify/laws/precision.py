@@ -10,10 +10,9 @@ from ..effort import Effort
 from ..figures import RoundingErrors
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
-from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
+from .base import ALLOWED, Law, pair_in_words, pairs, relative, rounding, worst_of
 
 TOLERANCE = 1e-3
-ALLOWED = 8.0  # roundings of the directions that float32 code may show
 
 
 class Precision(Law):
@@ -40,7 +39,7 @@ class Precision(Law):
                 return subject.eval(a, b, precision=p) if what == "eval" else subject.pdf(a, b, p)[:, None]
 
             quick, exact = values(wo, wi, "float32"), values(wo, wi)
-            noise = ALLOWED * rounding(values, wo, wi)
+            noise = rounding(values, wo, wi)
             floor = 1e-6 * float(np.percentile(np.abs(exact), 99.0))
             plain = max(plain, float(np.percentile(relative(quick, exact, 0.0, floor), 99.9)))
             error = relative(quick, exact, noise, floor)

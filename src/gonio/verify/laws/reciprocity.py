@@ -174,7 +174,7 @@ def _difference(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, ex
         return relative(there, back, 0.0, floor)
     noise = rounding(lambda a, b: subject.f(a, b) * scale, wo, wi) + rounding(subject.f, wi, wo)
     floor = 1e-6 * float(np.percentile(np.abs(there[np.isfinite(there)]), 99.0))
-    return relative(there, back, 8.0 * noise, floor)
+    return relative(there, back, noise, floor)
 
 
 def _map(subject: Subject, eta: float, exact: bool) -> np.ndarray:

@@ -122,10 +122,8 @@ class Weight(Law):
                 noise_value: np.ndarray | float = 0.0
                 noise_pdf: np.ndarray | float = 0.0
             else:
-                noise_value = 8.0 * rounding(
-                    lambda o, i, m=mode: subject.eval(o, i, m, precision), wo[rows], s.wi[rows]
-                )  # type: ignore[misc]
-                noise_pdf = 8.0 * rounding(lambda o, i: subject.pdf(o, i, precision)[:, None], wo[rows], s.wi[rows])
+                noise_value = rounding(lambda o, i, m=mode: subject.eval(o, i, m, precision), wo[rows], s.wi[rows])  # type: ignore[misc]
+                noise_pdf = rounding(lambda o, i: subject.pdf(o, i, precision)[:, None], wo[rows], s.wi[rows])
             error = np.maximum(
                 relative(a, b, noise_value, floor).max(1),
                 relative(c, d, noise_pdf, 1e-6 * scale.max(1, keepdims=True))[:, 0],

@@ -1,0 +1,16 @@
+# mitsuba:roughplastic, distribution = ggx: positivity. Mitsuba 3.9.1, 2026-11-22.
+import drjit as dr
+import mitsuba as mi
+
+mi.set_variant("llvm_ad_rgb")
+bsdf = mi.load_dict({'type': "roughplastic", 'distribution': "ggx"})
+n = 1 << 24
+si, ctx, rng = dr.zeros(mi.SurfaceInteraction3f, n), mi.BSDFContext(), mi.PCG32(n)
+si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1], [0.5, 0.5]
+si.dp_du, si.dp_dv, si.t, si.prim_index = [1, 0, 0], [0, 1, 0], 1, 0
+si.wi = mi.Vector3f(0.939692616, 0.342020154, 0)
+wo = mi.Vector3f(0, 0, 1)
+bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+found = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]
+good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in found]
+assert dr.all(good, axis=None), f"numbers >= 0, of eval, pdf, weight and its pdf: {good}"
