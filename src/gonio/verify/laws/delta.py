@@ -168,7 +168,8 @@ def _direction(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed
         mirror = o * [-1.0, -1.0, 1.0]
         # a grating's orders lie beside the mirror direction, and one of them in it
         _, also = lobes.along(lobes.rows_of(seen, rows), mirror)
-        near = ~through & ~also & (np.abs(i - mirror).max(1) < 0.1)
+        # not about the normal, where all these and the way back to wo are one
+        near = ~through & ~also & (np.abs(i - mirror).max(1) < 0.1) & (np.hypot(o[:, 0], o[:, 1]) > 0.2)
         miss = np.abs(i - mirror).max(1) * near
         yield _worst(miss, "beside the mirror direction", o, i)
 
