@@ -51,6 +51,13 @@ def test_no_range_is_invented() -> None:
     assert "gain 0 to 0.25" in report.cards[0].covered
 
 
+def test_every_name_of_a_choice_is_tried() -> None:
+    places = box.places(subject.of(go.Conductor(alpha=0.3)), EFFORTS["deep"], 1)
+    named = [place.values for place in places if place.why == "choice"]
+    assert {"ndf": "beckmann"} in named and {"fresnel": "one"} in named and {"sampling": "bounded"} in named
+    assert "ndf = beckmann" in box.covered(subject.of(go.Conductor()), places)
+
+
 def test_inner_materials_are_tried_as_well_and_the_same_seed_tries_the_same() -> None:
     one = subject.of(go.mix(go.Lambert(0.3), go.Conductor.preset("Au", alpha=0.3), 0.4))
     first, second = ([place.words for place in box.places(one, EFFORTS["default"], 3)] for _ in range(2))

@@ -159,7 +159,7 @@ def test_grades(average: float, worst: float, grade: Grade) -> None:
 
 
 def test_the_report_holds_grades_and_a_sound_one_none() -> None:
-    report = verify([Brighter(), go.Lambert(0.5)], quick=True, law=["weight", "energy"])
+    report = verify([Brighter(), go.Lambert(0.5)], law=["weight", "energy"])
     wrong, right = json.loads(json.dumps(report.as_dict()))["cards"]
     weight = next(v for v in wrong["verdicts"] if v["law"] == "weight")
     assert weight["grade"] == "visible" and weight["bias"]["kind"] == "lost" and weight["cause"]
@@ -169,7 +169,7 @@ def test_the_report_holds_grades_and_a_sound_one_none() -> None:
 
 
 def test_a_declared_breach_is_graded_too() -> None:
-    verdict = verify(go.Phong(), quick=True, law=["reciprocity"])["reciprocity"]
+    verdict = verify(go.Phong(), law=["reciprocity"])["reciprocity"]
     assert verdict.status == "breaks as declared" and verdict.grade is not None
 
 

@@ -16,6 +16,7 @@ from .base import Law, pair_in_words, relative, rounding, worst_of
 
 EXACT = 1e-10
 SINGLE = 2e-3
+LOBE = 1e4  # 1/sr; a value or a density that is larger is a lobe's, one of a degree at most
 ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
 PAIRS = 1 << 13  # samples whose ratios are looked at for a cause
 
@@ -107,9 +108,11 @@ class Weight(Law):
                 beside = np.maximum(
                     subject.eval(wo[delta], aside, mode, precision).max(1), subject.pdf(wo[delta], aside, precision)
                 )
-                # a narrow lobe about it is as bright so close beside it; the delta itself must not show
+                # a narrow lobe about it is as bright so close beside it, or, narrower yet, far brighter than any
+                # probability; the delta itself must not show
                 alone = getattr(subject.model, "delta", "maybe") == "always"
-                if np.any(peak > (0.0 if alone else 1e-3 + 3.0 * beside)):
+                shows = peak > (0.0 if alone else 1e-3 + 3.0 * beside)
+                if np.any(shows & (alone | (peak < LOBE))):
                     problems.append(f"{precision}: a delta sample's direction has a finite value or pdf")
             rows = np.flatnonzero(density)
             if subject.stochastic or not len(rows):
