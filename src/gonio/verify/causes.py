@@ -44,7 +44,7 @@ def named(ratio: Ratio) -> Cause | None:
     if region is None:
         # a channel alone is a place as well
         text = f"{ratio.name} is 1 but {words}"
-        return Cause(text, text) if words and bad.mean() > COVER else None
+        return Cause(text, text) if words and bad.mean() > COVER else _part(ratio)
     place, rows = region
     words = f"{words} and {place}".removeprefix(" and ") if words else place
     inside = fitted(ratio.take(np.flatnonzero(rows)))
@@ -52,6 +52,18 @@ def named(ratio: Ratio) -> Cause | None:
         return _cause(ratio, inside, words)
     text = f"{ratio.name} is 1 everywhere else, and wrong {words}"
     return Cause(text, text)
+
+
+def _part(ratio: Ratio) -> Cause | None:
+    """Of two densities one that is never more than the other: it knows fewer lobes."""
+    if "pdf" not in ratio.top or "pdf" not in ratio.bottom or "weight" in ratio.top:
+        return None
+    above, below = ratio.above[:, 0], ratio.below[:, 0]
+    for less, more, name, other in ((above, below, ratio.top, ratio.bottom), (below, above, ratio.bottom, ratio.top)):
+        if np.mean(less > more * (1.0 + 10.0 * tolerance(ratio))) < 1e-3 and np.mean(less < 0.95 * more) > 0.2:
+            text = f"{name} is nowhere more than {other}, and less at many directions: a lobe of a mixture left out?"
+            return Cause(text, f"{name} part")
+    return None
 
 
 def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:

@@ -134,13 +134,36 @@ def named(subject: Subject, held: Blocks) -> Cause | None:
 
         total = cubature.integrate(subject.sample, cubature.of_rows(weighed_pdf), light.wo, 1e-2).value[:, 0]
         if np.any(np.abs(total - light.drawn) > 0.02 + 0.02 * light.drawn):
+            if formula == "1" and left < EFFECT:
+                agree = f"samples over pdf are {scale:.3g} for all wi, and another number from other wo"
+                return Cause(f"{agree}: the probability of choosing a lobe?", "samples a number of wo")
             continue
         whole = formula if plain else text if formula == "1" else f"{text} times {formula}"
         if text.startswith("1 / ") and formula.startswith("1 / "):
             whole = f"1 / ({text[4:]} {formula[4:]})"
         agree = f"samples over pdf are {whole}, within {max(left, 1e-3):.0e} in the cells and in int pdf of all wo"
         return Cause(f"{agree}: {guess}?", f"samples {whole}")
-    return None
+    return _sides(held)
+
+
+def _sides(held: Blocks) -> Cause | None:
+    """Whether samples and pdf agree on each side of the surface, and not on how many fall on which."""
+    expected = held.joined(held.expected)
+    sides = held.joined(held.wi[:, 2] * held.area) > 0.0
+    if sides.all() or not sides.any():
+        return None
+    scaled, shares = np.zeros_like(expected), []
+    for side in (sides, ~sides):
+        e, o = float(expected[side].sum()), float(held.seen[side].sum())
+        if e <= 0.0 or o < 1000.0:
+            return None
+        scaled[side] = expected[side] * (o / e)
+        shares.append(o / e)
+    if _effect(scaled, held.seen) > EFFECT or abs(np.log(shares[0] / shares[1])) < BEFORE:
+        return None
+    above, below = shares
+    agree = f"samples over pdf are {above:.3g} above the surface and {below:.3g} below it, alike within each side"
+    return Cause(f"{agree}: the choice between reflection and transmission?", "samples choose the side")
 
 
 def _effect(expected: np.ndarray, seen: np.ndarray) -> float:

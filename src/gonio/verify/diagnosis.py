@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 ORDER = ("positivity", "calls", "delta", "weight", "pdf", "reciprocity", "energy")
 AFTER = ("isotropy", "linearity", "precision", "gradients")
 # Failures that another one brings along: the quadrature and the samples of the energy disagree where weights are wrong.
-FOLLOWS = {"energy": ("delta", "weight", "pdf"), "pdf": ("weight",)}
+FOLLOWS = {"energy": ("calls", "delta", "weight", "pdf"), "pdf": ("calls", "weight")}
 LIMIT = 60.0  # seconds a law; it takes less than one unless the BSDF loops
 
 

@@ -21,6 +21,10 @@ ALMOST_ONE = np.float32(1.0) - np.float32(2.0**-24)
 FIRST = (8, 16)  # cells a side of the surface, in theta and phi
 DEPTH = 21  # halvings of an eighth of a right angle, 1e-7: a width of 2e-4 is that narrow across at 89.9 degrees
 SEEDED = 17  # halvings around samples
+SAMPLES = 1024  # of each wo
+CROWD = 32  # of them in a cell that is divided before anything is known of the integrand
+AROUND = 3 * (CROWD + 4)  # points that stand for the mirror direction, wo and -wo
+UNSEEN = 0.01  # of the share of an integral that samples tell of: what is less was not seen at all
 LARGEST = 600_000  # cells evaluated in one round, some 10 M directions
 
 
@@ -78,7 +82,7 @@ def integrate(
     integrand  (wo, wi) -> a vector of one entry a channel, of Dr.Jit vectors of 64 bits; it runs inside a kernel
     tolerance  absolute, of each integral; where cells run out the stated error is larger
     """
-    cells = _seeded(sample, wo, seed)
+    cells, points = _seeded(sample, wo, seed)
     coarse = _values(integrand, wo, cells, _GAUSS).integral
     channels = coarse.shape[1]
     value, error = np.zeros((len(wo), channels)), np.zeros((len(wo), channels))
@@ -92,6 +96,10 @@ def integrate(
         difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
         difference += 0.02 * step_aside(seen, around).reshape(-1, 4, 1).sum(1)  # steps err both ways, and cancel
         divide = difference.max(1) > allowed
+        # the foot of a narrow lobe in a cell that is wider than the lobe: samples lie there, and no node sees anything
+        whole = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
+        share = np.bincount(points.cell, minlength=len(divide)) / SAMPLES
+        divide |= fine.sum(1).max(1) < UNSEEN * share * whole[cells.row]
         if depth == DEPTH - 1 or 16 * divide.sum() > LARGEST:
             divide[:] = False
         done = ~divide
@@ -99,29 +107,48 @@ def integrate(
         np.add.at(error, cells.row[done], difference[done])
         if not divide.any():
             break
+        points = points.within(cells, divide)
         cells = fine_cells.take(np.repeat(divide, 4))
         coarse = fine[divide].reshape(-1, channels)
     return Integral(value, error)
 
 
-def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> _Cells:
-    """A few cells a side, divided around what the model samples, around the mirror direction and around wo itself."""
+class _Points(NamedTuple):
+    """Samples in cells: the number of the cell, theta and phi."""
+
+    cell: np.ndarray
+    at: np.ndarray
+
+    def within(self, cells: _Cells, divided: np.ndarray) -> _Points:
+        """Those in divided cells, by the numbers of these cells' quarters."""
+        kept = divided[self.cell]
+        cell, at = self.cell[kept], self.at[kept]
+        far = at >= cells.low[cell] + 0.5 * cells.size[cell]
+        return _Points(4 * (np.cumsum(divided) - 1)[cell] + far[:, 0] + 2 * far[:, 1], at)
+
+
+def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points]:
+    """A few cells a side, divided around what the model samples, around the mirror direction and around wo itself; and
+    the samples in them."""
     n_theta, n_phi = FIRST
     step = np.array([0.5 * np.pi / n_theta, 2.0 * np.pi / n_phi])
     corner = np.stack(np.meshgrid(np.arange(n_theta), np.arange(n_phi), indexing="ij"), -1).reshape(-1, 2) * step
     row, side, cell = np.meshgrid(np.arange(len(wo)), [1.0, -1.0], np.arange(len(corner)), indexing="ij")
     cells = _Cells(row.ravel(), side.ravel(), corner[cell.ravel()], np.broadcast_to(step, (row.size, 2)).copy())
-    per = 256
+    per = SAMPLES
     rng = np.random.default_rng([seed, 77])
     many = np.repeat(wo, per, axis=0)
     drawn = sample(many, rng.random((len(many), 3)).astype(np.float32).clip(max=ALMOST_ONE).astype(float))
     good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
     mirror = wo * np.array([-1.0, -1.0, 1.0])
-    likely = np.concatenate([drawn.wi[good], *([mirror, wo, -wo] * 12)])
-    owner = np.concatenate([np.repeat(np.arange(len(wo)), per)[good], *([np.arange(len(wo))] * 36)])
+    likely = np.concatenate([drawn.wi[good], *([mirror, wo, -wo] * (CROWD + 4))])
+    owner = np.concatenate([np.repeat(np.arange(len(wo)), per)[good], *([np.arange(len(wo))] * AROUND)])
     theta = np.arctan2(np.hypot(likely[:, 0], likely[:, 1]), np.abs(likely[:, 2]))
     phi = np.arctan2(likely[:, 1], likely[:, 0]) % (2.0 * np.pi)
     below = (likely[:, 2] < 0.0).astype(int)
+    angles = np.stack([theta, phi], -1)
+    own = len(angles) - AROUND * len(wo)  # the rest are directions that no sample may have
+    homes, found = np.full(own, -1), 0
     # one integer says in which cell a point lies, at each level: row, side, and the cell's two coordinates
     settled: list[_Cells] = []
     for level in range(SEEDED):
@@ -131,13 +158,20 @@ def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> _Cells:
         mine = _key(cells.row, (cells.side < 0).astype(int), index[:, 0], index[:, 1], n_theta * scale, n_phi * scale)
         inside, count = np.unique(point, return_counts=True)
         place = np.searchsorted(inside, mine).clip(max=len(inside) - 1)
-        crowded = (inside[place] == mine) & (count[place] >= 8)
+        crowded = (inside[place] == mine) & (count[place] >= CROWD)
+        order = np.argsort(mine)
+        cell = order[np.searchsorted(mine[order], point[:own]).clip(max=len(mine) - 1)]
+        here = (mine[cell] == point[:own]) & ~crowded[cell]
+        homes[here] = found + (np.cumsum(~crowded) - 1)[cell[here]]
         settled.append(cells.take(~crowded))
+        found += len(settled[-1].row)
         cells = cells.take(crowded).quarters()
         if not len(cells.row):
             break
     settled.append(cells)
-    return _Cells(*[np.concatenate(parts) for parts in zip(*settled, strict=True)])
+    there = homes >= 0
+    points = _Points(homes[there], angles[:own][there])
+    return _Cells(*[np.concatenate(parts) for parts in zip(*settled, strict=True)]), points
 
 
 def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: int, n_b: int) -> np.ndarray:

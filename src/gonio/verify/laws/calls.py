@@ -12,7 +12,7 @@ from ...ops import Mode, Precision, backend
 from ...render.answers import Answer
 from .. import directions, severity
 from ..effort import Effort
-from ..ratio import Ratio
+from ..ratio import Cause, Ratio
 from ..subject import Subject, guarded
 from ..verdict import Finding
 from .base import Law, pair_in_words, pairs
@@ -59,11 +59,27 @@ class Calls(Law):
         names = ", ".join(dict.fromkeys(answer.what for answer in wrong))
         return severity.Bias(0.0, 0.0, 0.0, f"only who asks for {names}", "interface")
 
-    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio]:
-        for answer in finding.details:  # type: ignore[attr-defined]
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
+        wrong: list[Answer] = finding.details  # type: ignore[assignment]
+        for answer in wrong:
             if answer.rows is not None:
                 name, other, wo, wi, got, whole = answer.rows
                 yield Ratio(name, other, wo, wi, got, whole, subject)
+        for answer in wrong:
+            words = SUSPECTS.get(answer.what, f"not the formula, but {answer.what}: {answer.wrong}")
+            yield Cause(words, f"calls {answer.what}")
+
+
+# what an answer that depends on how it was asked for comes from
+_ROWS = "the answer depends on how many rows there are: an index or a buffer of fixed size?"
+_NEIGHBOURS = "a row's answer depends on the other rows: a sum, a mean or a branch over all of them?"
+SUSPECTS = {
+    "a million rows": _ROWS,
+    "one row at a time": _ROWS,
+    "rows in another order": _NEIGHBOURS,
+    "half the rows dead": _NEIGHBOURS,
+    "of one that nobody has used": "a call changes what later ones answer: state that is kept in the object?",
+}
 
 
 def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:

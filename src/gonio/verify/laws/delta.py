@@ -100,6 +100,24 @@ class DeltaLobes(Law):
         for miss in finding.details:  # type: ignore[attr-defined]
             if miss.cause:
                 yield Cause(miss.cause, miss.cause)
+        seen = lobes.of(subject, _views(subject, effort, seed), seed, "importance")
+        words = _choice(seen.share[seen.found], seen.pdf[seen.found], seen.carried[seen.found])
+        if words:
+            yield Cause(words, words)
+
+
+def _choice(share: np.ndarray, pdf: np.ndarray, carried: np.ndarray) -> str:
+    """What is wrong between how often lobes are met, the probability that they state, and their weight, over all."""
+    met = (share > 0.02) & (pdf > 0.0)
+    if met.sum() < 8:
+        return ""
+    share, pdf, weight = share[met], pdf[met], (carried[met] / pdf[met][:, None]).max(1)
+    if np.all(np.abs(pdf - 1.0) < 1e-6) and np.mean(share < 0.97) > 0.2:
+        return "the pdf of delta samples is 1, and they come in a part of the draws: the probability of the choice?"
+    factor = weight / pdf
+    if np.ptp(pdf) > 0.1 and np.ptp(factor) < 1e-3 * factor.mean():
+        return "the weight of delta samples follows the probability of their choice: not divided by it?"
+    return ""
 
 
 def _shown(seen: Lobes) -> str:

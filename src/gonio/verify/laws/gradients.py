@@ -50,11 +50,10 @@ class Gradients(Law):
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
-            # kinks, such as a table's, are told from slopes down to 1e-7 of what most pairs have: a hundredth of that
-            # has its four digits
-            size = np.abs(differences[smooth])
-            usual = float(np.percentile(size, 90.0)) if size.size else 0.0
-            floor = max(1e-6 * float(np.max(size, initial=0.0)), 1e-2 * usual, least)
+            # kinks, such as a table's, are told from slopes down to 1e-7 of what many pairs have (`_derivatives`): a
+            # hundredth of that has its four digits
+            usual = float(np.percentile(np.abs(differences), 90.0))
+            floor = max(1e-6 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-2 * usual, least)
             row, size = worst_of(relative(exact, differences, 0.0, floor) * smooth[:, None])
             if size > worst:
                 worst, place, name = size, row, label

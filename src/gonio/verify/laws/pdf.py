@@ -28,7 +28,7 @@ ABOVE = (
     (89.5, 250.0),
 )
 BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
-OBLIQUE = (50.0, 200.0)
+OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the latter for what only Fresnel's term tells
 FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # samples enough for a per cent
 PAIRS = 1 << 13  # that are looked at for a cause
 EXCESS = 1e-3
@@ -104,16 +104,45 @@ class Pdf(Law):
         if there.stochastic or not isinstance(finding.evidence, SampleCells):
             return
         # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are one
-        angles = [angles for side, angles in ((1, OBLIQUE), (-1, BELOW[1])) if side in there.sides]
+        angles = [angles for side, angles in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
         oblique = directions.single(np.array([directions.at(*pair) for pair in angles]).reshape(-1, 3))
         for tested in _chi_square(there, FEW, seed, oblique):
             held = crowding.blocks(tested.cells)
             cause = crowding.named(there, held) if held is not None else None
             if cause is not None:
                 yield cause
+        if _reused(there, oblique[:1], seed):
+            yield Cause(
+                "u.x chooses a lobe and, not stretched to [0, 1) again, places its directions too?", "u.x twice"
+            )
         for note in finding.notes:
             if note.startswith("pdf puts"):
                 yield Cause(note, "pdf where no sample falls")
+
+
+SWEEP = 512  # values of u.x
+TRIALS = 32  # values of the other two numbers
+LEAP = 0.2  # of a direction from one value of u.x to the next: another lobe
+
+
+def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
+    """Whether the azimuth turns with u.x by 2 pi u.x, and not by 2 pi, over a part of [0, 1) that chooses a lobe."""
+    others = directions.numbers(np.random.default_rng([seed, 45]), TRIALS)
+    u = np.repeat(others, SWEEP, axis=0)
+    u[:, 0] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
+    s = subject.sample(np.repeat(wo, len(u), axis=0), u)
+    wi, fine = s.wi.reshape(TRIALS, SWEEP, 3), ((s.pdf > 0.0) & ~s.delta).reshape(TRIALS, SWEEP)
+    phi = np.arctan2(wi[..., 1], wi[..., 0])
+    short = 0
+    for row in range(TRIALS):
+        leaps = np.flatnonzero((np.abs(np.diff(wi[row], axis=0)).max(1) > LEAP) | ~fine[row, 1:] | ~fine[row, :-1]) + 1
+        for part in np.split(np.arange(SWEEP), leaps):
+            length = len(part) / SWEEP
+            turned = abs(np.sum((np.diff(phi[row, part]) + np.pi) % (2.0 * np.pi) - np.pi)) / (2.0 * np.pi)
+            if 0.1 < length < 0.9 and abs(turned - length) < 0.02 and len(part) < SWEEP:
+                short += 1
+                break
+    return short > 0.8 * TRIALS
 
 
 _KINDS = {"fine": "cells", "coarse": "coarse cells", "others": "share of samples in no cell against 1 - int pdf"}

@@ -81,6 +81,8 @@ class Weight(Law):
                     lambda b, x, y, m: b.pdf(x, y)[:, None],
                 )
             value = subject.eval(o, i, mode)
+            if _grey(s.weight[rows]) and not _grey(value):
+                yield Cause("the weight is grey where eval has a colour: a mean, or one channel of it?", "grey weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
@@ -149,6 +151,11 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
         lit.append(subject.pdf(wo, turned, precision) > 0.0)
         lit.append(np.any(subject.eval(wo, turned, precision=precision) > 0.0, axis=1))
     return np.any(lit, axis=0) & ~np.all(lit, axis=0)
+
+
+def _grey(values: np.ndarray) -> bool:
+    """Whether all channels are one, within a per cent of most rows."""
+    return bool(np.mean(np.ptp(values, axis=1) > 0.01 * values.max(1)) < 0.05)
 
 
 def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
