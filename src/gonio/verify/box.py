@@ -15,6 +15,7 @@ import dataclasses
 import itertools
 import math
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -154,7 +155,7 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     for why, values in wanted:
         if len(made) >= most:
             break
-        values = {path: value if isinstance(value, str) else float(value) for path, value in values.items()}
+        values = {path: value if isinstance(value, str | bool) else float(value) for path, value in values.items()}
         if any(values == place.values for place in made):
             continue
         place = _made(subject, values, why, tuple(along))
@@ -163,15 +164,17 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
     return made
 
 
-def _choices(subject: Subject) -> list[dict[str, str]]:
-    """Each name that a choice has besides the one that was given; of several choices the first of each, then the next,
-    as a change of code costs more than one of a number."""
+def _choices(subject: Subject) -> list[dict[str, str | bool]]:
+    """Each name that a choice has besides the given one, and each switch the other way; of several the first of each,
+    then the next, as a change of code costs more than one of a number."""
     if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
         return []
-    turns: list[list[dict[str, str]]] = []
+    turns: list[list[dict[str, str | bool]]] = []
     for leaf in tree.leaves(subject.model):
         if leaf.parameter.kind == "choice":
             turns.append([{leaf.path: name} for name in leaf.parameter.choices if name != leaf.value])
+        elif leaf.parameter.kind == "flag":
+            turns.append([{leaf.path: not leaf.value}])
     return [one for turn in itertools.zip_longest(*turns) for one in turn if one is not None]
 
 
@@ -266,7 +269,7 @@ def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[
     wo, wi, u = (directions.single(wo), directions.single(wi), directions.numbers(rng, RAYS))
     count = len(values)
     many = [np.tile(part, (count, 1)) for part in (wo, wi, u)]
-    together = _per_ray(subject, path, np.repeat(values, RAYS))
+    together = per_ray(subject, {path: np.repeat(values, RAYS)})
     shape = (count, RAYS)
     if together is not None:
         value = together.eval(many[0], many[1], precision="float32")
@@ -282,15 +285,16 @@ def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[
     return [*(channels[:1] if same else channels), density.reshape(shape), weight.mean(1).reshape(shape)]
 
 
-def _per_ray(subject: Subject, path: str, values: np.ndarray) -> Subject | None:
-    """The subject with one value a ray; None where it takes no arrays."""
-    parameter = next(leaf.parameter for leaf in tree.leaves(subject.model) if leaf.path == path)
-    array: Any = np.repeat(values[:, None], 3, axis=1) if parameter.kind == "spectrum" else values
-    if parameter.kind == "alpha":
-        array = (values, values)
+def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
+    """The subject with one value a ray of some parameters, by path; None where it takes no arrays."""
+    kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
+    arrays: dict[str, Any] = {}
+    for path, column in values.items():
+        many = np.repeat(column[:, None], 3, axis=1) if kinds[path] == "spectrum" else column
+        arrays[path] = (many, many) if kinds[path] == "alpha" else many
     try:
-        together = subject.replace(**{path: array})
-        probe = directions.at(np.full(len(values), 30.0), 10.0)
+        together = subject.replace(**arrays)
+        probe = directions.at(np.full(len(column), 30.0), 10.0)
         together.eval(probe, probe)
     except (Fault, InputError):
         return None
@@ -301,4 +305,4 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-__all__ = ["Axis", "Place", "axes", "jumps", "places"]
+__all__ = ["Axis", "Place", "axes", "jumps", "per_ray", "places"]

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...models import BSDF
 from ...ops import Mode, Precision, backend
 from ...render.answers import Answer
-from .. import directions, severity
+from .. import box, directions, severity
 from ..effort import Effort
 from ..ratio import Cause, Ratio
 from ..subject import Subject, guarded
@@ -78,6 +79,7 @@ SUSPECTS = {
     "one row at a time": _ROWS,
     "rows in another order": _NEIGHBOURS,
     "half the rows dead": _NEIGHBOURS,
+    "textured parameters": "a value of one ray serves others: derived once for all of them?",
     "of one that nobody has used": "a call changes what later ones answer: state that is kept in the object?",
 }
 
@@ -90,6 +92,7 @@ def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
         yield from _batches(subject, wo, wi, u, precision)
     if not subject.stochastic:
         yield Answer("mode", _mode(subject, wo, wi) if subject.transmits else _one_mode(subject, wo, wi, u))
+    yield from _textured(subject, wo, wi, u)
     yield Answer("declared facts", _facts(subject, wo, wi, u))
 
 
@@ -237,6 +240,31 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
             ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
             return f"radiance over power in transmission runs {ends}: one index, one factor"
     return ""
+
+
+def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> Iterator[Answer]:
+    """Parameters that differ from ray to ray, as textures make them: each ray as if all had its values."""
+    if not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
+        return
+    along = box.axes(subject)
+    if not along:
+        return
+    odd = np.arange(len(wo)) % 2 == 1
+    # some up and others down, so that what depends on their ratio changes too
+    shares = [(0.3, 0.6), (0.7, 0.25)]
+    ends = [{axis.path: float(axis.at(shares[k % 2][end])) for k, axis in enumerate(along)} for end in (0, 1)]
+    together = box.per_ray(subject, {path: np.where(odd, ends[1][path], ends[0][path]) for path in ends[0]})
+    if together is None:
+        return
+    try:
+        alone = [_answers(subject.replace(**values), wo, wi, u, subject.best)[0] for values in ends]
+    except InputError:
+        return  # these values do not go together
+    (mixed,) = _answers(together, wo, wi, u, subject.best)
+    each = {name: np.where(odd[:, None], alone[1][name], first) for name, first in alone[0].items()}
+    names = " and ".join(list(ends[0])[:3])
+    answer = _unlike("textured parameters", each, mixed, wo, wi, SAME[subject.best])
+    yield answer._replace(wrong=f"{answer.wrong}, {names} from ray to ray") if answer.wrong else answer
 
 
 def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
