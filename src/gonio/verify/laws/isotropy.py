@@ -79,6 +79,15 @@ class Isotropy(Law):
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         if any("axes swapped" in problem for problem in finding.problems):
             yield Cause("the wider axis is that of the smaller width: alpha_x and alpha_y exchanged?", "axes exchanged")
+        elif subject.isotropic:
+            wo, wi = pairs(subject, 4096, seed)
+            turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
+            there, back = subject.eval(wo, wi), subject.eval(directions.turned(wo, turn), directions.turned(wi, turn))
+            off = np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back), axis=0)
+            names = [name for name, share in zip(("red", "green", "blue"), off, strict=False) if share > 0.01]
+            where = f" in {' and '.join(names)}" if len(off) == 3 and 0 < len(names) < 3 else ""
+            words = f"values change{where} when both directions turn about the normal: `isotropic` should be False"
+            yield Cause(f"{words}, or a tangent has got into the formula?", "turns")
 
     def _difference(
         self, subject: Subject, first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], exact: bool

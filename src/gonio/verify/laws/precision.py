@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ... import ops
 from .. import severity
+from ..causes import place_of
 from ..effort import Effort
 from ..figures import RoundingErrors
+from ..ratio import Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
 from .base import ALLOWED, Law, pair_in_words, pairs, relative, rounding, worst_of
@@ -62,3 +66,12 @@ class Precision(Law):
         return severity.by_samples(
             subject, lambda wo, wi: (subject.eval(wo, wi), subject.eval(wo, wi, precision="float32"))
         )
+
+    def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
+        wo, wi = pairs(subject, 4096, seed)
+        single, exact = subject.eval(wo, wi, precision="float32"), subject.eval(wo, wi)
+        noise = rounding(lambda a, b: subject.eval(a, b), wo, wi)
+        bad = relative(single, exact, noise, 1e-6 * float(np.percentile(np.abs(exact), 99.0))).max(1) > TOLERANCE
+        place = place_of(wo, wi, bad)
+        words = "float32 loses digits that float64 has" + (f", {place}" if place else "")
+        yield Cause(f"{words}: a difference of two numbers that are nearly one?", "cancellation")
