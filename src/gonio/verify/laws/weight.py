@@ -190,7 +190,10 @@ def _expected(subject: Subject, finding: Finding, seed: int, effort: Effort) -> 
         good = (s.pdf > 0.0) & ~s.delta
         value = subject.eval(wo[good], s.wi[good]).mean(1)
         difference = s.weight[good].mean(1) - value / s.pdf[good]
-        noise = difference.std() / np.sqrt(len(difference)) if len(difference) else 0.0
+        if not len(difference):
+            return 1.0
+        # where both draw the same number, all that is left is rounding
+        noise = float(np.hypot(difference.std() / np.sqrt(len(difference)), 1e-6 * s.weight[good].mean()))
         return statistics.normal_two_sided(difference.mean() / noise) if noise > 0.0 else 1.0
 
     finding.tolerance = np.inf
