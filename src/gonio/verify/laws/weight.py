@@ -155,7 +155,7 @@ def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precis
 
 def _grey(values: np.ndarray) -> bool:
     """Whether all channels are one, within a per cent of most rows."""
-    return bool(np.mean(np.ptp(values, axis=1) > 0.01 * values.max(1)) < 0.05)
+    return not len(values) or bool(np.mean(np.ptp(values, axis=1) > 0.01 * values.max(1)) < 0.05)
 
 
 def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
