@@ -1,4 +1,4 @@
-"""The public record: what is said of Mitsuba's plugins has a grade, a cause, and a program that shows it without Gonio."""
+"""The public record: what is said of Mitsuba's plugins has a grade, a cause, and a program that shows it."""
 
 from __future__ import annotations
 

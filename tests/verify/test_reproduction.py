@@ -1,4 +1,4 @@
-"""A failure of one of Mitsuba's plugins comes with a program of Mitsuba alone; `tests/docs` runs those of the record."""
+"""A failure of one of Mitsuba's plugins comes with a program of Mitsuba alone; `tests/docs` runs the record's."""
 
 from __future__ import annotations
 

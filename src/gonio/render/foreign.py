@@ -212,7 +212,7 @@ def plugin(name: str, properties: Mapping[str, object]) -> Native:
     more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
         ramp = np.linspace(0.0, 0.2, 16, dtype=np.float32)
-        heights = _mitsuba().Bitmap(np.ascontiguousarray(np.broadcast_to(ramp, (16, 16))[..., None]))
+        heights = _mitsuba().Bitmap(np.ascontiguousarray(ramp[None, :, None]))
         more = {"texture": {"type": "bitmap", "bitmap": heights, "raw": True}}
     return load({"type": name, **_NESTS.get(name, {}), **more, **properties})
 

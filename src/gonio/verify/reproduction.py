@@ -58,14 +58,15 @@ def _vector(w: np.ndarray) -> str:
 def _literal(value: object) -> str:
     """A property of a plugin as Python writes it."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name!r}: {_literal(one)}" for name, one in value.items()) + "}"
+        return "{" + ", ".join(f"{json.dumps(name)}: {_literal(one)}" for name, one in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_literal(one) for one in value) + "]"
     if isinstance(value, float | int | str):
         return json.dumps(value) if isinstance(value, str) else f"{value!r}"
     if type(value).__name__ == "Bitmap":
         pixels = np.asarray(value, dtype=np.float32)
-        return f"mi.Bitmap(mi.TensorXf({pixels.ravel().round(6).tolist()}, {pixels.shape}))"
+        numbers = ", ".join(f"{float(x):.4g}" for x in pixels.ravel())
+        return f"mi.Bitmap(mi.TensorXf([{numbers}], {pixels.shape}))"
     return str(value)
 
 
