@@ -3,7 +3,7 @@ import drjit as dr
 import mitsuba as mi
 
 mi.set_variant("llvm_ad_rgb")
-plugin = {'type': "principled", 'roughness': 0.571954001703399, 'anisotropic': 0.11841732634754099, 'spec_trans': 0.9601579750376608, 'spec_tint': 0.4270352014775808, 'sheen': 0.7148155837874357, 'sheen_tint': 0.32247589468874205, 'flatness': 0.9880130314083888, 'metallic': 0.7203665426621867, 'clearcoat': 0.5313129611614217, 'clearcoat_gloss': 0.5210994633939052, 'base_color': {'type': "rgb", 'value': [0.125, 0.125, 0.125]}}
+plugin = {"type": "principled", "roughness": 0.571954001703399, "anisotropic": 0.11841732634754099, "spec_trans": 0.9601579750376608, "spec_tint": 0.4270352014775808, "sheen": 0.7148155837874357, "sheen_tint": 0.32247589468874205, "flatness": 0.9880130314083888, "metallic": 0.7203665426621867, "clearcoat": 0.5313129611614217, "clearcoat_gloss": 0.5210994633939052, "base_color": {"type": "rgb", "value": [0.125, 0.125, 0.125]}}
 n = 1
 si, ctx, rng = dr.zeros(mi.SurfaceInteraction3f, n), mi.BSDFContext(), mi.PCG32(n)
 si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1], [0.5, 0.5]

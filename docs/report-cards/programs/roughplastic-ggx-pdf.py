@@ -3,7 +3,7 @@ import drjit as dr
 import mitsuba as mi
 
 mi.set_variant("llvm_ad_rgb")
-bsdf = mi.load_dict({'type': "roughplastic", 'distribution': "ggx", 'alpha': 1.0})
+bsdf = mi.load_dict({"type": "roughplastic", "distribution": "ggx", "alpha": 1.0})
 n = 1 << 24
 si, ctx, rng = dr.zeros(mi.SurfaceInteraction3f, n), mi.BSDFContext(), mi.PCG32(n)
 si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1], [0.5, 0.5]
