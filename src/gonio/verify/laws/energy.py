@@ -96,9 +96,12 @@ class Energy(Law):
             return
         a = albedo.mean(1)
         if np.ptp(a) < SPREAD * a.mean():
-            if curves.furnace is not None or a.mean() > 1.0:
+            if (curves.furnace is not None or a.mean() > 1.0) and abs(a.mean() - 1.0) > 2.0 * SPREAD:
                 factor = written(float(a.mean()))
-                words = f"it reflects {factor} times what comes in, whatever wo: a constant factor?"
+                guess = "a constant factor"
+                if factor == "2":
+                    guess = "a constant factor, a lobe that counts twice, or light to both sides of the surface"
+                words = f"it reflects {factor} times what comes in, whatever wo: {guess}?"
                 yield Cause(words, factor_key(float(a.mean())))
             return
         bad = np.abs(a - 1.0) > SPREAD
