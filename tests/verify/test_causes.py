@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Any, ClassVar
 
 import gonio as go
@@ -241,3 +243,32 @@ def test_a_cascade_names_its_first_cause_once() -> None:
     assert "(o.m)" in report["weight"].cause and report["energy"].cause == "follows from WEIGHT's"
     text = str(report)
     assert text.index("weight: ") < text.index("energy: directional")
+
+
+def test_what_the_examiners_named_is_named() -> None:
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from mutants.third.delta import CertainOfItself
+    from mutants.third.smooth import ChoiceNumberAgain, GreyWeight, OneLobeDensity
+
+    for cls, law, words in (
+        (ChoiceNumberAgain, "pdf", "u.x chooses a lobe"),
+        (GreyWeight, "weight", "the weight is grey"),
+        (OneLobeDensity, "weight", "a lobe of a mixture left out"),
+        (CertainOfItself, "delta", "the pdf of delta samples is 1"),
+    ):
+        assert words in verify(cls(), quick=True, law=law)[law].cause, cls
+
+
+def test_light_that_meets_a_pigment_twice_is_no_mistake_and_a_colour_that_is_squared_is() -> None:
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from mutants.fourth.sound import BouncingLacquer
+
+    class Squared(go.Lambert):
+        """The colour counts twice, and not once."""
+
+        def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
+            return super().eval(wo, wi, mode) * self.albedo
+
+    verdict = verify(BouncingLacquer(), quick=True, law="linearity")["linearity"]
+    assert verdict.status == "pass" and any("more than once" in note for note in verdict.notes)
+    assert verify(Squared(), quick=True, law="linearity")["linearity"].failed
