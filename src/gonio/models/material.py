@@ -30,7 +30,7 @@ from ..errors import InputError, did_you_mean
 from ..members import Family, subclasses_of
 from ..ops import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, backend, graph
 from ..optics import warp
-from . import binding, recording, tree
+from . import binding, guide_search, recording, tree
 from .calling import V3, Given, method
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, pair_of
 from .sample import Sample
@@ -103,6 +103,7 @@ class BSDF(Material):
     stochastic: ClassVar[bool] = False
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
+    guided: ClassVar[bool] = False  # whether only `eval` is, so that a guide is found for sampling
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
     _declared: ClassVar[Mapping[str, Parameter]] = {}
 
@@ -117,6 +118,7 @@ class BSDF(Material):
                 setattr(cls, formula, method(own[formula]))
         cls.derives = cls.derive is not Material.derive
         cls.has_terms = cls.terms is not BSDF.terms
+        cls.guided = cls.pdf is BSDF.pdf and cls.sample is BSDF.sample and cls.eval is not BSDF.eval
         dataclass(frozen=True, eq=False, repr=False)(cls)
         cls._declared = declared(cls)  # on the class, and gone with it when a user's file is loaded anew
 
@@ -143,7 +145,12 @@ class BSDF(Material):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes. Here: cosine sampling."""
+        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes.
+
+        Here, where `sample` is not written either: that of a guide found from `eval` (`gonio.models.guide`).
+        """
+        if self.guided:
+            return guide_search.guide_of(self.plain).pdf(self, wo, wi)
         same_side = wo.z * wi.z > 0.0
         return ops.where(same_side, ops.abs(wi.z) * ops.inv_pi, 0.0)
 
@@ -152,10 +159,13 @@ class BSDF(Material):
         """Choose wi for wo.
 
         u  three numbers in [0, 1) a ray, (N, 3): the first picks the lobe, the others the direction
-        Here: cosine sampling on wo's side.
+        Here: by a guide found from `eval` (`gonio.models.guide`); where `pdf` is written, cosine sampling on wo's side.
         """
-        local = warp.square_to_cosine_hemisphere(u.y, u.z)
-        wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
+        if self.guided:
+            wi = guide_search.guide_of(self.plain).draw(self, wo, u)
+        else:
+            local = warp.square_to_cosine_hemisphere(u.y, u.z)
+            wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
         pdf = self.pdf(wo, wi)
         valid = pdf > 0.0
         weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)

@@ -50,3 +50,24 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
             for c in range(width):
                 result[first + c] = result[first + c] + weight * (texel[c] if width == 4 else texel)
     return tuple(result)
+
+
+def fetch(table: Table, *indices: Scalar) -> tuple[Scalar, ...]:
+    """Every channel of one texel, given by a whole number from 0 along each axis; nothing is interpolated."""
+    if not any(is_drjit(x) for x in indices):
+        # a texel is where a lookup meets its centre
+        return lookup(table, *[(x + 0.5) / count for x, count in zip(indices, table.shape, strict=True)])
+    dr = drjit()
+    kind = types_like(type(next(x for x in indices if is_drjit(x))))
+    UInt = kind.module.UInt32
+    index: Array = UInt(0)
+    for x, count in zip(indices, table.shape, strict=True):
+        index = index * count + (UInt(x) if is_drjit(x) else int(x))
+    if table.channels == 1:
+        return (dr.gather(kind.float, table.array(kind), index),)
+    if table.channels in (2, 4):
+        texel = dr.gather(kind.vec2 if table.channels == 2 else kind.vec4, table.array(kind), index)
+        return tuple(texel)
+    return tuple(
+        dr.gather(kind.float, table.array(kind), index * table.channels + c) for c in range(table.channels)
+    )
