@@ -25,14 +25,16 @@ from .parameters import Material, Parameter, Value, pair_of
 
 Grid: TypeAlias = "NDArray[np.float64]"
 
-ANGLES = 17  # of wo, from the normal to the horizon: steps of 5.6 degrees
+ANGLES = 33  # of wo, from the normal to the horizon: steps of 2.8 degrees
+FEWER = 17  # where there are slices along more than the angle
 ROWS, COLUMNS = 64, 17  # nodes of s, and of the azimuth over half a turn
 AZIMUTHS, ROUND = 16, 33  # of wo, and nodes of a full turn, where `eval` turns with the surface
+REFINEMENTS = 4  # of the tables toward least variance; more gain nothing
 FINE = 2  # points at which `eval` is asked, for each step between nodes, along both
 HORIZON = np.radians(89.7)  # stands for 90 degrees, where nothing is seen
 COSINES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # shares of samples that may follow the cosine
 NARROWEST = 1e-10  # of q: lobes 1e-5 wide
-WIDTH_ANGLES = (2, 7, 12)  # of the slices, at which that is looked at
+WIDTH_ANGLES = (0.12, 0.45, 0.75)  # of wo, as shares of 90 degrees, at which that is looked at
 PEAKS = 2881  # directions in the plane of wo among which a lobe's peak is looked for
 WIDTH_SHARE = 0.2  # of a lobe's light that lies within q0
 VARYING = 9  # slices along a parameter that varies over the surface, and of two such:
@@ -42,6 +44,7 @@ DIFFERENT = 0.05  # share of the light that must move for a varying parameter to
 SMALLEST = 1.0 / 64.0  # where the range of a width that varies starts at 0
 SAME = 0.02  # relative difference under which two sides, or two azimuths, are alike
 PROBES = 768
+LEAST_LEFT = 0.25  # of the mean about a node that the refinement leaves: `eval` may be more between the points
 LEAST = 1e-20  # light of a slice that counts as none
 KEPT = 64  # guides in memory
 CHARTS = ("half", "normal", "centre")
@@ -112,7 +115,7 @@ def find(material: Any) -> Guide:
     cosine = sum(best.cosine * float(np.sum(best.light)) for best in found) / light
     return Guide(
         lobes=tuple(best.lobe(f"{name}_{'across' if best.across else 'here'}") for best in found),
-        angles=ANGLES,
+        angles=len(slices.angles),
         azimuths=slices.azimuths,
         behind=behind,
         above=1.0 in lit,
@@ -125,7 +128,7 @@ def find(material: Any) -> Guide:
 
 def _nothing() -> Guide:
     none = Table("guide_none", np.zeros((1, 1)))
-    return Guide((), ANGLES, 1, False, True, True, (), none, none)
+    return Guide((), 1, 1, False, True, True, (), none, none)
 
 
 # --------------------------------------------------------------------------- directions, and what eval says of them
@@ -392,7 +395,7 @@ class _Slices:
     def __init__(self, versions: list[Any], azimuths: int, sides: list[float]) -> None:
         self.versions, self.azimuths, self.sides = versions, azimuths, sides
         self.full = azimuths > 1
-        self.angles = np.linspace(0.0, 0.5 * np.pi, ANGLES)
+        self.angles = np.linspace(0.0, 0.5 * np.pi, FEWER if self.full or len(versions) > 1 else ANGLES)
         self.s, self._rows, self._from_rows = _steps(ROWS, False)
         phi, self._columns, self._from_columns = _steps(ROUND if self.full else COLUMNS, self.full)
         self.span = 2.0 * np.pi if self.full else np.pi
@@ -403,10 +406,10 @@ class _Slices:
 
     @property
     def count(self) -> int:
-        return ANGLES * len(self.versions) * self.azimuths * len(self.sides)
+        return len(self.angles) * len(self.versions) * self.azimuths * len(self.sides)
 
     def groups(self) -> Iterator[tuple[Any, float, float]]:
-        """(version, azimuth, side) of each run of ANGLES slices."""
+        """(version, azimuth, side) of each run of slices over the angles of wo."""
         for side in self.sides:
             for azimuth in range(self.azimuths):
                 for version in self.versions:
@@ -456,13 +459,13 @@ class _Slices:
     def _judged(self, chart: _Chart, nodes: list[_Fine], middles: list[_Fine], centres: Grid) -> _Best:
         """The tables, and the variance that they lead to half-way between slices."""
         light = np.array([fine.light.sum((1, 2)) * self.cell for fine in nodes])
-        density = np.array([self._rows @ fine.light @ self._columns.T for fine in nodes])
+        density = np.array([self._fitted(fine.light) for fine in nodes])
         sums = (_trapezoid(density.shape[-2], 1.0), _trapezoid(density.shape[-1], self.span))
         density /= np.maximum(np.einsum("gakj,k,j->ga", density, *sums), LEAST)[..., None, None]
         along = density.reshape(len(self.sides), self.azimuths, len(self.versions), *density.shape[1:])
         mixed = 0.5 * (along[..., 1:, :, :] + along[..., :-1, :, :])
         mixed = 0.5 * (mixed + np.roll(mixed, -1, axis=1)) if self.full else mixed
-        expected = (self._from_rows @ mixed @ self._from_columns.T).reshape(len(nodes), ANGLES - 1, *middles[0].light.shape[1:])
+        expected = (self._from_rows @ mixed @ self._from_columns.T).reshape(len(nodes), *middles[0].light.shape)
         wanted = np.array([fine.light for fine in middles])
         flat = np.array([fine.cosine for fine in middles])
         total = wanted.sum((2, 3)) * self.cell
@@ -476,6 +479,19 @@ class _Slices:
         shape = (self.count, *density.shape[2:])
         return _Best(chart, self.full, density.reshape(shape), light.ravel(), centres, *best)
 
+    def _fitted(self, light: Grid) -> Grid:
+        """Values at the nodes, at first the means around each; then the second moment of light / density is made less.
+
+        Where the integral of light^2 / density is least, the mean of its square about each node is the same, so nodes
+        where that is larger are raised: by its root, in steps that keep every value positive.
+        """
+        means = nodes = self._rows @ light @ self._columns.T
+        for _ in range(REFINEMENTS):
+            density = self._from_rows @ nodes @ self._from_columns.T
+            ratio = np.divide(light, density, out=np.zeros_like(light), where=density > 0.0)
+            nodes = np.maximum(nodes * np.sqrt(self._rows @ (ratio * ratio) @ self._columns.T), LEAST_LEFT * means)
+        return nodes
+
     def _width(
         self, name: str, across: bool, group: tuple[Any, float, float], centres: Grid
     ) -> float | None:
@@ -485,7 +501,7 @@ class _Slices:
         q = np.geomspace(NARROWEST, chart.q_max, 320)
         s, phi = np.log1p(q / chart.q0) / chart.span, (np.arange(12) + 0.5) * (2.0 * np.pi / 12)
         found = []
-        for place in WIDTH_ANGLES:
+        for place in (round(share * (len(self.angles) - 1)) for share in WIDTH_ANGLES):
             wo = _direction(self.angles[place], azimuth, 1.0)
             wi, jacobian = chart.direction(wo, s[:, None], phi[None], (centres[place, 0], centres[place, 1]))
             below = np.cumsum(np.where(wi[2] > 0.0, self._seen(material, across, side, wo, wi) * jacobian, 0.0).sum(1))
@@ -496,7 +512,7 @@ class _Slices:
     def _centres(self, name: str, material: Any, across: bool, side: float) -> Grid:
         """Sine and cosine of the angle at which a lobe has its peak, in the plane of wo, for each angle of wo."""
         if name != "centre":
-            return np.tile([0.0, 1.0], (ANGLES, 1))
+            return np.tile([0.0, 1.0], (len(self.angles), 1))
         angle = np.radians(np.linspace(-89.9, 89.9, PEAKS))
         wo = tuple(x[:, None] for x in _direction(np.minimum(self.angles, HORIZON), 0.0, 1.0))
         wi = np.sin(angle)[None], np.zeros((1, PEAKS)), np.cos(angle)[None]
