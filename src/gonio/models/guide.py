@@ -104,11 +104,10 @@ class Lobe(NamedTuple):
         _, rows, columns = self.density.shape
         row, along = _cell(s * (rows - 1.0), rows)
         column, across = _cell(phi * ((columns - 1.0) / self.span), columns)
-        low, high = (
-            _between(*(fetch(self.density, index, row + step, column + next_)[0] for next_ in (0.0, 1.0)), across)
-            for step in (0.0, 1.0)
+        (a,), (b,), (c,), (d,) = (
+            fetch(self.density, index, row + i, column + j) for i in (0.0, 1.0) for j in (0.0, 1.0)
         )
-        return _between(low, high, along)
+        return _between(_between(a, b, across), _between(c, d, across), along)
 
     def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
         """(s, phi) with the density of a slice: first s, by the integrals over phi, then phi at that s."""
@@ -124,10 +123,12 @@ class Lobe(NamedTuple):
         along = _in_cell((u1 - row_below(row)) * (rows - 1.0), total(row), total(row + 1.0))
 
         def column_below(column: Scalar) -> Scalar:
-            return _between(*(fetch(self.below, index, row + step, column)[0] for step in (0.0, 1.0)), along)
+            (low,), (high,) = fetch(self.below, index, row, column), fetch(self.below, index, row + 1.0, column)
+            return _between(low, high, along)
 
         def height(column: Scalar) -> Scalar:
-            return _between(*(fetch(self.density, index, row + step, column)[0] for step in (0.0, 1.0)), along)
+            (low,), (high,) = fetch(self.density, index, row, column), fetch(self.density, index, row + 1.0, column)
+            return _between(low, high, along)
 
         u2 = u2 * column_below(0.0 * row + (columns - 1.0))
         column = _search(column_below, u2, columns)
@@ -146,12 +147,12 @@ class Place(NamedTuple):
 class Axis(NamedTuple):
     """A direction along which slices are laid: a parameter that varies over the surface.
 
-    read   its value of a bound material, as a place from 0 to 1
-    count  slices along it
+    read    its value of a bound material, as a place from 0 to 1
+    slices  along it
     """
 
     read: Callable[[object], Scalar]
-    count: int
+    slices: int
 
 
 class Guide(NamedTuple):
@@ -214,8 +215,7 @@ class Guide(NamedTuple):
         by_cosine = u.x < cosine
         rest = where(by_cosine, u.x / cosine, (u.x - cosine) / (1.0 - cosine))
         index, left = _pick(place, minimum(rest, ALMOST_ONE))
-        both = len({lobe.across for lobe in self.lobes}) == 2
-        crosses = left < where(by_cosine, 0.5, fetch(self.shares, index)[0]) if both else None
+        crosses = left < where(by_cosine, 0.5, fetch(self.shares, index)[0])
         chosen: Direction | None = None
         for lobe in self.lobes:
             # both halves of the azimuth are alike: u2 picks one and is stretched
@@ -224,8 +224,10 @@ class Guide(NamedTuple):
             if not lobe.full:
                 phi = where(u.z < 0.5, -phi, phi)
             w = lobe.direction(place, _turned(above, turn), s, phi)
-            # a direction under the surface is a failed sample, whichever side the lobe is on
-            w = _turned(vec3(w.x, w.y, maximum(w.z, 0.0)), vec3(turn.x, -turn.y, turn.z))
+            # a direction under the surface, which the other side's lobe may hold too, becomes a failed sample: z = 0
+            flattened = ops.rsqrt(maximum(w.x * w.x + w.y * w.y, 1e-20))
+            w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, 0.0 * w.z))
+            w = _turned(w, vec3(turn.x, -turn.y, turn.z))
             w = where(by_cosine, flat, w)
             w = vec3(w.x, w.y, w.z * (-sign if lobe.across else sign))
             chosen = w if chosen is None else where(crosses if lobe.across else ~crosses, w, chosen)
@@ -259,9 +261,9 @@ class Guide(NamedTuple):
         ways = [_cell(angle * (self.angles - 1.0), self.angles)]
         strides, count = [1], self.angles
         for axis in self.axes:
-            ways.append(_cell(axis.read(material) * (axis.count - 1.0), axis.count))
+            ways.append(_cell(axis.read(material) * (axis.slices - 1.0), axis.slices))
             strides.append(count)
-            count *= axis.count
+            count *= axis.slices
         slices, weights = [0.0 * cos], [1.0 + 0.0 * cos]
         for (cell, along), stride in zip(ways, strides, strict=True):
             slices, weights = (

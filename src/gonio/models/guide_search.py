@@ -30,12 +30,13 @@ FEWER = 17  # where there are slices along more than the angle
 ROWS, COLUMNS = 64, 17  # nodes of s, and of the azimuth over half a turn
 AZIMUTHS, ROUND = 16, 33  # of wo, and nodes of a full turn, where `eval` turns with the surface
 REFINEMENTS = 4  # of the tables toward least variance; more gain nothing
+JUDGED = 4  # of so many azimuths of wo one is judged
 FINE = 2  # points at which `eval` is asked, for each step between nodes, along both
 HORIZON = np.radians(89.7)  # stands for 90 degrees, where nothing is seen
 COSINES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.3, 0.6)  # shares of samples that may follow the cosine
 NARROWEST = 1e-10  # of q: lobes 1e-5 wide
 WIDTH_ANGLES = (0.12, 0.45, 0.75)  # of wo, as shares of 90 degrees, at which that is looked at
-PEAKS = 2881  # directions in the plane of wo among which a lobe's peak is looked for
+PEAKS, ZOOMS = 801, 3  # directions in the plane of wo among which a lobe's peak is looked for, ever closer to it
 WIDTH_SHARE = 0.2  # of a lobe's light that lies within q0
 VARYING = 9  # slices along a parameter that varies over the surface, and of two such:
 VARYING_TWO = 5
@@ -154,7 +155,7 @@ def _light(material: Guided, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> Grid
 
 
 def _pairs(side: float) -> tuple[Grid, Grid]:
-    """Pairs of directions to try, wo on one side: anywhere, and ever closer to mirrored, turned back and straight on."""
+    """Pairs of directions to try, wo on one side: anywhere, or near mirrored, turned back and straight on."""
     rng = np.random.default_rng(7)
     wo, wi = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, PROBES, 3)))
     wo[:, 2] = side * np.abs(wo[:, 2])
@@ -315,7 +316,7 @@ class _Chart:
         return float(np.log1p(self.q_max / self.q0))
 
     def direction(
-        self, wo: tuple[Grid, ...], s: Grid, phi: Grid, centre: tuple[Grid, Grid]
+        self, wo: tuple[Grid, ...], s: Grid, phi: NDArray[np.floating], centre: tuple[Any, Any]
     ) -> tuple[tuple[Grid, ...], Grid]:
         """(wi, dw / (ds dphi)), all above the surface."""
         q = self.q0 * np.expm1(s * self.span)
@@ -446,10 +447,13 @@ class _Slices:
             return None
         chart = _Chart(name, across, min(known))
         nodes, middles = [], []
+        step = JUDGED if self.full else 1
         half_way = 0.5 * (self.angles[1:] + self.angles[:-1])
         turn = np.pi / self.azimuths if self.full else 0.0
-        for (version, azimuth, side), own in groups:
+        for number, ((version, azimuth, side), own) in enumerate(groups):
             nodes.append(self.fine(chart, version, self.angles, azimuth, side, own))
+            if number % step:
+                continue
             between = own[1:] + own[:-1]
             between = between / np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-6)
             # between slices, what a ray meets at worst
@@ -465,7 +469,8 @@ class _Slices:
         along = density.reshape(len(self.sides), self.azimuths, len(self.versions), *density.shape[1:])
         mixed = 0.5 * (along[..., 1:, :, :] + along[..., :-1, :, :])
         mixed = 0.5 * (mixed + np.roll(mixed, -1, axis=1)) if self.full else mixed
-        expected = (self._from_rows @ mixed @ self._from_columns.T).reshape(len(nodes), *middles[0].light.shape)
+        mixed = mixed.reshape(len(nodes), *mixed.shape[3:])[:: len(nodes) // len(middles)]
+        expected = self._from_rows @ mixed @ self._from_columns.T
         wanted = np.array([fine.light for fine in middles])
         flat = np.array([fine.cosine for fine in middles])
         total = wanted.sum((2, 3)) * self.cell
@@ -492,14 +497,13 @@ class _Slices:
             nodes = np.maximum(nodes * np.sqrt(self._rows @ (ratio * ratio) @ self._columns.T), LEAST_LEFT * means)
         return nodes
 
-    def _width(
-        self, name: str, across: bool, group: tuple[Any, float, float], centres: Grid
-    ) -> float | None:
+    def _width(self, name: str, across: bool, group: tuple[Any, float, float], centres: Grid) -> float | None:
         """q within which lies a small share of the light, from the narrowest lobe up; None where there is no light."""
         material, azimuth, side = group
         chart = _Chart(name, across, NARROWEST)
         q = np.geomspace(NARROWEST, chart.q_max, 320)
-        s, phi = np.log1p(q / chart.q0) / chart.span, (np.arange(12) + 0.5) * (2.0 * np.pi / 12)
+        s = np.log1p(q / chart.q0) / chart.span
+        phi = (np.arange(12) + 0.5) * (2.0 * np.pi / 12)
         found = []
         for place in (round(share * (len(self.angles) - 1)) for share in WIDTH_ANGLES):
             wo = _direction(self.angles[place], azimuth, 1.0)
@@ -513,17 +517,17 @@ class _Slices:
         """Sine and cosine of the angle at which a lobe has its peak, in the plane of wo, for each angle of wo."""
         if name != "centre":
             return np.tile([0.0, 1.0], (len(self.angles), 1))
-        angle = np.radians(np.linspace(-89.9, 89.9, PEAKS))
         wo = tuple(x[:, None] for x in _direction(np.minimum(self.angles, HORIZON), 0.0, 1.0))
-        wi = np.sin(angle)[None], np.zeros((1, PEAKS)), np.cos(angle)[None]
-        light = self._seen(material, across, side, wo, wi)
-        weight = (light / np.maximum(light.max(1, keepdims=True), LEAST)) ** 4
-        centre = np.stack([(weight * wi[0]).sum(1), (weight * wi[2]).sum(1)], axis=-1) + [0.0, LEAST]
-        return centre / np.linalg.norm(centre, axis=1, keepdims=True)
+        reach, middle = 0.5 * np.pi, np.zeros((len(self.angles), 1))
+        for _ in range(ZOOMS):
+            angle = np.clip(middle + reach * np.linspace(-1.0, 1.0, PEAKS), -HORIZON, HORIZON)
+            light = self._seen(material, across, side, wo, (np.sin(angle), 0.0 * angle, np.cos(angle)))
+            weight = (light / np.maximum(light.max(1, keepdims=True), LEAST)) ** 4
+            middle = ((weight * angle).sum(1) / np.maximum(weight.sum(1), LEAST))[:, None]
+            reach *= 8.0 / PEAKS
+        return np.concatenate([np.sin(middle), np.cos(middle)], axis=1)
 
-    def _seen(
-        self, material: Any, across: bool, side: float, wo: tuple[Grid, ...], wi: tuple[Grid, ...]
-    ) -> Grid:
+    def _seen(self, material: Any, across: bool, side: float, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> Grid:
         """Light of pairs that are both given above the surface."""
         return _light(material, (wo[0], wo[1], side * wo[2]), (wi[0], wi[1], (-side if across else side) * wi[2]))
 

@@ -7,8 +7,9 @@
         def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
             return self.albedo * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
-Only `eval` must be written. `pdf` and `sample` fall back to cosine sampling, `f` follows from `eval`, and every fact
-has an honest default. Whoever wants to know something about a material asks it: no other room tests for a class.
+Only `eval` must be written. `pdf` and `sample` fall back to a guide that is found from it (`gonio.models.guide`), `f`
+follows too, and every fact has an honest default. Whoever wants to know something about a material asks it: no other
+room tests for a class.
 
 The formulas are written in the vocabulary of `gonio.ops` and see *bound* parameters (`gonio.models.binding`): Dr.Jit
 values, or symbols while recording. Callers hand over NumPy arrays, lists or Dr.Jit vectors (`gonio.models.calling`).
@@ -103,7 +104,6 @@ class BSDF(Material):
     stochastic: ClassVar[bool] = False
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
-    guided: ClassVar[bool] = False  # whether only `eval` is, so that a guide is found for sampling
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
     _declared: ClassVar[Mapping[str, Parameter]] = {}
 

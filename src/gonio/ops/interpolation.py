@@ -62,12 +62,10 @@ def fetch(table: Table, *indices: Scalar) -> tuple[Scalar, ...]:
     UInt = kind.module.UInt32
     index: Array = UInt(0)
     for x, count in zip(indices, table.shape, strict=True):
-        index = index * count + (UInt(x) if is_drjit(x) else int(x))
+        index = index * count + UInt(x)
     if table.channels == 1:
         return (dr.gather(kind.float, table.array(kind), index),)
     if table.channels in (2, 4):
         texel = dr.gather(kind.vec2 if table.channels == 2 else kind.vec4, table.array(kind), index)
         return tuple(texel)
-    return tuple(
-        dr.gather(kind.float, table.array(kind), index * table.channels + c) for c in range(table.channels)
-    )
+    return tuple(dr.gather(kind.float, table.array(kind), index * table.channels + c) for c in range(table.channels))
