@@ -39,7 +39,10 @@ class Prepared:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's."""
+    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's.
+
+    signal  the number of the signal that interrupted it, 0 where none did
+    """
 
     output: Path
     spp: int
@@ -50,6 +53,7 @@ class Result:
     settings: dict[str, images.Value]
     warnings: tuple[str, ...]
     exposure: float | None = None
+    signal: int = 0
 
     def as_dict(self) -> dict[str, object]:
         return {**asdict(self), "output": str(self.output)}
@@ -187,10 +191,10 @@ def render(
     report: Callable[[Progress], None] = lambda progress: None,
     notice: Callable[[], None] = lambda: None,
 ) -> Result:
-    """Render a scene to a file; on Ctrl-C or at the time limit, the picture so far.
+    """Render a scene to a file; on Ctrl-C, SIGTERM and SIGHUP or at the time limit, the picture so far.
 
     report  called after each pass
-    notice  called at the first Ctrl-C, from another thread
+    notice  called at the first of these signals, from another thread
     """
     started = time.perf_counter()
     with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
@@ -221,6 +225,7 @@ def render(
         settings,
         (*prepared.warnings, *filter(None, [shown.notice])),
         shown.exposure,
+        interrupts.asked if stopped == "interrupt" else 0,
     )
 
 

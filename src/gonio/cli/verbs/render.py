@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,8 @@ from typer import Option
 
 from ..options import Json, Material, Rendering, SceneFile
 from ..output import Bar, print_warnings
-from .base import INTERRUPTED, PICTURES, verb
+from ..signals import exit_code, words
+from .base import PICTURES, verb
 
 if TYPE_CHECKING:
     from ...render.run import Result
@@ -32,7 +34,8 @@ def render(
     """Render a scene, or a material on a ball, to a picture.
 
     Without -o the picture gets the name that the scene gives it, in the current folder.
-    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once.
+    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once. So do
+    SIGTERM and SIGHUP, which batch systems and closing terminals send.
 
     \b
     Examples:
@@ -47,12 +50,18 @@ def render(
     request = how.request(scene, output, timeout, made.instead_of(scene))
     with Bar(scene.name) as bar:
         result = run.render(request, report=bar.update, notice=bar.stopping)
-    if as_json:
-        print(json.dumps(result.as_dict()))
-    else:
-        _print(result, how.exposure)
+    try:
+        if as_json:
+            print(json.dumps(result.as_dict()))
+        else:
+            _print(result, how.exposure)
+        sys.stdout.flush()
+    except OSError:
+        if not result.signal:  # else it is the terminal, which has closed; the picture is written
+            raise
+        os._exit(exit_code(result.signal))
     if result.stopped == "interrupt":
-        sys.exit(INTERRUPTED)
+        sys.exit(exit_code(result.signal))
 
 
 def _print(result: Result, exposure: str) -> None:
@@ -62,6 +71,6 @@ def _print(result: Result, exposure: str) -> None:
         text += f", exposure {result.exposure:+g} EV"
     print_warnings(result.warnings)
     if result.stopped:
-        why = "stopped by Ctrl-C" if result.stopped == "interrupt" else "stopped at the time limit"
+        why = f"stopped by {words(result.signal)}" if result.stopped == "interrupt" else "stopped at the time limit"
         text += f"; {why}, {result.wanted_spp} spp were asked for"
     print(text)
