@@ -62,6 +62,11 @@ class Bar:
         with contextlib.suppress(OSError):  # a terminal that has closed costs no picture
             self._bar.update(self._task, total=total, completed=done, state=state)
 
+    def tell(self, text: str) -> None:
+        """A line above the bar."""
+        with contextlib.suppress(OSError):
+            self._console.print(text, markup=False, soft_wrap=True)
+
     def stopping(self) -> None:
         with contextlib.suppress(OSError):
             self._console.print("ending in a moment; Ctrl-C again to end at once")

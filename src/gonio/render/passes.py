@@ -14,9 +14,9 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,10 @@ class Renders(Protocol):
 
     def aov(self) -> dict[str, NDArray[np.float32]]: ...
 
+    def state(self) -> dict[str, NDArray[Any]]: ...
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None: ...
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -64,14 +68,14 @@ def run(
 ) -> str:
     """Advance `render` to `spp` samples per pixel; why it ended: "" (done), "interrupt" or "timeout".
 
-    At least one pass is made, so that there is always a picture. Both wishes to stop are looked at between
-    passes; near the time limit the passes shrink to what still fits.
+    At least one pass is made where samples are missing, so that there is always a picture. Both wishes to stop are
+    looked at between passes; near the time limit the passes shrink to what still fits.
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # a Mitsuba scene's passes are of one size
     count = power_of_two(FIRST_PASS / pixels)
     compiled, counted_samples, counted_seconds = False, 0, 0.0
-    while True:
+    while render.done < spp:
         if fixed:
             count = fixed
         before, started = render.done, clock()
@@ -95,6 +99,7 @@ def run(
             if timeout is not None:
                 count = min(count, max(1, int(left * rate / pixels)))
         compiled = True
+    return ""
 
 
 def _next_count(count: int, elapsed: float, compiled: bool) -> int:
