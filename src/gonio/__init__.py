@@ -36,6 +36,7 @@ _PLACES = {
         *("angle", "bsdf", "choice", "flag", "method", "model", "never", "number", "spectrum", "width"),
     ),
     "energy": ("Albedo", "albedo"),
+    "render": ("resume",),
     "render.integrators": ("Integrator",),
     "verify.laws": ("Law",),
     "render.tables": ("bake",),
@@ -76,7 +77,7 @@ if TYPE_CHECKING:
     from .optics.fresnel import Fresnel
     from .optics.masking import Masking
     from .optics.ndf import NDF, Stretched
-    from .render import render
+    from .render import render, resume
     from .render.integrators import Integrator
     from .render.tables import bake
     from .verify import verify
@@ -117,6 +118,6 @@ __all__ = [
     "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
     "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
     "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model",
-    "models", "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided",
-    "verify", "view", "width",
+    "models", "never", "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study",
+    "two_sided", "verify", "view", "width",
 ]  # fmt: skip

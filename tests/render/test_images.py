@@ -8,6 +8,7 @@ import resource
 import struct
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -58,10 +59,14 @@ def test_png_is_a_valid_file_to_another_reader(tmp_path: Path, picture: np.ndarr
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(
-    tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    picture: np.ndarray,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = tmp_path / "a.exr"
     path.write_bytes(b"old")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("rescued")))
 
     def no_space(descriptor: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

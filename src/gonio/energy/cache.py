@@ -74,7 +74,7 @@ def _store(path: Path, content: bytes) -> None:
     """Write a file of the cache where that can be done: a read-only home costs time, not correctness."""
     with contextlib.suppress(OSError, GonioError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        files.write_whole(path, content)
+        files.write_whole(path, content, rescue=False)
 
 
 def _meaning(source: str) -> str:

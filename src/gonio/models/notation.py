@@ -130,6 +130,34 @@ def written(value: Value) -> str:
     return str(value)
 
 
+def as_json(material: BSDF) -> dict[str, object]:
+    """The material as JSON has it, to the last digit: {"type": "conductor", "alpha": 0.3}; `made` takes the values.
+
+    Raises InputError for a class that no file holds, and for values that JSON has no word for.
+    """
+    found: dict[str, object] = {"type": spelled(type(material))}
+    if found["type"] != type(material).name and ":" not in str(found["type"]):
+        what = f"the class {type(material).__name__} is known to this program alone"
+        raise InputError(what, "material", "put it into a file, and name it FILE.py:CLASS")
+    for name, value in settings(material).items():
+        if isinstance(value, BSDF):
+            found[name] = as_json(value)
+        elif isinstance(value, bool | str):
+            found[name] = value
+        else:
+            try:
+                found[name] = np.asarray(value, float).tolist()
+            except (TypeError, ValueError):
+                raise InputError(f"{name} = {value!r} is no number", "material", "give numbers") from None
+    return found
+
+
+def from_json(described: Mapping[str, object]) -> BSDF:
+    """The material that `as_json` describes."""
+    fields = dict(described)
+    return made(class_named(str(fields.pop("type")), "material"), fields)[0]
+
+
 def settings(material: BSDF) -> dict[str, Value]:
     """The parameters that are not the default, by name."""
     found = {}

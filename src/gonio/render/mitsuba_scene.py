@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -43,9 +44,22 @@ class MitsubaRender:
         taken = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * taken
-        self._sum = weighted if self._sum is None else self._sum + weighted
+        self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
         self.done += taken
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """The sum so far, and which passes it is of."""
+        assert self._sum is not None, "advance() comes first"
+        return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError for another film."""
+        width, height = self._sensor.film().crop_size()
+        if "sum" not in state or "passes" not in state or state["sum"].shape[:2] != (int(height), int(width)):
+            raise ValueError("no sum of this film")
+        self._sum, (self._passes, self.pass_size) = state["sum"], map(int, state["passes"])
+        self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
         tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
@@ -69,7 +83,8 @@ def load(request: Request, mi: ModuleType) -> Scene:
     if not request.allow_outside:
         _check_inside(request.scene, request.overrides)
     try:
-        scene = mi.load_file(where, **{key: _as_xml(value) for key, value in request.overrides.items()})
+        # one after the other: in parallel the order of shapes, and with it the last bit, is left to chance
+        scene = mi.load_file(where, parallel=False, **{key: _as_xml(value) for key, value in request.overrides.items()})
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():
@@ -103,8 +118,29 @@ def _mitsuba_text(error: Exception) -> str:
     return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
 
 
+def sources(file: Path, parameters: Mapping[str, object]) -> tuple[str, dict[str, Path]]:
+    """The text of a scene with all that it includes, and every file that it names, by the name that it gives it."""
+    texts, named = [repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))], {}
+    texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
+    for _, name, target, included in _named(file, parameters):
+        named[name] = target
+        if included:
+            texts.append(target.read_text(encoding="utf-8", errors="surrogateescape"))
+    return "\n".join(texts), named
+
+
 def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
     """Raise InputError where a Mitsuba scene, or a file it includes, names a file outside the scene's folder."""
+    folder = file.parent.resolve()
+    for current, name, target, _ in _named(file, parameters):
+        if not target.is_relative_to(folder):
+            what = f"'{name}' lies outside the scene's folder {folder}"
+            raise InputError(what, str(current), "copy it there, or use --allow-outside")
+
+
+def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path, str, Path, bool]]:
+    """Each file that exists and is named by a Mitsuba scene, or by a file that it includes: (where, its name there,
+    the file, whether it is included)."""
     folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
     while waiting:
         current = waiting.pop()
@@ -128,8 +164,7 @@ def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
                 exists = target.exists()
             except (OSError, ValueError):  # no file's name, such as a long or odd string
                 continue
-            if exists and not target.is_relative_to(folder):
-                what = f"'{name}' lies outside the scene's folder {folder}"
-                raise InputError(what, str(current), "copy it there, or use --allow-outside")
-            if element.tag == "include" and exists:
-                waiting.append(target)
+            if exists:
+                yield current, name, target, element.tag == "include"
+                if element.tag == "include":
+                    waiting.append(target)
