@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+from collections.abc import Iterator
 from types import ModuleType
 
 from .. import llvm
@@ -56,3 +58,23 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
             raise InputError(f"{threads} threads asked for", "--threads", "give 1 or more")
         dr.set_thread_count(threads)
     return mi
+
+
+@contextlib.contextmanager
+def file_threads() -> Iterator[None]:
+    """Whatever Mitsuba reads or writes is read or written in here.
+
+    Its OpenEXR hands blocks to Dr.Jit's threads and waits for them, for ever where there is none beside the one that
+    waits: with one CPU, or `threads=1`, there is a second one meanwhile.
+    """
+    import drjit as dr
+
+    count = dr.thread_count()
+    if count >= 2:
+        yield
+        return
+    dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        dr.set_thread_count(count)

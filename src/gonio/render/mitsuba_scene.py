@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import engine, formats
 from .passes import power_of_two
 from .request import Request
 from .types import Plugin, Scene
@@ -66,10 +67,10 @@ class MitsubaRender:
 def load(request: Request, mi: ModuleType) -> Scene:
     """The scene of a Mitsuba XML file; the request's overrides are its `$parameters`."""
     where = str(request.scene)
-    if not request.allow_outside:
-        _check_inside(request.scene, request.overrides)
+    check_files(request.scene, request.overrides, request.allow_outside)
     try:
-        scene = mi.load_file(where, **{key: _as_xml(value) for key, value in request.overrides.items()})
+        with engine.file_threads():
+            scene = mi.load_file(where, **{key: _as_xml(value) for key, value in request.overrides.items()})
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():
@@ -103,8 +104,24 @@ def _mitsuba_text(error: Exception) -> str:
     return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
 
 
-def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
-    """Raise InputError where a Mitsuba scene, or a file it includes, names a file outside the scene's folder."""
+def check_files(file: Path, parameters: Mapping[str, object], allow_outside: bool = False) -> None:
+    """Raise InputError where a Mitsuba scene, or a file it includes, names a file that must not be opened: one outside
+    the scene's folder, or a picture that contradicts itself, by which a library in C++ could be corrupted."""
+    folder = file.parent.resolve()
+    for current, name, target in _named_files(file, parameters):
+        if not allow_outside and not target.is_relative_to(folder):
+            what = f"'{name}' lies outside the scene's folder {folder}"
+            raise InputError(what, str(current), "copy it there, or use --allow-outside")
+        try:
+            formats.check_file(target)
+        except formats.Unreadable as error:
+            raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
+        except OSError as error:
+            raise InputError(f"'{name}' cannot be read: {error.strerror}", str(current), "check the file") from None
+
+
+def _named_files(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path, str, Path]]:
+    """Of each file that a Mitsuba scene names, and that is there: the scene's file that does, the name, the file."""
     folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
     while waiting:
         current = waiting.pop()
@@ -113,7 +130,7 @@ def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
         seen.add(current)
         try:
             root = ElementTree.parse(current).getroot()
-        except (ElementTree.ParseError, OSError, ValueError) as error:
+        except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
             raise InputError(f"not well-formed XML: {error}", str(current), "mend it there") from error
         values = {x.get("name", ""): x.get("value", "") for x in root.iter("default")}
         values |= {name: _as_xml(value) for name, value in parameters.items()}
@@ -125,11 +142,10 @@ def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
                 name = name.replace("$" + key, values[key])
             try:
                 target = (folder / name).resolve()
-                exists = target.exists()
-            except (OSError, ValueError):  # no file's name, such as a long or odd string
+                exists = target.is_file()
+            except (OSError, ValueError, RuntimeError):  # no file's name, such as a long or odd string, or a loop
                 continue
-            if exists and not target.is_relative_to(folder):
-                what = f"'{name}' lies outside the scene's folder {folder}"
-                raise InputError(what, str(current), "copy it there, or use --allow-outside")
+            if exists:
+                yield current, name, target
             if element.tag == "include" and exists:
                 waiting.append(target)
