@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from .. import archives, files
 from ..errors import InputError, did_you_mean
+from ..owner import alone
 from . import engine, exposures, formats
 
 Value = str | int | float
@@ -56,6 +57,7 @@ def check_writable(path: str | Path) -> Path:
     return files.check_file(target)
 
 
+@alone
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format its suffix names, whole or not at all.
 
@@ -180,6 +182,7 @@ def _one_line(value: Value) -> str:
 # --- reading -------------------------------------------------------------------------------------------
 
 
+@alone
 def read(path: str | Path) -> Picture:
     """A picture as linear RGB, with the settings that Gonio wrote into it.
 

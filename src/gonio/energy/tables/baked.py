@@ -83,9 +83,7 @@ def read(path: Path) -> Baked:
         text, seal = str(arrays.pop("manifest")), str(arrays.pop("seal"))
         manifest = json.loads(text)
         hashes = dict(manifest["hash"])
-    except (
-        Exception
-    ) as error:  # of any content
+    except Exception as error:  # of any content
         raise ValueError("damaged, or not written by gonio bake") from error
     altered = ["manifest"] if seal != _seal(text) else []
     altered += [name for name, value in hashes.items() if name not in arrays or content_hash(arrays[name]) != value]
