@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..models import BSDF, notation, tree
 from ..ops import graph
 from ..ops.types import Value
+from ..owner import alone
 from . import program as programs
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment
@@ -68,6 +69,7 @@ class Bundle:
         return [folder / file for file in contents]
 
 
+@alone
 def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:
     """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
 
@@ -83,6 +85,7 @@ def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eva
     return bundle(model, lang, functions).text
 
 
+@alone
 def bundle(
     model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")
 ) -> Bundle:

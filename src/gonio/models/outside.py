@@ -21,6 +21,7 @@ import numpy as np
 from .. import members
 from ..errors import GonioError, InputError, did_you_mean
 from ..ops import RecordingError
+from ..owner import alone
 from . import tree
 from .material import BSDF
 from .sample import Sample
@@ -193,6 +194,7 @@ def _line_of(cls: type) -> str:
 # --------------------------------------------------------------------------- trying a material
 
 
+@alone
 def probe(material: BSDF) -> BSDF:
     """The material itself, after its formulas were tried on two directions. InputError, with file and line, where one
     raises, uses Python's `if` on a value, or returns what it must not: better than a failure deep inside a render."""

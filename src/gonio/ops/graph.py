@@ -26,6 +26,7 @@ from typing import Protocol, TypeAlias, TypeGuard
 import numpy as np
 
 from ..errors import GonioError
+from ..owner import alone
 from .table import read_in_numpy
 from .types import Value
 
@@ -392,6 +393,7 @@ def recording(values: tuple) -> bool:
     return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
 
 
+@alone
 def record(
     python_function: Callable,
     *,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._callable import make_callable
+from ..owner import alone
 
 if TYPE_CHECKING:
     from ..models import BSDF
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from .request import Request
 
 
+@alone
 def render(
     scene: str | Path | BSDF,
     *,
@@ -82,9 +84,10 @@ def render(
         material=scene if isinstance(scene, BSDF) else None,
         checkpoint=None if checkpoint is None else Path(checkpoint),
     )
-    return _picture(request)
+    return _picture(request, level=5)  # past the lock and the call of the module
 
 
+@alone
 def resume(
     checkpoint: str | Path,
     *,
@@ -113,11 +116,11 @@ def resume(
         timeout=timeout,
     )
     change.check()
-    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code))
+    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=4)
 
 
-def _picture(request: Request) -> RGB:
-    """Render it, write it where an output is named, and warn of what is to be known."""
+def _picture(request: Request, level: int) -> RGB:
+    """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
     import warnings
 
     from ..errors import GonioWarning
@@ -138,7 +141,7 @@ def _picture(request: Request) -> RGB:
     if keeper.error:
         notices.append(f"no checkpoint was written: {keeper.error.what}")
     for notice in notices:
-        warnings.warn(notice, GonioWarning, stacklevel=4)  # past `render` and the call of the module
+        warnings.warn(notice, GonioWarning, stacklevel=level)
     return picture
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import engine, formats
 from .passes import power_of_two
 from .request import Request
 from .types import Plugin, Scene
@@ -80,11 +81,12 @@ class MitsubaRender:
 def load(request: Request, mi: ModuleType) -> Scene:
     """The scene of a Mitsuba XML file; the request's overrides are its `$parameters`."""
     where = str(request.scene)
-    if not request.allow_outside:
-        _check_inside(request.scene, request.overrides)
+    check_files(request.scene, request.overrides, request.allow_outside)
     try:
         # one after the other: in parallel the order of shapes, and with it the last bit, is left to chance
-        scene = mi.load_file(where, parallel=False, **{key: _as_xml(value) for key, value in request.overrides.items()})
+        with engine.file_threads():
+            values = {key: _as_xml(value) for key, value in request.overrides.items()}
+            scene = mi.load_file(where, parallel=False, **values)
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():
@@ -129,13 +131,20 @@ def sources(file: Path, parameters: Mapping[str, object]) -> tuple[str, dict[str
     return "\n".join(texts), named
 
 
-def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
-    """Raise InputError where a Mitsuba scene, or a file it includes, names a file outside the scene's folder."""
+def check_files(file: Path, parameters: Mapping[str, object], allow_outside: bool = False) -> None:
+    """Raise InputError where a Mitsuba scene, or a file it includes, names a file that must not be opened: one outside
+    the scene's folder, or a picture that contradicts itself, by which a library in C++ could be corrupted."""
     folder = file.parent.resolve()
     for current, name, target, _ in _named(file, parameters):
-        if not target.is_relative_to(folder):
+        if not allow_outside and not target.is_relative_to(folder):
             what = f"'{name}' lies outside the scene's folder {folder}"
             raise InputError(what, str(current), "copy it there, or use --allow-outside")
+        try:
+            formats.check_file(target)
+        except formats.Unreadable as error:
+            raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
+        except OSError as error:
+            raise InputError(f"'{name}' cannot be read: {error.strerror}", str(current), "check the file") from None
 
 
 def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path, str, Path, bool]]:
@@ -149,7 +158,7 @@ def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path,
         seen.add(current)
         try:
             root = ElementTree.parse(current).getroot()
-        except (ElementTree.ParseError, OSError, ValueError) as error:
+        except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
             raise InputError(f"not well-formed XML: {error}", str(current), "mend it there") from error
         values = {x.get("name", ""): x.get("value", "") for x in root.iter("default")}
         values |= {name: _as_xml(value) for name, value in parameters.items()}
@@ -161,8 +170,8 @@ def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path,
                 name = name.replace("$" + key, values[key])
             try:
                 target = (folder / name).resolve()
-                exists = target.exists()
-            except (OSError, ValueError):  # no file's name, such as a long or odd string
+                exists = target.is_file()
+            except (OSError, ValueError, RuntimeError):  # no file's name, such as a long or odd string, or a loop
                 continue
             if exists:
                 yield current, name, target, element.tag == "include"

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..models import BSDF, notation, tree
-from ..render import engine, scene
+from ..render import scene
 from ..render.scene import schema, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
 from ..render.scene.values import ImageTexture, rgb
@@ -223,8 +223,7 @@ def _environment(description: schema.SceneDescription, light: schema.Environment
     if not isinstance(source, ImageTexture):
         return {**found, "constant": [float(x) for x in rgb(source)]}
     where = description.where("/scene/lights")
-    mi = engine.load("cpu")
-    pixels = textures.load_image(mi, description.locate(source.file, where), where, srgb=source.color_space == "srgb")
+    pixels = textures.load_image(description.locate(source.file, where), where, srgb=source.color_space == "srgb")
     pixels = _smaller(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     halves = np.ones((*pixels.shape[:2], 4), "<f2")
     halves[..., :3] = np.clip(pixels, 0.0, np.finfo(np.float16).max)

@@ -231,7 +231,7 @@ class _Builder:
         path = self.description.locate(texture.file, f"{where}/file")
         if (path, srgb) not in self.images:
             here = self.description.where(f"{where}/file")
-            self.images[path, srgb] = textures.load_image(self.mi, path, here, srgb=srgb)
+            self.images[path, srgb] = textures.load_image(path, here, srgb=srgb)
         return self.images[path, srgb]
 
     def check_range(self, pixels: RGB, parameter: Parameter, texture: ImageTexture, where: str) -> None:
