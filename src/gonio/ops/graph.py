@@ -26,7 +26,7 @@ from typing import Protocol, TypeAlias, TypeGuard
 import numpy as np
 
 from ..errors import GonioError
-from .table import read_in_numpy
+from .table import fetch_in_numpy, read_in_numpy
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
@@ -492,6 +492,9 @@ def _run(function: Function, arguments: list) -> Value:
         elif node.op == "lookup":
             table, channel = node.static
             values.append(read_in_numpy(table, *args)[channel])
+        elif node.op == "fetch":
+            table, channel = node.static
+            values.append(fetch_in_numpy(table, *args)[channel])
         else:
             values.append(NUMPY[node.op](*args))
     return _rebuild(function.result, get)
