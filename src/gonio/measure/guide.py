@@ -25,10 +25,10 @@ from .warp import Nodes, Warp
 
 Floats = NDArray[np.float64]
 
-VIEWS = 16  # angles of view; between them densities are mixed
-COLUMNS, ROWS = 64, 32  # of theta_m by its square root, and of phi_m over half a turn: its other half is mirrored
+VIEWS = 24  # angles of view; between them densities are mixed
+COLUMNS, ROWS = 96, 48  # of theta_m by its square root, and of phi_m over half a turn: its other half is mirrored
 FINE = 4  # as many points a node and axis, so that a lobe between two nodes is seen
-COSINE = 0.1  # share of samples by the cosine
+COSINE = 0.03  # share of samples by the cosine: what the guide misses weighs 1 / 0.03 at most
 ALMOST_ONE = 0.99999994  # the largest float32 under 1
 
 

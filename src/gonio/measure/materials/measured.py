@@ -30,8 +30,9 @@ class Measured(BSDF):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = self.file
-        vars(self)["_table"] = given if isinstance(given, Measurement) else read(given)
+        table = read(self.file)
+        table.prepare()
+        vars(self)["_table"] = table
 
     @classmethod
     def reads(cls, text: str) -> bool:

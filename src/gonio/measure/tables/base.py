@@ -52,6 +52,9 @@ class Measurement:
         """A direction, and its density; what lies below the surface has failed."""
         raise NotImplementedError
 
+    def prepare(self) -> None:
+        """Find what formulas need and is expensive; while a renderer records its kernels nothing could be computed."""
+
     @property
     def isotropic(self) -> bool:
         return True

@@ -20,6 +20,10 @@ class Guided(Measurement):
 
         return Guide(luminance)
 
+    def prepare(self) -> None:
+        """The guide."""
+        _ = self.guide
+
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         return self.guide.pdf(wo, wi)
 

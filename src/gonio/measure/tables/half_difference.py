@@ -29,7 +29,7 @@ class HalfDifference(Guided, Measurement):
     theta_d > 89.5 degrees are extrapolated so in a table of MERL's size.
 
     A cell that is negative is invalid: no light, and no negative light either. It keeps its numbers; where the
-    interpolation needs it, it takes those of the nearest valid cell.
+    interpolation needs it, it takes those of the valid cell before it along theta_d, where both directions are higher.
     """
 
     name = "half-difference"
@@ -70,10 +70,20 @@ class HalfDifference(Guided, Measurement):
     def _table(self) -> Table:
         values = in_rgb(self.values, self.wavelengths)
         if not self.valid.all():
-            # along theta_h a step changes more than along the others: it is taken as four
-            nearest = distance_transform_edt(~self.valid, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
-            values = values[tuple(nearest)]
+            values = self._held(values)
         return named("half_difference", padded(values))
+
+    def _held(self, values: Floats) -> Floats:
+        """Invalid cells with the numbers of the last valid one at a smaller theta_d, as both directions rise with it;
+        where there is none, of the nearest, a step along theta_h being taken as four of the others."""
+        step = np.arange(values.shape[1])[None, :, None]
+        last = np.maximum.accumulate(np.where(self.valid, step, -1), axis=1)
+        held = np.take_along_axis(values, np.maximum(last, 0)[..., None], axis=1)
+        if last.min() < 0:
+            found = last >= 0
+            nearest = distance_transform_edt(~found, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
+            held = held[tuple(nearest)]
+        return held
 
     @ops.function
     def value(self, wo: Direction, wi: Direction) -> Spectrum:
