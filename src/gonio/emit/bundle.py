@@ -28,7 +28,7 @@ from .program import Program
 from .routine import RoutineWriter
 from .simplify import SIZES, Record, stem_of
 from .syntax import literal
-from .textures import axes, pixels, reader, width
+from .textures import READERS, axes, pixels, width
 
 Json: TypeAlias = Any  # a value that a JSON file may hold
 
@@ -127,9 +127,12 @@ def _text(made: Program, names: Names) -> str:
         uniform = f"table_{table.name}"
         size = " x ".join(map(str, table.shape))
         channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
-        about = f"// {size} texels, {channels}; linear between texel centres, held outside."
+        readings = sorted(made.readings[id(table)])
+        rule = "linear between texel centres, " if "lookup" in readings else ""
+        about = f"// {size} texels, {channels}; {rule}held outside."
         binding = language.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
-        parts.append([*binding, "", about, *reader(language, table)])
+        readers = [line for how in readings for line in ("", *READERS[how](language, table))]
+        parts.append([*binding, "", about, *readers[1:]])
     parts += bodies
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 

@@ -2,6 +2,7 @@
 
     conductor                                   its name; parameters follow as NAME=VALUE
     ward.py:Ward                                a class in a Python file, which runs because the user named it
+    gold.binary                                 a file of measured values
     conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
     {"type": "conductor", "alpha": [.1, .4]}    as in a scene
 
@@ -100,6 +101,8 @@ def typed(parameter: Parameter, value: Value) -> object:
     where = f"--param {parameter.name}"
     if parameter.inner:
         return _inner(value, where)
+    if parameter.kind == "file":
+        return value
     if parameter.kind == "choice":
         name = value.strip().strip('"') if isinstance(value, str) else value
         # a distribution or a masking term of the user's own
@@ -202,7 +205,16 @@ def spelled(cls: type[BSDF]) -> str:
 
 
 def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
-    """The class and the text of each parameter of NAME or NAME(parameter=value,...)."""
+    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...)."""
+    head = text.strip()
+    while True:  # a file's name may have brackets in it
+        reader = outside.reader_of(head)
+        if reader is not None:
+            given = dict(assignment(part, where) for part in _parts(text.strip()[len(head) :].strip("() ")))
+            return reader, {"file": head, **given}
+        head, bracket, _ = head.rpartition("(")
+        if not bracket:
+            break
     match = _CALL.fullmatch(text)
     if not match or re.fullmatch(r"[\d.-]+", match[1]):
         raise _no_material(text, where)

@@ -1,4 +1,4 @@
-"""Materials in files of the user's own: FILE.py:CLASS.
+"""Materials in files of the user's own: FILE.py:CLASS, which is code, and files of data.
 
 A file runs only where the user named it, or allowed a scene to: `load` is called for what stands on the command line or
 in a program, and by the reader of scenes where code is allowed.
@@ -36,6 +36,11 @@ _loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
 def names_code(text: str) -> bool:
     """Whether a text is FILE.py:CLASS."""
     return _CODE.fullmatch(text.strip()) is not None
+
+
+def reader_of(text: str) -> type[BSDF] | None:
+    """The material that a file of data is, by the file's name: Measured of "gold.binary"; None where it is none."""
+    return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..errors import GonioError
 from ..owner import alone
-from .table import read_in_numpy
+from .table import fetch_in_numpy, read_in_numpy
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
@@ -494,6 +494,9 @@ def _run(function: Function, arguments: list) -> Value:
         elif node.op == "lookup":
             table, channel = node.static
             values.append(read_in_numpy(table, *args)[channel])
+        elif node.op == "fetch":
+            table, channel = node.static
+            values.append(fetch_in_numpy(table, *args)[channel])
         else:
             values.append(NUMPY[node.op](*args))
     return _rebuild(function.result, get)

@@ -167,6 +167,8 @@ def _target(target: str | Path | BSDF) -> str | BSDF:
         return target
     if outside.names_code(name):
         return _own(target, name)
+    if outside.reader_of(name):
+        return notation.named(target)[0]
     known = [*distributions(), *models()]
     if name.replace("_", "-") not in known:
         raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))

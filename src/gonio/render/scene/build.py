@@ -189,6 +189,8 @@ class _Builder:
             here = where + pointer(key)
             if isinstance(value, MaterialPart):
                 plugin[name] = self.plugin(value, here)
+            elif parameters[name].kind == "file":
+                plugin[name] = material.located(str(value), self.description.locate, here)
             elif isinstance(value, (bool, str)):
                 plugin[name] = value
             elif parameters[name].kind == "spectrum":

@@ -102,7 +102,7 @@ def _check_material(description: SceneDescription, where: str, material: Materia
             place = description.where(f"{where}/{key}")
             description._warnings.append(f"{place}: ignored, as in the lab; 'gonio-{material.model.name}' uses it")
     try:
-        outside.probe(material.instance())
+        outside.probe(material.instance(description.locate, where))
     except InputError as error:
         raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
 
