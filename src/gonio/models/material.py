@@ -7,8 +7,9 @@
         def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
             return self.albedo * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
-Only `eval` must be written. `pdf` and `sample` fall back to cosine sampling, `f` follows from `eval`, and every fact
-has an honest default. Whoever wants to know something about a material asks it: no other room tests for a class.
+Only `eval` must be written. `pdf` and `sample` fall back to a guide that is found from it (`gonio.models.guide`), `f`
+follows too, and every fact has an honest default. Whoever wants to know something about a material asks it: no other
+room tests for a class.
 
 The formulas are written in the vocabulary of `gonio.ops` and see *bound* parameters (`gonio.models.binding`): Dr.Jit
 values, or symbols while recording. Callers hand over NumPy arrays, lists or Dr.Jit vectors (`gonio.models.calling`).
@@ -30,7 +31,7 @@ from ..errors import InputError, did_you_mean
 from ..members import Family, subclasses_of
 from ..ops import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, backend, graph
 from ..optics import warp
-from . import binding, recording, tree
+from . import binding, guide_search, recording, tree
 from .calling import V3, Given, method
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
 from .sample import Sample
@@ -117,6 +118,7 @@ class BSDF(Material):
                 setattr(cls, formula, method(own[formula]))
         cls.derives = cls.derive is not Material.derive
         cls.has_terms = cls.terms is not BSDF.terms
+        cls.guided = cls.pdf is BSDF.pdf and cls.sample is BSDF.sample and cls.eval is not BSDF.eval
         dataclass(frozen=True, eq=False, repr=False)(cls)
         cls._declared = declared(cls)  # on the class, and gone with it when a user's file is loaded anew
 
@@ -143,7 +145,12 @@ class BSDF(Material):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes. Here: cosine sampling."""
+        """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes.
+
+        Here, where `sample` is not written either: that of a guide found from `eval` (`gonio.models.guide`).
+        """
+        if self.guided:
+            return guide_search.guide_of(self.plain).pdf(self, wo, wi)
         same_side = wo.z * wi.z > 0.0
         return ops.where(same_side, ops.abs(wi.z) * ops.inv_pi, 0.0)
 
@@ -152,10 +159,13 @@ class BSDF(Material):
         """Choose wi for wo.
 
         u  three numbers in [0, 1) a ray, (N, 3): the first picks the lobe, the others the direction
-        Here: cosine sampling on wo's side.
+        Here: by a guide found from `eval` (`gonio.models.guide`); where `pdf` is written, cosine sampling on wo's side.
         """
-        local = warp.square_to_cosine_hemisphere(u.y, u.z)
-        wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
+        if self.guided:
+            wi = guide_search.guide_of(self.plain).draw(self, wo, u)
+        else:
+            local = warp.square_to_cosine_hemisphere(u.y, u.z)
+            wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
         pdf = self.pdf(wo, wi)
         valid = pdf > 0.0
         weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)

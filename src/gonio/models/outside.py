@@ -92,7 +92,7 @@ def files_in(text: str) -> list[Path]:
 
 
 def adopt(cls: type, where: str = "") -> type[BSDF]:
-    """A class that is no gonio.BSDF but has `eval`, as one: `pdf` and `sample` fall back to cosine sampling."""
+    """A class that is no gonio.BSDF but has `eval`, as one: `pdf` and `sample` fall back to a guide found from it."""
     if not callable(getattr(cls, "eval", None)):
         raise InputError(f"{cls.__name__} has no eval", where, "write eval(self, wo, wi): f |cos theta_i|")
     try:

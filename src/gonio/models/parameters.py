@@ -64,6 +64,7 @@ class Material:
     """What the tree of materials is made of, and a parameter may hold: `BSDF`, as far as parameters go."""
 
     derives: ClassVar[bool] = False  # whether `derive` is written
+    guided: ClassVar[bool] = False  # whether of eval, pdf and sample only `eval` is: a guide is found for sampling
 
     _bound: ClassVar[bool] = False
     _plain: Self | None = None

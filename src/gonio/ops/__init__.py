@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable
 from typing import Protocol, TypeVar, overload
 
+from ..errors import InputError
 from . import graph
 from .backend import drjit, get_precision, in_formula, is_drjit, set_precision, types_like
 from .graph import Graph, Node, RecordingError, record
@@ -24,8 +25,8 @@ from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Val
 
 __all__ = [
     "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum",
-    "Table", "Vector", "Vector3", "abs", "atan2", "clamp", "copysign", "cos", "dot", "erf", "exp", "fetch", "floor", "fma",
-    "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log", "lookup", "max_component",
+    "Table", "Vector", "Vector3", "abs", "atan2", "clamp", "copysign", "cos", "dot", "erf", "exp", "fetch", "floor",
+    "fma", "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log", "lookup", "max_component",
     "maximum", "mean", "minimum", "norm", "normalize", "pi", "pow", "record", "rsqrt", "safe_div", "safe_sqrt",
     "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3", "where",
 ]  # fmt: skip
@@ -218,17 +219,24 @@ def safe_div(a: Value, b: Value) -> Value:
 
 def vec2(x: Scalar | float, y: Scalar | float) -> Pair:
     """A vector of two components."""
-    if isinstance(x, Node) or isinstance(y, Node):
-        return graph.emit("vector", "vec2", x, y)
-    return types_like(type(x if is_drjit(x) else y)).vec2(x, y)
+    return _vector("vec2", x, y)
 
 
 def vec3(x: Scalar | float, y: Scalar | float, z: Scalar | float) -> Direction:
     """A vector of three components."""
-    if isinstance(x, Node) or isinstance(y, Node) or isinstance(z, Node):
-        return graph.emit("vector", "vec3", x, y, z)
-    known = next(v for v in (x, y, z) if is_drjit(v))
-    return types_like(type(known)).vec3(x, y, z)
+    return _vector("vec3", x, y, z)
+
+
+def _vector(kind: str, *parts: Value) -> Value:
+    """Of symbols or Dr.Jit values; of plain numbers alone, of what the formula that is running computes with."""
+    if not any(is_drjit(part) for part in parts):
+        parts = (in_formula(parts[0]), *parts[1:])
+    for part in parts:
+        if is_drjit(part):
+            return getattr(types_like(type(part)), kind)(*parts)
+    if graph._stack:
+        return graph.emit("vector", kind, *parts)
+    raise InputError(f"{kind} of plain numbers, outside of a formula", kind, "use NumPy, or give a Dr.Jit value")
 
 
 def dot(a: V, b: V) -> Scalar:

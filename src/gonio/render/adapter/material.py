@@ -7,7 +7,7 @@ import warnings
 import drjit as dr
 
 from ...errors import InputError, did_you_mean
-from ...models import BSDF, binding
+from ...models import BSDF, binding, guide_search
 from ...models.two_sided import TwoSided
 from ..native import Native
 from ..types import Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
@@ -72,6 +72,7 @@ class PlacedMaterial:
         if self.varies and self.model.needs_uniform:
             what = "this base is measured: it takes colours and numbers, no texture, unlike conductor and dielectric"
             raise InputError(what, f"{self.name}.base")
+        guide_search.prepare(self.model)  # integrators ask inside loops
         if self.model.derives and not self.varies:
             self.derived = binding.settled(self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True))
 

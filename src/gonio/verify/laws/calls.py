@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...models import BSDF
+from ...models import BSDF, tree
 from ...ops import Mode, Precision, backend
 from ...render.answers import Answer
 from .. import box, directions, severity
@@ -262,6 +262,9 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
         return  # these values do not go together
     (mixed,) = _answers(together, wo, wi, u, subject.best)
     each = {name: np.where(odd[:, None], alone[1][name], first) for name, first in alone[0].items()}
+    if any(one.guided for _, one in tree.walk(subject.model)):
+        # a guide follows all values together: its density is another than for one of them, and its samples are others
+        each = {"eval": each["eval"]}
     names = " and ".join(list(ends[0])[:3])
     answer = _unlike("textured parameters", each, mixed, wo, wi, SAME[subject.best])
     yield answer._replace(wrong=f"{answer.wrong}, {names} from ray to ray") if answer.wrong else answer

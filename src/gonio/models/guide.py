@@ -1,0 +1,334 @@
+"""Sampling for a material that has only an `eval`: a density that follows the light, tabulated from `eval` itself.
+
+The plane that a guide is tabulated over is that of a *chart*: directions about an axis, by how far they lie from it and
+in which azimuth. Of a half vector the axis is the surface normal, so that a glossy lobe stays where it is when the
+viewer moves (as in Dupuy2018); a broad or a lopsided lobe is charted directly, about the normal or about its own
+centre. With q = |v - axis|^2 = 2 (1 - cos),
+
+    s = log(1 + q / q0) / log(1 + q_max / q0),    dw = dq dphi / 2,    dq = (q + q0) log(1 + q_max / q0) ds,
+
+so that equal steps of s resolve a lobe of width sqrt(q0) and all that is wider. A density over (s, phi) is kept for
+each of a few angles of wo (and, where `eval` turns with the surface, azimuths; and values of parameters that vary over
+the surface), bilinear between nodes; between two angles it is the mixture of both. What the nodes do not show is not
+lost: a share of samples follows the cosine.
+
+`pdf` is the density of `sample` whatever the tables hold: a guide that fits badly makes noise, never bias.
+`guide_search` finds the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from .. import ops
+from ..ops import Direction, Mask, Scalar, Table, dot, fetch, inv_pi, maximum, minimum, safe_sqrt, sincos, vec3, where
+from ..ops.backend import Array
+from ..optics.frame import half_vector, reflect
+from ..optics.warp import square_to_cosine_hemisphere
+
+ALMOST_ONE = 0.99999994  # the largest float32 under 1
+
+
+class Lobe(NamedTuple):
+    """Where the light goes on one side of the surface.
+
+    across   whether that is the side where wo is not
+    chart    "half", "normal" or "centre"
+    q_max    largest q of the chart: 2 about the normal, else 4
+    full     whether azimuths run all round, from the tangent; else from wo's azimuth, and both halves are alike
+    density  over (s, phi), by slice: 1 over all s and phi
+    below    its integral over phi up to each node, by slice and node of s
+    rows     its integral over s and phi up to each node of s, by slice
+    scales   q0 and 1 / log(1 + q_max / q0)
+    centres  sine and cosine of the centre's angle to the normal, by slice: positive on wo's side
+    """
+
+    across: bool
+    chart: str
+    q_max: float
+    full: bool
+    density: Table
+    below: Table
+    rows: Table
+    scales: Table
+    centres: Table
+
+    def axis(self, place: Place) -> tuple[Scalar, Scalar]:
+        """Sine and cosine of the angle between the chart's axis and the normal, in the plane of wo."""
+        if self.chart != "centre":
+            return 0.0 * place.weights[0], 1.0 + 0.0 * place.weights[0]
+        x: Array = 0.0
+        z: Array = 0.0
+        for index, weight in zip(place.slices, place.weights, strict=True):
+            sine, cosine = fetch(self.centres, index)
+            x, z = x + weight * sine, z + weight * cosine
+        scale = ops.rsqrt(maximum(x * x + z * z, 1e-12))
+        return x * scale, z * scale
+
+    def chart_of(self, place: Place, wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
+        """(s, phi, dw / (ds dphi) of wi) of a direction above the surface, wo in the plane of x."""
+        v = half_vector(wo, wi) if self.chart == "half" else wi
+        sine, cosine = self.axis(place)
+        x, z = cosine * v.x - sine * v.z, sine * v.x + cosine * v.z
+        # 2 (1 - z), which would cancel near the axis
+        q = where(z > 0.5, 2.0 * (x * x + v.y * v.y) / (1.0 + z), 2.0 * (1.0 - z))
+        q0, scale = fetch(self.scales, 0.0 * z)
+        jacobian = 0.5 * (q + q0) / scale
+        if self.chart == "half":
+            jacobian = jacobian * (4.0 * maximum(dot(wo, v), 0.0))
+        if self.full:
+            phi = ops.atan2(v.y, x)
+            phi = where(phi < 0.0, phi + 2.0 * ops.pi, phi)
+        else:
+            phi = ops.atan2(ops.abs(v.y), x)
+        return ops.log(1.0 + q / q0) * scale, phi, jacobian
+
+    def direction(self, place: Place, wo: Direction, s: Scalar, phi: Scalar) -> Direction:
+        """The direction at (s, phi), wo in the plane of x; it may lie under the surface."""
+        q0, scale = fetch(self.scales, 0.0 * s)
+        q = minimum(q0 * (ops.exp(s / scale) - 1.0), self.q_max)
+        radius, (sin_phi, cos_phi) = safe_sqrt(q * (1.0 - 0.25 * q)), sincos(phi)
+        x, y, z = radius * cos_phi, radius * sin_phi, 1.0 - 0.5 * q
+        sine, cosine = self.axis(place)
+        v = vec3(cosine * x + sine * z, y, cosine * z - sine * x)
+        return reflect(wo, v) if self.chart == "half" else v
+
+    @property
+    def span(self) -> float:
+        """Of the azimuth."""
+        return 2.0 * ops.pi if self.full else ops.pi
+
+    def at(self, index: Scalar, s: Scalar, phi: Scalar) -> Scalar:
+        """The density of a slice at (s, phi)."""
+        _, rows, columns = self.density.shape
+        row, along = _cell(s * (rows - 1.0), rows)
+        column, across = _cell(phi * ((columns - 1.0) / self.span), columns)
+        (a,), (b,), (c,), (d,) = (
+            fetch(self.density, index, row + i, column + j) for i in (0.0, 1.0) for j in (0.0, 1.0)
+        )
+        return _between(_between(a, b, across), _between(c, d, across), along)
+
+    def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
+        """(s, phi) with the density of a slice: first s, by the integrals over phi, then phi at that s."""
+        _, rows, columns = self.density.shape
+
+        def row_below(row: Scalar) -> Scalar:
+            return fetch(self.rows, index, row)[0]
+
+        def total(row: Scalar) -> Scalar:
+            return fetch(self.below, index, row, 0.0 * row + (columns - 1.0))[0]
+
+        row = _search(row_below, u1, rows)
+        along = _in_cell((u1 - row_below(row)) * (rows - 1.0), total(row), total(row + 1.0))
+
+        def column_below(column: Scalar) -> Scalar:
+            (low,), (high,) = fetch(self.below, index, row, column), fetch(self.below, index, row + 1.0, column)
+            return _between(low, high, along)
+
+        def height(column: Scalar) -> Scalar:
+            (low,), (high,) = fetch(self.density, index, row, column), fetch(self.density, index, row + 1.0, column)
+            return _between(low, high, along)
+
+        u2 = u2 * column_below(0.0 * row + (columns - 1.0))
+        column = _search(column_below, u2, columns)
+        width = self.span / (columns - 1.0)
+        across = _in_cell((u2 - column_below(column)) / width, height(column), height(column + 1.0))
+        return (row + along) / (rows - 1.0), (column + across) * width
+
+
+class Place(NamedTuple):
+    """Which slices a ray's density is mixed from, with what weights."""
+
+    slices: tuple[Scalar, ...]
+    weights: tuple[Scalar, ...]
+
+
+class Axis(NamedTuple):
+    """A direction along which slices are laid: a parameter that varies over the surface.
+
+    read    its value of a bound material, as a place from 0 to 1
+    slices  along it
+    """
+
+    read: Callable[[object], Scalar]
+    slices: int
+
+
+class Guide(NamedTuple):
+    """What a material is sampled by.
+
+    lobes      on wo's side, across, or both; none where nothing is scattered
+    angles     how many angles of wo there are slices of, from the normal to the horizon
+    azimuths   how many azimuths of wo; 1 where `eval` does not turn with the surface
+    behind     whether slices of wo below the surface follow those of wo above; else both are alike
+    above      whether anything is scattered toward a wo above the surface
+    below      and below
+    axes       parameters that vary
+    shares     by slice: the share of the lobe across
+    cosine     share of samples that follow the cosine
+    """
+
+    lobes: tuple[Lobe, ...]
+    angles: int
+    azimuths: int
+    behind: bool
+    above: bool
+    below: bool
+    axes: tuple[Axis, ...]
+    shares: Table
+    cosine: Table
+
+    def pdf(self, material: object, wo: Direction, wi: Direction) -> Scalar:
+        """Density of `sample`, 1/sr."""
+        seen = self._seen(wo)
+        crosses = wo.z * wi.z < 0.0
+        if not self.lobes:
+            return where(seen & ~crosses & (wi.z != 0.0), ops.abs(wi.z) * inv_pi, 0.0)
+        place = self._place(material, wo)
+        turn, above = self._turn(wo), _above(wo)
+        (cosine,) = fetch(self.cosine, 0.0 * wo.z)
+        both = len({lobe.across for lobe in self.lobes}) == 2
+        density: Array = 0.0 * wo.z
+        for lobe in self.lobes:
+            on_side = crosses if lobe.across else ~crosses
+            local = _turned(_above(wi), turn)
+            s, phi, jacobian = lobe.chart_of(place, _turned(above, turn), local)
+            here: Array = 0.0
+            for index, weight in zip(place.slices, place.weights, strict=True):
+                here = here + self._share(lobe, index) * weight * lobe.at(index, s, phi)
+            here = here * (1.0 if lobe.full else 0.5)
+            smooth = (0.5 if both else 1.0) * ops.abs(wi.z) * inv_pi
+            found = (1.0 - cosine) * ops.safe_div(here, jacobian) + cosine * smooth
+            density = where(on_side, found, density)
+        return where(seen & (wi.z != 0.0), density, 0.0)
+
+    def draw(self, material: object, wo: Direction, u: Direction) -> Direction:
+        """A direction; u1 picks the slice and the side. It may lie on a side where nothing is: its pdf is 0 then."""
+        flat = square_to_cosine_hemisphere(u.y, u.z)
+        sign = where(wo.z < 0.0, -1.0, 1.0)
+        if not self.lobes:
+            return vec3(flat.x, flat.y, flat.z * sign)
+        place = self._place(material, wo)
+        turn, above = self._turn(wo), _above(wo)
+        (cosine,) = fetch(self.cosine, 0.0 * wo.z)
+        by_cosine = u.x < cosine
+        rest = where(by_cosine, u.x / cosine, (u.x - cosine) / (1.0 - cosine))
+        index, left = _pick(place, minimum(rest, ALMOST_ONE))
+        crosses = left < where(by_cosine, 0.5, fetch(self.shares, index)[0])
+        chosen: Direction | None = None
+        for lobe in self.lobes:
+            # both halves of the azimuth are alike: u2 picks one and is stretched
+            second = u.z if lobe.full else minimum(ops.abs(2.0 * u.z - 1.0), ALMOST_ONE)
+            s, phi = lobe.draw(index, u.y, second)
+            if not lobe.full:
+                phi = where(u.z < 0.5, -phi, phi)
+            w = lobe.direction(place, _turned(above, turn), s, phi)
+            # a direction under the surface, which the other side's lobe may hold too, becomes a failed sample: z = 0
+            flattened = ops.rsqrt(maximum(w.x * w.x + w.y * w.y, 1e-20))
+            w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, 0.0 * w.z))
+            w = _turned(w, vec3(turn.x, -turn.y, turn.z))
+            w = where(by_cosine, flat, w)
+            w = vec3(w.x, w.y, w.z * (-sign if lobe.across else sign))
+            chosen = w if chosen is None else where(crosses if lobe.across else ~crosses, w, chosen)
+        assert chosen is not None
+        return chosen
+
+    def _seen(self, wo: Direction) -> Mask:
+        if self.above and self.below:
+            return wo.z != 0.0
+        return wo.z > 0.0 if self.above else wo.z < 0.0
+
+    def _share(self, lobe: Lobe, index: Scalar) -> Scalar:
+        """Of a slice's samples, those of this lobe."""
+        (across,) = fetch(self.shares, index)
+        return across if lobe.across else 1.0 - across
+
+    def _turn(self, wo: Direction) -> Direction:
+        """(cos, sin, 0) of the azimuth that charts count from: wo's, or the tangent's where `eval` turns with it."""
+        zero = 0.0 * wo.z
+        if self.azimuths > 1:
+            return vec3(1.0 + zero, zero, zero)
+        radius2 = wo.x * wo.x + wo.y * wo.y
+        scale = ops.rsqrt(maximum(radius2, 1e-20))
+        upright = radius2 < 1e-20
+        return vec3(where(upright, 1.0, wo.x * scale), where(upright, 0.0, wo.y * scale), zero)
+
+    def _place(self, material: object, wo: Direction) -> Place:
+        """The slices on both sides of wo's angle, and of every other axis."""
+        cos = ops.abs(wo.z)
+        angle = ops.atan2(safe_sqrt(1.0 - cos * cos), cos) * (2.0 * inv_pi)
+        ways = [_cell(angle * (self.angles - 1.0), self.angles)]
+        strides, count = [1], self.angles
+        for axis in self.axes:
+            ways.append(_cell(axis.read(material) * (axis.slices - 1.0), axis.slices))
+            strides.append(count)
+            count *= axis.slices
+        slices, weights = [0.0 * cos], [1.0 + 0.0 * cos]
+        for (cell, along), stride in zip(ways, strides, strict=True):
+            slices, weights = (
+                [index + (cell + step) * float(stride) for step in (0.0, 1.0) for index in slices],
+                [weight * (along if step else 1.0 - along) for step in (0, 1) for weight in weights],
+            )
+        if self.azimuths > 1:
+            phi = ops.atan2(wo.y, wo.x) * (0.5 * inv_pi)
+            at = where(phi < 0.0, phi + 1.0, phi) * float(self.azimuths)
+            cell = minimum(ops.floor(at), self.azimuths - 1.0)
+            along, following = at - cell, where(cell + 1.5 > self.azimuths, 0.0, cell + 1.0)
+            slices, weights = (
+                [index + turn * float(count) for turn in (cell, following) for index in slices],
+                [weight * share for share in (1.0 - along, along) for weight in weights],
+            )
+            count *= self.azimuths
+        if self.behind:
+            slices = [index + where(wo.z < 0.0, float(count), 0.0) for index in slices]
+        return Place(tuple(slices), tuple(weights))
+
+
+def _above(w: Direction) -> Direction:
+    return vec3(w.x, w.y, ops.abs(w.z))
+
+
+def _turned(w: Direction, turn: Direction) -> Direction:
+    """w in axes turned by an azimuth of (cos, sin, 0)."""
+    return vec3(turn.x * w.x + turn.y * w.y, turn.x * w.y - turn.y * w.x, w.z)
+
+
+def _cell(at: Scalar, count: int) -> tuple[Scalar, Scalar]:
+    """(node below, share of the way to the next) of a place among `count` nodes 0, 1, ..."""
+    at = ops.clamp(at, 0.0, count - 1.0)
+    cell = minimum(ops.floor(at), count - 2.0)
+    return cell, at - cell
+
+
+def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
+    return low + (high - low) * share
+
+
+def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
+    """The last but one node at most, up to which there is no more than u."""
+    found: Array = 0.0 * u
+    step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
+    while step:
+        ahead = found + float(step)
+        inside = minimum(ahead, count - 2.0)
+        found = where((ahead < count - 1.5) & (below(inside) <= u), ahead, found)
+        step >>= 1
+    return found
+
+
+def _in_cell(area: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """Share of a cell of width 1 below which lies `area` of a density that goes linearly from low to high."""
+    root = safe_sqrt(low * low + 2.0 * (high - low) * area)
+    return ops.clamp(ops.safe_div(2.0 * area, low + root), 0.0, 1.0)
+
+
+def _pick(place: Place, u: Scalar) -> tuple[Scalar, Scalar]:
+    """A slice by its weight, and what is left of u, in [0, 1)."""
+    index, start, width = place.slices[0], 0.0 * u, place.weights[0]
+    below: Array = place.weights[0]
+    for other, weight in zip(place.slices[1:], place.weights[1:], strict=True):
+        passed = (u >= below) & (weight > 0.0)
+        index, start, width = where(passed, other, index), where(passed, below, start), where(passed, weight, width)
+        below = below + weight
+    return index, ops.clamp(ops.safe_div(u - start, width), 0.0, ALMOST_ONE)
