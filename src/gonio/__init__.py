@@ -35,7 +35,9 @@ _PLACES = {
         *("Angle", "BSDF", "Breach", "Colour", "Number", "Parameter", "Preset", "Sample", "Width"),
         *("angle", "bsdf", "choice", "flag", "method", "model", "never", "number", "spectrum", "width"),
     ),
+    "models.library": ("fits", "material", "materials"),
     "energy": ("Albedo", "albedo"),
+    "render": ("resume",),
     "render.integrators": ("Integrator",),
     "verify.laws": ("Law",),
     "render.tables": ("bake",),
@@ -64,6 +66,7 @@ if TYPE_CHECKING:
     from .models.conductor import Conductor
     from .models.dielectric import Dielectric
     from .models.lambert import Lambert
+    from .models.library import fits, material, materials
     from .models.mirror import Mirror
     from .models.mix import Mix
     from .models.mix import Mix as mix
@@ -76,7 +79,7 @@ if TYPE_CHECKING:
     from .optics.fresnel import Fresnel
     from .optics.masking import Masking
     from .optics.ndf import NDF, Stretched
-    from .render import render
+    from .render import render, resume
     from .render.integrators import Integrator
     from .render.tables import bake
     from .verify import verify
@@ -116,7 +119,7 @@ __all__ = [
     "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
     "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
     "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
-    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model",
-    "models", "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided",
-    "verify", "view", "width",
+    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "fits", "flag", "get_precision", "material",
+    "materials", "method", "mix", "model", "models", "never", "number", "ops", "plot", "register", "render", "resume",
+    "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -14,8 +15,14 @@ from .errors import InputError, MachineError
 def check_file(path: str | Path) -> Path:
     """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
     target = Path(path).expanduser()
-    if target.is_symlink():
-        target = target.resolve()
+    try:
+        if target.is_symlink():
+            target = target.resolve()
+        looped = target.is_symlink()  # from Python 3.13 on; before, it raises
+    except (OSError, RuntimeError):
+        looped = True
+    if looped:
+        raise InputError("this is a loop of links", str(path), "remove it, or choose another name")
     folder = target.parent
     if not folder.is_dir():
         hint = f"mkdir -p '{folder}', or choose another"
@@ -46,11 +53,12 @@ def check_folder(folder: str | Path) -> Path:
     return folder
 
 
-def write_whole(path: str | Path, content: bytes | Callable[[Path], None]) -> Path:
+def write_whole(path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True) -> Path:
     """Write a file so that at every moment `path` is the old one or the whole new one.
 
     content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
-    Raises MachineError where the disk is full; nothing of the new file is left then.
+    rescue   where it cannot be written, write it to the temporary folder, so that hours of work are not lost
+    Raises MachineError where the disk is full, which says where the content is; nothing of it is left beside `path`.
     """
     target = check_file(path)
     # In the same folder, hence on the same file system, where a rename is one step.
@@ -69,11 +77,28 @@ def write_whole(path: str | Path, content: bytes | Callable[[Path], None]) -> Pa
     except OSError as error:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
+        kept = _rescued(target.name, content) if rescue else None
         hint = "free some space, or choose another folder with -o; nothing was written"
-        raise MachineError(what, str(path), hint) from error
+        raise MachineError(what, str(path), f"it is kept as {kept}: move it from there" if kept else hint) from error
     finally:
         temporary.unlink(missing_ok=True)
     return target
+
+
+def _rescued(name: str, content: bytes | Callable[[Path], None]) -> Path | None:
+    """The file in a folder of its own among the temporary ones, None where there is no room either."""
+    folder = None
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="gonio-"))
+        if callable(content):
+            content(folder / name)
+        else:
+            (folder / name).write_bytes(content)
+        return folder / name
+    except OSError:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        return None
 
 
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -49,3 +49,17 @@ def test_new_contents_compile_no_kernel():
                 assert all(k["cache_hit"] for k in dr.kernel_history([dr.KernelType.JIT]))
     finally:
         dr.set_flag(dr.JitFlag.KernelHistory, False)
+
+
+def test_one_texel_is_fetched_alike_by_drjit_numpy_and_the_graph():
+    rng = np.random.default_rng(1)
+    table = ops.Table("t", rng.random((3, 4, 5, 4)))
+    at = np.array([rng.integers(-1, n + 1, 50).astype(float) for n in table.shape])  # beyond both edges too
+    held = tuple(np.clip(a, 0, n - 1).astype(int) for a, n in zip(at, table.shape, strict=True))
+    by_numpy = np.array(ops.fetch(table, *at))
+    np.testing.assert_array_equal(by_numpy, table.values[held].T)
+    kind = backend.types("float64")
+    by_drjit = np.array([np.array(v) for v in ops.fetch(table, *[kind.float(a) for a in at])])
+    np.testing.assert_array_equal(by_drjit, by_numpy)
+    graph = ops.record(lambda x, y, z: ops.fetch(table, x, y, z), name="read", types=dict.fromkeys("xyz", "float"))
+    np.testing.assert_array_equal(np.array(graph.evaluate(**dict(zip("xyz", at, strict=True)))), by_numpy)

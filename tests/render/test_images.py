@@ -8,6 +8,7 @@ import resource
 import struct
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -58,10 +59,14 @@ def test_png_is_a_valid_file_to_another_reader(tmp_path: Path, picture: np.ndarr
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(
-    tmp_path: Path, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    picture: np.ndarray,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = tmp_path / "a.exr"
     path.write_bytes(b"old")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("rescued")))
 
     def no_space(descriptor: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -132,7 +137,7 @@ def test_a_header_that_claims_too_much_is_refused(tmp_path: Path, picture: np.nd
     content = bytearray(png.read_bytes())
     content[16:24] = struct.pack(">II", 60000, 60000)
     png.write_bytes(content)
-    with pytest.raises(InputError, match="claims 60000x60000"):
+    with pytest.raises(InputError, match="claims 60000 x 60000"):
         images.read(png)
 
     exr = images.write(tmp_path / "a.exr", picture)

@@ -7,10 +7,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.render import engine, scene
+from gonio.render import engine, run, scene
 
 
 def scene_with(shapes: list, lights: list | None = None, **changes: Any) -> dict:
@@ -405,3 +406,16 @@ def test_two_lamps_that_are_alike_are_two_lamps(build):
     }
     other = {**lamp, "shape": {**lamp["shape"], "base": [2, 3, 0]}}
     assert len(build([{"type": "sphere", "center": [0, 0, 0], "radius": 1}], [lamp, other]).emitters()) == 2
+
+
+def test_shapes_and_lights_come_in_the_same_order_every_time() -> None:
+    """Mitsuba merges meshes, and hands them on in the order of their addresses: with it went that of the lights."""
+    material = go.Lambert()
+    orders = set()
+    kept = []  # so that addresses differ
+    for _ in range(8):
+        prepared = run.prepare(run.Request(Path("ball"), material=material, spp=1, size=(8, 8)))
+        kept.append(prepared)
+        shapes = prepared.render.scene.shapes()  # type: ignore[attr-defined]
+        orders.add(tuple((shape.id(), str(shape.bbox())) for shape in shapes))
+    assert len(orders) == 1

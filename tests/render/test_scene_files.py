@@ -201,7 +201,7 @@ def test_every_kind_of_image_reads_whatever_its_suffix(tmp_path):
     for suffix, content in images(mi, tmp_path).items():
         (tmp_path / "renamed.dat").write_bytes(content)
         for name in (f"a.{suffix}", "renamed.dat"):
-            values = textures.load_image(mi, tmp_path / name, "here")
+            values = textures.load_image(tmp_path / name, "here")
             assert values.shape == (9, 7, 3) and values.dtype == np.float32 and 0 <= values.min() <= values.max() <= 1
 
 
@@ -211,15 +211,15 @@ def test_grey_and_alpha_images(tmp_path):
         pixels = np.full((2, 3, channels), 51, np.uint8)
         kind = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}[channels]
         mi.Bitmap(pixels, getattr(mi.Bitmap.PixelFormat, kind)).write(str(tmp_path / "a.png"))
-        values = textures.load_image(mi, tmp_path / "a.png", "here")
+        values = textures.load_image(tmp_path / "a.png", "here")
         assert values.shape == (2, 3, expected) and np.allclose(values, 0.2)
 
 
 @pytest.mark.parametrize("content", [b"x", b"hello world" * 10, b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"#?RADIANCE\n"])
 def test_bytes_that_are_no_image(tmp_path, content):
     (tmp_path / "a.png").write_bytes(content)
-    with pytest.raises(InputError, match="no image that can be read"):
-        textures.load_image(engine.load(), tmp_path / "a.png", "here")
+    with pytest.raises(InputError, match=r"no image that can be read|cannot be decoded"):
+        textures.load_image(tmp_path / "a.png", "here")
 
 
 def test_image_that_claims_more_pixels_than_it_can_hold(tmp_path):
@@ -228,7 +228,7 @@ def test_image_that_claims_more_pixels_than_it_can_hold(tmp_path):
     content[16:24] = struct.pack(">II", 60000, 60000)
     (tmp_path / "bomb.png").write_bytes(content)
     with pytest.raises(InputError, match="claims 60000 x 60000 pixels"):
-        textures.load_image(mi, tmp_path / "bomb.png", "here")
+        textures.load_image(tmp_path / "bomb.png", "here")
 
 
 def test_image_with_nan(tmp_path):
@@ -237,7 +237,7 @@ def test_image_with_nan(tmp_path):
     pixels[1, 2, 0] = np.nan
     mi.Bitmap(pixels).write(str(tmp_path / "a.exr"))
     with pytest.raises(InputError, match="not finite at row 1, column 2"):
-        textures.load_image(mi, tmp_path / "a.exr", "here")
+        textures.load_image(tmp_path / "a.exr", "here")
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "hdr"])
@@ -253,7 +253,7 @@ def test_damaged_image_reads_or_is_refused_but_nothing_else(tmp_path, suffix):
             damaged = damaged[: rng.integers(1, len(damaged))]
         (tmp_path / "damaged").write_bytes(damaged)
         try:
-            values = textures.load_image(mi, tmp_path / "damaged", "here")
+            values = textures.load_image(tmp_path / "damaged", "here")
         except InputError as error:
             assert error.hint
             continue

@@ -51,6 +51,23 @@ def test_no_range_is_invented() -> None:
     assert "gain 0 to 0.25" in report.cards[0].covered
 
 
+class Painted(go.BSDF):
+    """Half the light is reflected by a facet, half by paint; it knows nothing of delta lobes, and says so."""
+
+    metal: go.BSDF = go.bsdf("between the paint", default=go.Conductor(alpha=0.3))
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        return self.metal.eval(wo, wi, mode) * 0.5 + go.ops.where((wo.z > 0.0) & (wi.z > 0.0), 0.1 * wi.z, 0.0)
+
+
+def test_an_inner_material_is_made_no_delta_lobe_where_the_outer_says_that_it_has_none() -> None:
+    (alpha,) = [axis for axis in box.axes(subject.of(Painted())) if axis.path == "metal.alpha"]
+    assert 0.0 < alpha.low < 0.03
+    both = subject.of(go.TwoSided(go.Conductor(alpha=0.3)))
+    (alpha,) = [axis for axis in box.axes(both) if axis.path == "base.alpha"]
+    assert alpha.low == 0.0  # it hands on what its base says
+
+
 def test_every_name_of_a_choice_is_tried() -> None:
     places = box.places(subject.of(go.Conductor(alpha=0.3)), EFFORTS["deep"], 1)
     named = [place.values for place in places if place.why == "choice"]

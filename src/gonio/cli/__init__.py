@@ -1,14 +1,43 @@
 """The command line: thin verbs over the rooms below, no logic of its own. One verb a file in `verbs`.
 
-Nothing heavy is imported at the top, so that `gonio --help` takes little more than Python and Typer: each verb imports
-what it needs when it runs. Errors are printed in one place, `app.main`.
+Nothing at all is imported at the top, so that whatever is imported later is already inside `main`, where Ctrl-C is one
+line. Nothing heavy is imported by `app`, so that `gonio --help` takes little more than Python and Typer: each verb
+imports what it needs when it runs. Errors are printed in one place, `app.run`.
 
-Exit codes: 0 done, 1 a verdict of "fails", 2 bad usage or input, 3 a fault of the machine, 130 ended by Ctrl-C.
+Exit codes: 0 done, 1 a verdict of "fails", 2 bad usage or input, 3 a fault of the machine, 130 ended by Ctrl-C (143 by
+SIGTERM, 129 by SIGHUP).
 """
 
 from __future__ import annotations
 
-from .app import main, run
-from .verbs.base import Verb, verb
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from .app import run as run
+    from .verbs.base import Verb as Verb
+    from .verbs.base import verb as verb
 
 __all__ = ["Verb", "main", "run", "verb"]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The `gonio` command."""
+    import sys
+
+    from . import signals
+
+    with signals.at_once():
+        from . import app
+    with signals.as_exceptions() as ended:
+        sys.exit(app.run(arguments, ended))
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module
+
+        if name in ("Verb", "verb"):
+            return getattr(import_module(".verbs.base", __name__), name)
+        if name == "run":
+            return import_module(".app", __name__).run
+        raise AttributeError(f"module 'gonio.cli' has no attribute '{name}'")

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
+import signal
 import sys
+import warnings
 from typing import Annotated
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from ..errors import GonioError, GonioWarning, InputError
-from .verbs.base import INTERRUPTED, MATERIALS, PICTURES, SUPPORT, Verb
+from .signals import Ended, exit_code
+from .verbs.base import MATERIALS, PICTURES, SUPPORT, Verb
 
 _HEADINGS = re.compile(r"^\S[^:]*:", re.MULTILINE)
 _NAMES = re.compile(r"^  (-\S+(?:, --\S+)?(?= |$)|[a-z][\w-]*(?=  ))", re.MULTILINE)
@@ -115,29 +119,56 @@ def _show_warning(message: Warning | str, category: type[Warning], *place: objec
         print(f"warning: {message}", file=sys.stderr)
 
 
-def run(arguments: list[str] | None) -> int:
+def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
+    """The exit code of the command; `ended` knows the signal where one came."""
     given = sys.argv[1:] if arguments is None else arguments
     as_json = "--json" in given
+    ended = ended or Ended()
+    warnings.showwarning = _show_warning
+    warnings.simplefilter("always", GonioWarning)
     try:
         code = app(given or ["--help"], prog_name="gonio", standalone_mode=False)
         sys.stdout.flush()
-        if code == INTERRUPTED:  # Typer's answer to a KeyboardInterrupt; a render that kept its picture exits itself
-            print("ended by Ctrl-C; nothing was written", file=sys.stderr)
+        if code == exit_code(signal.SIGINT):  # Typer's answer to a KeyboardInterrupt; what kept something exits itself
+            print(ended.line, file=sys.stderr)
+            return ended.code
         return InputError.code if not given else code if isinstance(code, int) else 0
     except GonioError as error:
         return _fail(error, as_json)
-    except BrokenPipeError:  # `gonio schema | head`: whoever read us has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except KeyboardInterrupt:  # between two things that Typer does
+        print(ended.line, file=sys.stderr)
+        return ended.code
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):  # `gonio schema | head`: whoever read us has seen enough
+            _say_no_more()
+            return 0
+        if error.errno == errno.EIO and ended.number:  # the terminal has closed
+            _say_no_more()
+            return ended.code
+        return _broken(error, as_json, ended)
     except Exception as error:
         if hasattr(error, "format_message"):  # a usage error of the argument parser
             return _fail(_usage_error(error), as_json)
-        if os.environ.get("GONIO_DEBUG"):
-            raise
-        what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
-        failure = GonioError(what, "", "this is a fault of Gonio; run `gonio --debug ...` and report what it prints")
-        failure.code = 3
-        return _fail(failure, as_json)
+        return _broken(error, as_json, ended)
+
+
+def _say_no_more() -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        os.dup2(nowhere, stream.fileno())
+
+
+def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
+    """The exit code of what is a fault of Gonio, unless a signal came in the middle of an import."""
+    if ended.number:
+        print(ended.line, file=sys.stderr)
+        return ended.code
+    if os.environ.get("GONIO_DEBUG"):
+        raise error
+    what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
+    failure = GonioError(what, "", "this is a fault of Gonio; run `gonio --debug ...` and report what it prints")
+    failure.code = 3
+    return _fail(failure, as_json)
 
 
 def _usage_error(error: Exception) -> InputError:
@@ -145,12 +176,3 @@ def _usage_error(error: Exception) -> InputError:
     command = context.command_path if context else "gonio"
     message = error.format_message()  # type: ignore[attr-defined]
     return InputError(message, "", "" if "Did you mean" in message else f"see `{command} --help`")
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """The `gonio` command."""
-    import warnings
-
-    warnings.showwarning = _show_warning
-    warnings.simplefilter("always", GonioWarning)
-    sys.exit(run(arguments))

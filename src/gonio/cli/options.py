@@ -27,6 +27,9 @@ Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
 Code = Annotated[bool, Option("--allow-code", help="Let the scene run Python files that it names as materials.")]
 Device = Annotated[str, Option(metavar="cpu|cuda|auto", help="Where to compute.")]
+Checkpoint = Annotated[
+    Path | None, Option(metavar="FILE", help="Keep the sums so far there, and go on from them where it exists.")
+]
 Exposure = Annotated[str, Option(metavar="EV|auto", help="Stops of brightness, for .png.")]
 
 
@@ -63,7 +66,7 @@ class Material:
 
         text = str(scene)
         head = text.partition("(")[0]
-        if not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models()):
+        if outside.reader_of(head) or not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models()):
             return notation.named(self.text(text))[0]
         if self.param or self.preset:
             what = "parameters of a material given, and a scene"
@@ -94,7 +97,12 @@ class Rendering:
     allow_code: Code = False
 
     def request(
-        self, scene: Path, output: Path | None = None, timeout: float | None = None, material: BSDF | None = None
+        self,
+        scene: Path,
+        output: Path | None = None,
+        timeout: float | None = None,
+        material: BSDF | None = None,
+        checkpoint: Path | None = None,
     ) -> Request:
         """The request to render a scene, or a material on a ball. Raises InputError for a size or an exposure that is
         none."""
@@ -109,5 +117,6 @@ class Rendering:
                 "size": None if self.size is None else run.parse_size(self.size),
                 "exposure": exposures.parse(self.exposure),
                 "material": material,
+                "checkpoint": checkpoint,
             },
         )

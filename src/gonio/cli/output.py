@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 from collections.abc import Mapping
@@ -48,19 +49,27 @@ class Bar:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._bar.__exit__(kind, error, trace)
+        with contextlib.suppress(OSError):
+            self._bar.__exit__(kind, error, trace)
 
     def update(self, progress: Progress) -> None:
         minutes, seconds = divmod(round(progress.remaining), 60)
         state = f"{progress.done}/{progress.wanted} spp  {progress.rate / 1e6:.2f} M samples/s"
         state += f"  {minutes}:{seconds:02} left" if progress.done < progress.wanted else "  writing"
-        self._bar.update(self._task, total=progress.wanted, completed=progress.done, state=state)
+        self.step(progress.done, progress.wanted, state)
 
     def step(self, done: int, total: int, state: str) -> None:
-        self._bar.update(self._task, total=total, completed=done, state=state)
+        with contextlib.suppress(OSError):  # a terminal that has closed costs no picture
+            self._bar.update(self._task, total=total, completed=done, state=state)
+
+    def tell(self, text: str) -> None:
+        """A line above the bar."""
+        with contextlib.suppress(OSError):
+            self._console.print(text, markup=False, soft_wrap=True)
 
     def stopping(self) -> None:
-        self._console.print("Ctrl-C: ending in a moment; again to end at once")
+        with contextlib.suppress(OSError):
+            self._console.print("ending in a moment; Ctrl-C again to end at once")
 
 
 def listing(*headings: str) -> Table:

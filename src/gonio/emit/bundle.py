@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..models import BSDF, notation, tree
 from ..ops import graph
 from ..ops.types import Value
+from ..owner import alone
 from . import program as programs
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment
@@ -27,7 +28,7 @@ from .program import Program
 from .routine import RoutineWriter
 from .simplify import SIZES, Record, stem_of
 from .syntax import literal
-from .textures import axes, pixels, reader, width
+from .textures import READERS, axes, pixels, width
 
 Json: TypeAlias = Any  # a value that a JSON file may hold
 
@@ -68,6 +69,7 @@ class Bundle:
         return [folder / file for file in contents]
 
 
+@alone
 def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:
     """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
 
@@ -83,6 +85,7 @@ def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eva
     return bundle(model, lang, functions).text
 
 
+@alone
 def bundle(
     model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")
 ) -> Bundle:
@@ -124,9 +127,12 @@ def _text(made: Program, names: Names) -> str:
         uniform = f"table_{table.name}"
         size = " x ".join(map(str, table.shape))
         channels = f"{table.channels} channel{'s' * (table.channels > 1)}"
-        about = f"// {size} texels, {channels}; linear between texel centres, held outside."
+        readings = sorted(made.readings[id(table)])
+        rule = "linear between texel centres, " if "lookup" in readings else ""
+        about = f"// {size} texels, {channels}; {rule}held outside."
         binding = language.binding(uniform, 3 if len(axes(table)) == 3 else 2, place)
-        parts.append([*binding, "", about, *reader(language, table)])
+        readers = [line for how in readings for line in ("", *READERS[how](language, table))]
+        parts.append([*binding, "", about, *readers[1:]])
     parts += bodies
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 

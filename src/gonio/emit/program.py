@@ -38,7 +38,8 @@ class Program:
     routines  in order of definition, callees first
     entries   method -> its routine, "derive" among them where there is something to derive
     structs   of parameters, derived values and results, in order of use
-    tables    the tables that are looked up
+    tables    the tables that are read
+    readings  of each, by identity, how: "lookup" and "fetch"
     """
 
     def __init__(self, model: BSDF, functions: tuple[str, ...]) -> None:
@@ -157,10 +158,13 @@ class Program:
 
     def _tables(self) -> list[Table]:
         found: dict[int, Table] = {}
+        self.readings: dict[int, set[str]] = {}
         for routine in self.routines:
             for value in routine.values():
                 if value.op == "texel":
-                    found.setdefault(id(value.static[0]), value.static[0])
+                    table, _, how = value.static
+                    found.setdefault(id(table), table)
+                    self.readings.setdefault(id(table), set()).add(how)
         return list(found.values())
 
 

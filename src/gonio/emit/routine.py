@@ -380,11 +380,11 @@ class RoutineWriter:
         return text, SIGN if text.startswith("-") else ATOM
 
     def texel(self, value: Value) -> str:
-        table, group = value.static
+        table, group, how = value.static
         arguments = [self.whole_or_local(a) for a in value.args]
         if table.channels > 4:
             arguments.append(str(group))
-        return f"lookup_{table.name}({', '.join(arguments)})"
+        return f"{how}_{table.name}({', '.join(arguments)})"
 
     # ------------------------------------------------------------------ calls
 

@@ -187,8 +187,8 @@ class _Simplifier:
             return self.make("call", callee.results[0][1].type if callee.single else callee, args, callee)
         if op == "element":
             return self.element(args[0], node.static)
-        if op == "lookup":
-            return self.lookup(args, *node.static)
+        if op in ("lookup", "fetch"):
+            return self.texel(op, args, *node.static)
         if op == "component":
             return self.component(args[0], node.static)
         if op == "vector":
@@ -201,12 +201,12 @@ class _Simplifier:
             return self.constant(result.static, result.type)
         return self.make("element", result.type, (called,), place)
 
-    def lookup(self, args: tuple, table: Table, channel: int) -> Value:
+    def texel(self, how: str, args: tuple, table: Table, channel: int) -> Value:
         if table.channels == 1:
-            return self.make("texel", "float", args, (table, 0))
+            return self.make("texel", "float", args, (table, 0, how))
         if table.channels == 2:
-            return self.component(self.make("texel", "vec2", args, (table, 0)), channel)
-        return self.component(self.make("texel", "vec4", args, (table, channel // 4)), channel % 4)
+            return self.component(self.make("texel", "vec2", args, (table, 0, how)), channel)
+        return self.component(self.make("texel", "vec4", args, (table, channel // 4, how)), channel % 4)
 
     def component(self, vector: Value, place: int) -> Value:
         if vector.order in self.parts:

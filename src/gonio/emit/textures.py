@@ -1,4 +1,4 @@
-"""Tables as textures: their size and contents, and the function that reads one."""
+"""Tables as textures: their size and contents, and the functions that read one."""
 
 from __future__ import annotations
 
@@ -42,14 +42,8 @@ def reader(language: Language, table: Table) -> list[str]:
 
     A shader's own filtering would not do: its weights have eight bits.
     """
-    names = list("xyz"[: len(table.shape)])  # in the order of a lookup, slowest axis first
-    sizes = dict(zip(names, table.shape, strict=True))
-    many = groups(table) > 1
-    channels = width(table)
+    names, sizes, lines = _head(language, table, "lookup")
     real, whole = language.type("float"), language.type("int")
-    result = real if channels == 1 else language.type(f"vec{channels}")
-    parameters = [(real, name) for name in names] + [(whole, "group")] * many
-    lines = [language.signature(result, f"lookup_{table.name}", parameters)]
     for axis, count in sizes.items():
         at, cell = f"at_{axis}", f"{axis}0"
         for type_, name, text in (
@@ -60,14 +54,9 @@ def reader(language: Language, table: Table) -> list[str]:
             lines.append("    " + language.local(type_, name, text))
 
     def texel(steps: dict[str, int]) -> str:
-        places = [f"{axis}0" + (" + 1" if steps[axis] and sizes[axis] > 1 else "") for axis in reversed(names)]
-        if many and len(places) == 3:
-            places[2] = f"group * {sizes[names[0]]} + {places[2]}"
-        elif many:
-            places.append("group")
-        elif len(places) == 1:
-            places.append("0")
-        return language.fetch(f"table_{table.name}", places) + {1: ".r", 2: ".rg", 4: ""}[channels]
+        return _texel(
+            language, table, [f"{axis}0" + (" + 1" if steps[axis] and sizes[axis] > 1 else "") for axis in names]
+        )
 
     def between(rest: list[str], steps: dict[str, int], indent: str) -> str:
         if not rest:
@@ -78,3 +67,37 @@ def reader(language: Language, table: Table) -> list[str]:
 
     body = between(names, {}, "    ").strip()
     return [*lines, *f"    return {body};".splitlines(), "}"]
+
+
+def fetcher(language: Language, table: Table) -> list[str]:
+    """The function that reads one texel, at whole-numbered places; held outside (`gonio.ops.fetch`)."""
+    names, sizes, lines = _head(language, table, "fetch")
+    whole = language.type("int")
+    places = [f"{whole}(clamp({axis}, 0.0, {count - 1}.0))" for axis, count in sizes.items()]
+    return [*lines, f"    return {_texel(language, table, places)};", "}"]
+
+
+READERS = {"lookup": reader, "fetch": fetcher}
+
+
+def _head(language: Language, table: Table, how: str) -> tuple[list[str], dict[str, int], list[str]]:
+    """Names of the axes in the order of a lookup, slowest first; their texels; and the function's first line."""
+    names = list("xyz"[: len(table.shape)])
+    channels = width(table)
+    real = language.type("float")
+    result = real if channels == 1 else language.type(f"vec{channels}")
+    parameters = [(real, name) for name in names] + [(language.type("int"), "group")] * (groups(table) > 1)
+    sizes = dict(zip(names, table.shape, strict=True))
+    return names, sizes, [language.signature(result, f"{how}_{table.name}", parameters)]
+
+
+def _texel(language: Language, table: Table, places: list[str]) -> str:
+    """A texel at places along the axes, slowest first."""
+    at = places[::-1]
+    if groups(table) > 1 and len(at) == 3:
+        at[2] = f"group * {table.shape[0]} + {at[2]}"
+    elif groups(table) > 1:
+        at.append("group")
+    elif len(at) == 1:
+        at.append("0")
+    return language.fetch(f"table_{table.name}", at) + {1: ".r", 2: ".rg", 4: ""}[width(table)]

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .. import files
+from .. import archives, files
 from ..errors import GonioError, GonioWarning
 from ..members import Family
 from ..optics.fresnel import Fresnel
@@ -74,7 +74,7 @@ def _store(path: Path, content: bytes) -> None:
     """Write a file of the cache where that can be done: a read-only home costs time, not correctness."""
     with contextlib.suppress(OSError, GonioError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        files.write_whole(path, content)
+        files.write_whole(path, content, rescue=False)
 
 
 def _meaning(source: str) -> str:
@@ -148,10 +148,10 @@ def remember(key: tuple, build: Callable[[], np.ndarray]) -> np.ndarray:
 
     def read(path: Path) -> np.ndarray:
         try:
-            with np.load(path, allow_pickle=False) as file:
-                values = file["values"]
-                fine = str(file["name"]) == name and str(file["hash"]) == content_hash(values)
-        except Exception as error:  # a file of any content: zip, zlib and NumPy each have their own ways to fail
+            file = archives.read(path)
+            values = file["values"]
+            fine = str(file["name"]) == name and str(file["hash"]) == content_hash(values)
+        except (KeyError, ValueError, OSError) as error:
             raise ValueError("damaged, or not ours") from error
         if not fine:
             raise ValueError("altered, or not ours")

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from .. import ops
 from ..errors import InputError
 from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
+from ..owner import COMPUTING
 from . import binding, tree
 from .parameters import Material
 from .sample import Floats, Sample, SampleArrays
@@ -104,9 +105,10 @@ def method(formula: Callable[..., object], /) -> object:
                 return inner(self, wo, other, *args)
         if mode not in MODES:
             raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{formula.__name__}", " or ".join(MODES))
-        if backend.is_drjit(wo):
-            return enter(binding.bind_to(self, backend.types_like(type(wo))), wo, other, mode)
-        return _on_numpy(self, formula.__name__, enter, wo, other, mode, precision)
+        with COMPUTING:
+            if backend.is_drjit(wo):
+                return enter(binding.bind_to(self, backend.types_like(type(wo))), wo, other, mode)
+            return _on_numpy(self, formula.__name__, enter, wo, other, mode, precision)
 
     return enter
 

@@ -33,7 +33,7 @@ from ..ops import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, back
 from ..optics import warp
 from . import binding, guide_search, recording, tree
 from .calling import V3, Given, method
-from .parameters import Floats, Material, Parameter, Value, bsdf, declared, pair_of
+from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
 from .sample import Sample
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
@@ -89,7 +89,7 @@ class Microsurface(NamedTuple):
     transmits: bool
 
 
-@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(bsdf,))
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(bsdf, file))
 class BSDF(Material):
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
 
@@ -240,6 +240,11 @@ class BSDF(Material):
         nodes    of a quadrature that the material makes itself; None asks for closed forms only
         """
         return None
+
+    @classmethod
+    def reads(cls, text: str) -> bool:
+        """Whether a text names a file that is such a material: "gold.binary". Its path is then the parameter `file`."""
+        return False
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:

@@ -2,6 +2,7 @@
 
     conductor                                   its name; parameters follow as NAME=VALUE
     ward.py:Ward                                a class in a Python file, which runs because the user named it
+    gold.binary                                 a file of measured values
     conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
     {"type": "conductor", "alpha": [.1, .4]}    as in a scene
 
@@ -100,6 +101,8 @@ def typed(parameter: Parameter, value: Value) -> object:
     where = f"--param {parameter.name}"
     if parameter.inner:
         return _inner(value, where)
+    if parameter.kind == "file":
+        return value
     if parameter.kind == "choice":
         name = value.strip().strip('"') if isinstance(value, str) else value
         # a distribution or a masking term of the user's own
@@ -128,6 +131,34 @@ def written(value: Value) -> str:
     if isinstance(value, float | int | np.floating | np.integer):
         return f"{value:.6g}"
     return str(value)
+
+
+def as_json(material: BSDF) -> dict[str, object]:
+    """The material as JSON has it, to the last digit: {"type": "conductor", "alpha": 0.3}; `made` takes the values.
+
+    Raises InputError for a class that no file holds, and for values that JSON has no word for.
+    """
+    found: dict[str, object] = {"type": spelled(type(material))}
+    if found["type"] != type(material).name and ":" not in str(found["type"]):
+        what = f"the class {type(material).__name__} is known to this program alone"
+        raise InputError(what, "material", "put it into a file, and name it FILE.py:CLASS")
+    for name, value in settings(material).items():
+        if isinstance(value, BSDF):
+            found[name] = as_json(value)
+        elif isinstance(value, bool | str):
+            found[name] = value
+        else:
+            try:
+                found[name] = np.asarray(value, float).tolist()
+            except (TypeError, ValueError):
+                raise InputError(f"{name} = {value!r} is no number", "material", "give numbers") from None
+    return found
+
+
+def from_json(described: Mapping[str, object]) -> BSDF:
+    """The material that `as_json` describes."""
+    fields = dict(described)
+    return made(class_named(str(fields.pop("type")), "material"), fields)[0]
 
 
 def settings(material: BSDF) -> dict[str, Value]:
@@ -174,7 +205,16 @@ def spelled(cls: type[BSDF]) -> str:
 
 
 def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
-    """The class and the text of each parameter of NAME or NAME(parameter=value,...)."""
+    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...)."""
+    head = text.strip()
+    while True:  # a file's name may have brackets in it
+        reader = outside.reader_of(head)
+        if reader is not None:
+            given = dict(assignment(part, where) for part in _parts(text.strip()[len(head) :].strip("() ")))
+            return reader, {"file": head, **given}
+        head, bracket, _ = head.rpartition("(")
+        if not bracket:
+            break
     match = _CALL.fullmatch(text)
     if not match or re.fullmatch(r"[\d.-]+", match[1]):
         raise _no_material(text, where)

@@ -1,4 +1,4 @@
-"""Materials in files of the user's own: FILE.py:CLASS.
+"""Materials in files of the user's own: FILE.py:CLASS, which is code, and files of data.
 
 A file runs only where the user named it, or allowed a scene to: `load` is called for what stands on the command line or
 in a program, and by the reader of scenes where code is allowed.
@@ -21,6 +21,7 @@ import numpy as np
 from .. import members
 from ..errors import GonioError, InputError, did_you_mean
 from ..ops import RecordingError
+from ..owner import alone
 from . import tree
 from .material import BSDF
 from .sample import Sample
@@ -35,6 +36,11 @@ _loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
 def names_code(text: str) -> bool:
     """Whether a text is FILE.py:CLASS."""
     return _CODE.fullmatch(text.strip()) is not None
+
+
+def reader_of(text: str) -> type[BSDF] | None:
+    """The material that a file of data is, by the file's name: Measured of "gold.binary"; None where it is none."""
+    return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:
@@ -193,6 +199,7 @@ def _line_of(cls: type) -> str:
 # --------------------------------------------------------------------------- trying a material
 
 
+@alone
 def probe(material: BSDF) -> BSDF:
     """The material itself, after its formulas were tried on two directions. InputError, with file and line, where one
     raises, uses Python's `if` on a value, or returns what it must not: better than a failure deep inside a render."""

@@ -293,6 +293,16 @@ class FlagParameter(Parameter):
             raise InputError(f"{value!r} given, True or False expected", where)
 
 
+class FileParameter(Parameter):
+    """A file, by its path; what reads it is the material's own business."""
+
+    kind = "file"
+
+    def check(self, value: object, where: str) -> None:
+        if isinstance(value, bool | int | float | list | tuple) or value is None or value == "":
+            raise InputError(f"{value!r} given, the path of a file expected", where)
+
+
 class MaterialParameter(Parameter):
     """A material inside a material."""
 
@@ -374,6 +384,11 @@ def choice(
 def flag(default: bool, doc: str) -> bool:
     """Declare a switch that shapes the code."""
     return _declare(FlagParameter, default, doc)
+
+
+def file(doc: str) -> Value:
+    """Declare a file of data, by its path; it shapes the code, so it is read when the material is made."""
+    return _declare(FileParameter, None, doc)
 
 
 def bsdf(doc: str, default: Material | None = None) -> Value:

@@ -9,9 +9,9 @@ import numpy as np
 
 from .. import ops
 from ..errors import InputError
-from ..ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, vec3, where
+from ..ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, where
 from ..optics.frame import mirror
-from ..optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
+from ..optics.warp import around, square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
 from .calling import method
 from .material import BSDF, Breach, never
 from .parameters import Colour, Number, flag, number, spectrum
@@ -141,15 +141,4 @@ class Phong(_Empirical):
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """A direction of a cos^p lobe about the mirrored viewer."""
-        return _around(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))
-
-
-@function
-def _around(axis: Direction, w: Direction) -> Direction:
-    """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
-    side = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
-    a = -1.0 / (side + axis.z)
-    b = axis.x * axis.y * a
-    s = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x)
-    t = vec3(b, side + axis.y * axis.y * a, -axis.y)
-    return s * w.x + t * w.y + axis * w.z
+        return around(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))

@@ -92,7 +92,8 @@ def types_like(kind: type) -> Types:
 def is_drjit(value: object) -> TypeGuard[Array]:
     """Whether a value is a Dr.Jit array (asked without loading Dr.Jit)."""
     dr = sys.modules.get("drjit")
-    return dr is not None and dr.is_array_v(value)
+    is_array = getattr(dr, "is_array_v", None)  # not there yet while another thread imports Dr.Jit
+    return is_array is not None and is_array(value)
 
 
 _formula: ContextVar[type | None] = ContextVar("formula", default=None)  # type of the directions it runs on

@@ -26,7 +26,8 @@ from typing import Protocol, TypeAlias, TypeGuard
 import numpy as np
 
 from ..errors import GonioError
-from .table import read_in_numpy
+from ..owner import alone
+from .table import fetch_in_numpy, read_in_numpy
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
@@ -392,6 +393,7 @@ def recording(values: tuple) -> bool:
     return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
 
 
+@alone
 def record(
     python_function: Callable,
     *,
@@ -492,6 +494,9 @@ def _run(function: Function, arguments: list) -> Value:
         elif node.op == "lookup":
             table, channel = node.static
             values.append(read_in_numpy(table, *args)[channel])
+        elif node.op == "fetch":
+            table, channel = node.static
+            values.append(fetch_in_numpy(table, *args)[channel])
         else:
             values.append(NUMPY[node.op](*args))
     return _rebuild(function.result, get)

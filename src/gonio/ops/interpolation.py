@@ -1,4 +1,4 @@
-"""Reading a table by the rule of `gonio.ops.table`, in Dr.Jit or as symbols."""
+"""Reading a table by the rule of `gonio.ops.table`, or one texel of it, in Dr.Jit or as symbols."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from itertools import product
 
 from . import graph
 from .backend import Array, drjit, is_drjit, types_like
-from .table import Table, read_in_numpy
+from .table import Table, fetch_in_numpy, read_in_numpy
 from .types import Scalar
 
 
@@ -52,20 +52,28 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
     return tuple(result)
 
 
-def fetch(table: Table, *indices: Scalar) -> tuple[Scalar, ...]:
-    """Every channel of one texel, given by a whole number from 0 along each axis; nothing is interpolated."""
-    if not any(is_drjit(x) for x in indices):
-        # a texel is where a lookup meets its centre
-        return lookup(table, *[(x + 0.5) / count for x, count in zip(indices, table.shape, strict=True)])
+def fetch(table: Table, *places: Scalar) -> tuple[Scalar, ...]:
+    """Every channel of the texel at whole-numbered places, one an axis; outside the table the nearest is taken.
+
+    For grids whose axes are no plain [0, 1]: angles that wrap, nodes at uneven steps, cumulative sums to search in.
+    """
+    if any(isinstance(x, graph.Node) for x in places):
+        symbols: list[Array] = [graph.emit("fetch", "float", *places, static=(table, c)) for c in range(table.channels)]
+        return tuple(symbols)
+    if not any(is_drjit(x) for x in places):
+        values = fetch_in_numpy(table, *places)
+        return tuple(values[c] for c in range(table.channels))
     dr = drjit()
-    kind = types_like(type(next(x for x in indices if is_drjit(x))))
+    kind = types_like(type(next(x for x in places if is_drjit(x))))
     UInt = kind.module.UInt32
     index: Array = UInt(0)
-    for x, count in zip(indices, table.shape, strict=True):
-        index = index * count + UInt(x)
-    if table.channels == 1:
-        return (dr.gather(kind.float, table.array(kind), index),)
-    if table.channels in (2, 4):
-        texel = dr.gather(kind.vec2 if table.channels == 2 else kind.vec4, table.array(kind), index)
-        return tuple(texel)
-    return tuple(dr.gather(kind.float, table.array(kind), index * table.channels + c) for c in range(table.channels))
+    for x, count in zip(places, table.shape, strict=True):
+        index = index * count + UInt(dr.clip(kind.float(x), 0.0, count - 1.0))
+    array = table.array(kind)
+    width = 4 if table.channels % 4 == 0 else 1
+    fetched = kind.vec4 if width == 4 else kind.float
+    found: list[Array] = []
+    for first in range(0, table.channels, width):
+        texel = dr.gather(fetched, array, index * (table.channels // width) + first // width)
+        found += list(texel) if width == 4 else [texel]
+    return tuple(found)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import ops
-from ..ops import Scalar, abs, erf, exp, fma, function, is_short, log, minimum, sqr, sqrt, where
+from ..ops import Scalar, abs, clamp, erf, exp, fma, function, is_short, log, minimum, sqr, sqrt, where
 
 # Giles2010, the single-precision polynomial: coefficients in falling powers.
 # fmt: off
@@ -86,6 +86,41 @@ def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
     tail = 1 / 7 + z2 * (1 / 9 + z2 * (1 / 11 + z2 * (1 / 13)))
     series = 1.0 + z2 * (1 / 3 + z2 * (1 / 5 + z2 * tail))
     return where((sin2 < 0.1) & (cos_theta > 0.0), exp(p * z * series), ops.pow(cos_theta, p))
+
+
+@function
+def exprel(x: Scalar) -> Scalar:
+    """(e^x - 1) / x, 1 at x = 0: by its series up to |x| = 1/2, whose next term is under 2e-17 of it."""
+    t = clamp(x, -0.5, 0.5)
+    series = 1.0 + t * (1.0 / 13.0)
+    for n in range(12, 1, -1):
+        series = 1.0 + t * (1.0 / n) * series
+    small = abs(x) < 0.5
+    return where(small, series, (exp(x) - 1.0) / where(small, 1.0, x))
+
+
+@function
+def logrel(x: Scalar) -> Scalar:
+    """log(1 + x) / x for x > -1, 1 at x = 0: up to |x| = 1/4 by 2 atanh(x / (2 + x)), next term under 1e-17 of it."""
+    t = clamp(x, -0.25, 0.25)
+    z2 = sqr(t / (2.0 + t))
+    series = 1 / 17 + z2 * (1 / 19)
+    for odd in range(15, 0, -2):
+        series = series * z2 + 1.0 / odd
+    small = abs(x) < 0.25
+    return where(small, 2.0 * series / (2.0 + t), log(where(small, 1.0, 1.0 + x)) / where(small, 1.0, x))
+
+
+@function
+def power_integral(log_t: Scalar, q: Scalar) -> Scalar:
+    """int_1^t s^(q - 1) ds = (t^q - 1) / q from log t, log t itself at q = 0."""
+    return log_t * exprel(q * log_t)
+
+
+@function
+def power_quantile(area: Scalar, q: Scalar) -> Scalar:
+    """log t of the t up to which `power_integral` is `area`: a power law's distribution function turned round."""
+    return area * logrel(q * area)
 
 
 @function

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .. import ops
 from ..ops import Direction, Scalar, function, safe_sqrt, sincos, vec3
+from .special import exprel
 
 
 @function
@@ -22,9 +23,13 @@ def square_to_cosine_hemisphere_pdf(w: Direction) -> Scalar:
 
 @function
 def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
-    """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994)."""
-    cos_theta = ops.pow(1.0 - u1, 1.0 / (p + 1.0))
-    sin_theta = safe_sqrt(1.0 - cos_theta * cos_theta)
+    """A direction about +z with density (p + 1) / (2 pi) cos(theta)^p on the upper hemisphere (Lafortune1994).
+
+    sin^2 = 1 - cos^2 is taken from the logarithm of the cosine: at p = 1e5 the difference has no digits left in float32.
+    """
+    log_cos = ops.log(1.0 - u1) / (p + 1.0)
+    cos_theta = ops.exp(log_cos)
+    sin_theta = safe_sqrt(-2.0 * log_cos * exprel(2.0 * log_cos))
     phi = (2.0 * ops.pi) * u2
     s, c = sincos(phi)
     return vec3(sin_theta * c, sin_theta * s, cos_theta)
@@ -34,3 +39,14 @@ def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
 def square_to_power_lobe_pdf(cos_theta: Scalar, p: Scalar) -> Scalar:
     """(p + 1) / (2 pi) cos(theta)^p above, 0 below; 1/sr."""
     return (p + 1.0) * (0.5 * ops.inv_pi) * ops.pow(cos_theta, p)
+
+
+@function
+def around(axis: Direction, w: Direction) -> Direction:
+    """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
+    side = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
+    a = -1.0 / (side + axis.z)
+    b = axis.x * axis.y * a
+    s = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x)
+    t = vec3(b, side + axis.y * axis.y * a, -axis.y)
+    return s * w.x + t * w.y + axis * w.z

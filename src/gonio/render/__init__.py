@@ -7,12 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._callable import make_callable
+from ..owner import alone
 
 if TYPE_CHECKING:
     from ..models import BSDF
     from .exposures import RGB, Exposure
+    from .request import Request
 
 
+@alone
 def render(
     scene: str | Path | BSDF,
     *,
@@ -31,6 +34,7 @@ def render(
     allow_outside: bool = False,
     allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
+    checkpoint: str | Path | None = None,
 ) -> RGB:
     """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
@@ -53,13 +57,12 @@ def render(
     allow_outside  let the scene read files outside its folder
     allow_code     let the scene name materials in Python files, "ward.py:Ward", which then run
     overrides      values by their path in the scene, as `gonio study` varies them; materials too
-    Warns (GonioWarning) of odd scenes and of a .png that clips. Raises InputError, MachineError.
+    checkpoint     file for the sums so far, written every few seconds; where it is there, the render goes on from it,
+                   to the same bits. None: beside the output, where the render takes over a minute
+    Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
     """
-    import warnings
-
-    from ..errors import GonioWarning
     from ..models import BSDF
-    from . import images, run
+    from . import run
 
     request = run.Request(
         Path(scene.name) if isinstance(scene, BSDF) else Path(scene),
@@ -79,17 +82,66 @@ def render(
         allow_code=allow_code,
         overrides=overrides or {},
         material=scene if isinstance(scene, BSDF) else None,
+        checkpoint=None if checkpoint is None else Path(checkpoint),
     )
+    return _picture(request, level=5)  # past the lock and the call of the module
+
+
+@alone
+def resume(
+    checkpoint: str | Path,
+    *,
+    output: str | Path | None = None,
+    spp: int | None = None,
+    threads: int | None = None,
+    timeout: float | None = None,
+    allow_code: bool = False,
+) -> RGB:
+    """Go on with a render from its checkpoint: the picture, as `go.render` would have given it, to the bit.
+
+        picture = go.resume("phong.exr.checkpoint", spp=1024)
+
+    output      file to write; None is the one that was asked for, if one was
+    spp         samples per pixel in all; None is what was asked for
+    allow_code  let it run Python files that its scene names
+    Raises InputError where the checkpoint is damaged, and where anything that the picture depends on has changed.
+    """
+    from . import checkpoints, run
+
+    change = run.Request(
+        Path(),
+        output=None if output is None else Path(output),
+        spp=spp,
+        threads=threads,
+        timeout=timeout,
+    )
+    change.check()
+    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=4)
+
+
+def _picture(request: Request, level: int) -> RGB:
+    """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
+    import warnings
+
+    from ..errors import GonioWarning
+    from . import checkpoints, images, run
+
+    notices: list[str] = []
+    output, exposure = request.output, request.exposure
     prepared = run.prepare(request)
-    width, height = prepared.size
-    run.run(prepared.render, prepared.spp, width * height, timeout=timeout)
-    picture = run.finished(prepared.render, denoise)
-    notices = list(prepared.warnings)
+    notices += prepared.warnings
+    beside = None if output is None else checkpoints.beside(output)
+    stopped, keeper = run.work(prepared, temporary=beside, tell=notices.append)
+    picture = run.finished(prepared.render, request.denoise)
     if output is not None:
         settings = prepared.settings | {"spp": prepared.render.done}
         notices += filter(None, [images.show(output, picture, settings, exposure).notice])
+    if not stopped:
+        keeper.remove()
+    if keeper.error:
+        notices.append(f"no checkpoint was written: {keeper.error.what}")
     for notice in notices:
-        warnings.warn(notice, GonioWarning, stacklevel=3)  # past the call of the module
+        warnings.warn(notice, GonioWarning, stacklevel=level)
     return picture
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import functools
+from collections.abc import Iterator
 from types import ModuleType
 
 from .. import llvm
 from ..errors import InputError, MachineError
+from ..owner import COMPUTING, alone
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -34,6 +38,7 @@ def variant_for(device: str = "cpu", spectral: bool = False) -> str:
     return ("cuda_ad_" if has_cuda else "llvm_ad_") + ("spectral" if spectral else "rgb")
 
 
+@alone
 def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
     """Mitsuba, with a variant set: the current one where `device` is None and one is set, else `variant_for`.
 
@@ -42,6 +47,7 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
     """
     import mitsuba as mi
 
+    _own(mi)
     variant = mi.variant()
     if device is not None or variant is None:
         variant = variant_for(device or "cpu", spectral)
@@ -56,3 +62,53 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
             raise InputError(f"{threads} threads asked for", "--threads", "give 1 or more")
         dr.set_thread_count(threads)
     return mi
+
+
+@functools.lru_cache
+def _own(mi: ModuleType) -> None:
+    """Let nobody change the variant, which is one for all threads, while another thread computes."""
+    change = mi.set_variant
+
+    @functools.wraps(change)
+    def set_variant(*names: str) -> None:
+        with COMPUTING:
+            change(*names)
+
+    vars(mi)["set_variant"] = set_variant
+
+
+@contextlib.contextmanager
+def using(variant: str) -> Iterator[None]:
+    """Compute by that variant, whatever another thread has set, and put it back."""
+    import mitsuba as mi
+
+    with COMPUTING:
+        before = mi.variant()
+        if before == variant:
+            yield
+            return
+        mi.set_variant(variant)
+        try:
+            yield
+        finally:
+            mi.set_variant(before)
+
+
+@contextlib.contextmanager
+def file_threads() -> Iterator[None]:
+    """Whatever Mitsuba reads or writes is read or written in here.
+
+    Its OpenEXR hands blocks to Dr.Jit's threads and waits for them, for ever where there is none beside the one that
+    waits: with one CPU, or `threads=1`, there is a second one meanwhile.
+    """
+    import drjit as dr
+
+    count = dr.thread_count()
+    if count >= 2:
+        yield
+        return
+    dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        dr.set_thread_count(count)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..models import number, outside, spectrum
-from . import adapter, engine
+from . import adapter, engine, mitsuba_scene
 from .native import Native
 from .types import MitsubaBSDF, OfVariant, PluginDict
 
@@ -109,7 +109,8 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     mi = _mitsuba()
     kind = str(description.get("type", ""))
     try:
-        bsdf = mi.load_dict(description)
+        with engine.file_threads():
+            bsdf = mi.load_dict(description)
     except Exception as error:
         raise _refused(error, kind) from None
     if not isinstance(bsdf, mi.BSDF):
@@ -144,8 +145,10 @@ def _is_bsdf(value: object) -> bool:
 def load_file(path: Path) -> Native:
     """The BSDF of a Mitsuba XML file: its root, or the first in a scene."""
     mi = _mitsuba()
+    mitsuba_scene.check_files(path, {}, allow_outside=True)
     try:
-        found = mi.load_file(str(path))
+        with engine.file_threads():
+            found = mi.load_file(str(path))
     except Exception as error:
         raise _refused(error, path.name) from None
     if isinstance(found, mi.BSDF):

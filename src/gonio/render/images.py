@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import re
 import struct
-import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,9 +19,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import files
+from .. import archives, files
 from ..errors import InputError, did_you_mean
-from . import engine, exposures
+from ..owner import alone
+from . import engine, exposures, formats
 
 Value = str | int | float
 RGB = NDArray[np.float32]
@@ -32,10 +32,7 @@ Metadata = Mapping[str, Value]
 SUFFIXES = (".exr", ".hdr", ".png", ".npz")
 _PREFIX = "gonio."  # keeps our attributes apart from the format's own, and finds them again
 
-# A file may claim any size in its header. DEFLATE, the densest coding here, reaches 1032 to 1, so a picture
-# with more pixels than this times its bytes is a lie (even at one byte a pixel), and is not allocated.
-_MOST_PIXELS_PER_BYTE = 1032
-_MOST_PIXELS = 1 << 28  # 16384 x 16384: 3 GiB as float32 RGB
+_KINDS = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
 
 
 @dataclass(frozen=True)
@@ -60,6 +57,7 @@ def check_writable(path: str | Path) -> Path:
     return files.check_file(target)
 
 
+@alone
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format its suffix names, whole or not at all.
 
@@ -157,7 +155,8 @@ def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
     for key, value in metadata.items():
         bitmap.metadata()[_PREFIX + key] = value
     stream = mi.MemoryStream()
-    bitmap.write(stream, getattr(mi.Bitmap.FileFormat, file_format))
+    with engine.file_threads():
+        bitmap.write(stream, getattr(mi.Bitmap.FileFormat, file_format))
     return stream.raw_buffer()
 
 
@@ -183,6 +182,7 @@ def _one_line(value: Value) -> str:
 # --- reading -------------------------------------------------------------------------------------------
 
 
+@alone
 def read(path: str | Path) -> Picture:
     """A picture as linear RGB, with the settings that Gonio wrote into it.
 
@@ -204,7 +204,6 @@ def read(path: str | Path) -> Picture:
     if suffix == ".npz":
         pixels, metadata = _read_npz(source)
     else:
-        _check_claimed_size(content, suffix, path)
         pixels, metadata = _read_bitmap(source, content, suffix)
     return Picture(pixels, source, suffix != ".png", metadata)
 
@@ -216,56 +215,20 @@ def _nearby(source: Path) -> str:
     return did_you_mean(source.name, near) if near and len(near) <= 20 else "check the name"
 
 
-def _check_claimed_size(content: bytes, suffix: str, path: str | Path) -> None:
-    size = _claimed_size(content, suffix)
-    if size is None:
-        raise InputError(f"this is no {suffix[1:].upper()} picture", str(path), "check the file or its suffix")
-    width, height = size
-    if width <= 0 or height <= 0 or width * height > min(_MOST_PIXELS, _MOST_PIXELS_PER_BYTE * len(content)):
-        what = f"the header claims {width}x{height} pixels, which a file of {len(content)} bytes cannot hold"
-        if 0 < width * height <= _MOST_PIXELS_PER_BYTE * len(content):
-            what = f"{width}x{height} pixels are more than {_MOST_PIXELS}"
-        raise InputError(what, str(path), "the file is damaged or too large")
-
-
-def _claimed_size(content: bytes, suffix: str) -> tuple[int, int] | None:
-    """Width and height by the header, None where it is not of this format."""
-    if suffix == ".png":
-        if content[:8] != b"\x89PNG\r\n\x1a\n" or len(content) < 24:
-            return None
-        return struct.unpack(">II", content[16:24])
-    if suffix == ".exr":
-        if content[:4] != b"\x76\x2f\x31\x01":
-            return None
-        match = re.search(rb"dataWindow\0box2i\0\x10\0\0\0(.{16})", content[: 1 << 20], re.DOTALL)
-        if not match:
-            return None
-        left, top, right, bottom = struct.unpack("<iiii", match[1])
-        return right - left + 1, bottom - top + 1
-    if content[:2] != b"#?":
-        return None
-    match = re.search(rb"\n\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n", content[: 1 << 20])
-    return (int(match[2]), int(match[1])) if match else None
-
-
 def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[RGB, dict[str, Value]]:
-    mi, path = engine.load(), str(source)
+    kind, where = _KINDS[suffix], str(source)
+    if formats.kind_of(content) != kind:
+        raise InputError(f"this is no {suffix[1:].upper()} picture", where, "check the file or its suffix")
     try:
-        bitmap = mi.Bitmap(str(source), _mitsuba_format(mi, suffix))
-        metadata = _metadata(bitmap, content, suffix)
-        if suffix == ".png":  # by our own decoding: a 16-bit PNG would be taken for linear
-            values = np.array(bitmap)
-            pixels = from_screen(_three_channels(values, path) / np.float32(np.iinfo(values.dtype).max))
-        else:
-            pixels = _three_channels(np.array(bitmap).astype(np.float32), path)
-    except RuntimeError as error:
-        raise InputError(f"this picture is damaged: {_reason(error)}", path, "render or copy it again") from error
+        values, _ = formats.decode(source, content, kind)
+        metadata = _metadata(content, suffix)
+    except formats.Unreadable as error:
+        raise InputError(f"this picture is damaged: {error}", where, "render or copy it again") from error
+    if suffix == ".png":  # by our own decoding: a 16-bit PNG would be taken for linear
+        pixels = from_screen(_three_channels(values, where))
+    else:
+        pixels = _three_channels(values, where)
     return np.ascontiguousarray(pixels), metadata
-
-
-def _mitsuba_format(mi: object, suffix: str) -> object:
-    names = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
-    return getattr(mi.Bitmap.FileFormat, names[suffix])  # type: ignore[attr-defined]
 
 
 def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number]:
@@ -277,16 +240,10 @@ def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number
     raise InputError(f"{grey.shape[2]} channels, expected RGB", str(path), "keep one layer only")
 
 
-def _reason(error: Exception) -> str:
-    """Mitsuba's message without its class and the file's name, which the error names already."""
-    return re.sub(r'^\s*(\[[^\]]*\]\s*)?("[^"]*":\s*)?', "", str(error).strip().splitlines()[-1])
-
-
-def _metadata(bitmap: object, content: bytes, suffix: str) -> dict[str, Value]:
+def _metadata(content: bytes, suffix: str) -> dict[str, Value]:
     found: Iterator[tuple[str, Value]]
     if suffix == ".exr":
-        properties = bitmap.metadata()  # type: ignore[attr-defined]
-        found = ((key, properties[key]) for key in properties.keys())  # noqa: SIM118 - no mapping
+        found = _exr_values(content)
     elif suffix == ".hdr":
         lines = content.split(b"\n\n", 1)[0].decode("utf-8", "replace").splitlines()
         ours = (line[2:].partition("=") for line in lines if line.startswith(f"# {_PREFIX}"))
@@ -296,16 +253,23 @@ def _metadata(bitmap: object, content: bytes, suffix: str) -> dict[str, Value]:
     return {key.removeprefix(_PREFIX): value for key, value in found if key.startswith(_PREFIX)}
 
 
+def _exr_values(content: bytes) -> Iterator[tuple[str, Value]]:
+    """The texts and numbers among the attributes (OpenEXR's file layout, "Predefined attribute types")."""
+    numbers = {"int": "<i", "float": "<f", "double": "<d"}
+    for name, kind, value in formats.exr_attributes(content):
+        if kind == "string":
+            yield name, value.decode("utf-8", "replace")
+        elif kind in numbers and len(value) == struct.calcsize(numbers[kind]):
+            yield name, struct.unpack(numbers[kind], value)[0]
+
+
 def _png_texts(content: bytes) -> Iterator[tuple[str, Value]]:
-    at = 8
-    while at + 8 <= len(content):
-        length, kind = struct.unpack(">I4s", content[at : at + 8])
-        key, _, value = content[at + 8 : at + 8 + length].partition(b"\0")
+    for kind, data in formats.png_chunks(content):
+        key, _, value = data.partition(b"\0")
         if kind == b"tEXt":
             yield _parsed(key.decode("latin-1"), value.decode("latin-1"))
         elif kind == b"iTXt" and value[:2] == b"\0\0":  # not compressed
             yield _parsed(key.decode("latin-1"), value[2:].split(b"\0", 2)[-1].decode("utf-8", "replace"))
-        at += 12 + length
 
 
 def _parsed(key: str, value: str) -> tuple[str, Value]:
@@ -322,18 +286,15 @@ def _parsed(key: str, value: str) -> tuple[str, Value]:
 def _read_npz(source: Path) -> tuple[RGB, dict[str, Value]]:
     where = str(source)
     try:
-        with np.load(source, allow_pickle=False) as archive:
-            names = [name for name in archive.files if name != "metadata"]
-            name = "radiance" if "radiance" in names else names[0] if len(names) == 1 else ""
-            if not name:
-                hint = "save it with np.savez(path, radiance=picture); found: " + ", ".join(names)
-                raise InputError("no array named 'radiance'", where, hint)
-            array = archive[name]
-            metadata = json.loads(str(archive["metadata"])) if "metadata" in archive.files else {}
-    except (ValueError, OSError, EOFError, KeyError, MemoryError, zipfile.BadZipFile, zlib.error) as error:
-        if isinstance(error, InputError):
-            raise
+        arrays = archives.read(source)
+        metadata = json.loads(str(arrays.pop("metadata", "{}")))
+    except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"this .npz cannot be read: {error}", where, "save it with np.savez(...)") from error
+    name = "radiance" if "radiance" in arrays else next(iter(arrays), "") if len(arrays) == 1 else ""
+    if not name:
+        hint = "save it with np.savez(path, radiance=picture); found: " + ", ".join(arrays)
+        raise InputError("no array named 'radiance'", where, hint)
+    array = arrays[name]
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu" or array.size == 0:
         what = f"'{name}' is {array.dtype} of shape {array.shape}, expected (H, W, 3) numbers"
         raise InputError(what, where)

@@ -281,7 +281,10 @@ class Lights:
 
     def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
-        self.emitters = scene.emitters()
+        found = scene.emitters()
+        # Mitsuba merges the shapes of a file in an order of chance, and that of their lights must not follow it
+        order = sorted(range(len(found)), key=lambda index: _order(found[index]))
+        self.emitters = [found[index] for index in order]
         self.count = len(self.emitters)
         self.rectangle: Rectangle | None = None
         self.has_environment = scene.environment() is not None
@@ -291,7 +294,8 @@ class Lights:
         elif self.count > 1:
             self.probability = self._probabilities()
             self.choice = mi.DiscreteDistribution(self.probability)
-            self.by_pointer = self._by_pointer(self.probability)
+            self.place = mi.UInt32(order)  # of each of `emitters` among the scene's
+            self.by_pointer = self._by_pointer()
 
     def _is_rectangle_light(self, emitter: Emitter) -> bool:
         known = getattr(emitter, "two_sided", False) or emitter.class_name() == "AreaLight"
@@ -322,12 +326,12 @@ class Lights:
         share = [f / total if total > 0 else 1 / self.count for f in flux]
         return mi.Float([0.5 / self.count + 0.5 * s for s in share])
 
-    def _by_pointer(self, probability: Float) -> Float:
+    def _by_pointer(self) -> Float:
         """The probabilities again, indexed by Dr.Jit's number of the emitter (what an EmitterPtr holds)."""
         mi = self.mi
         number = dr.reinterpret_array(mi.UInt32, self.scene.emitters_dr())
         table = dr.zeros(mi.Float, int(dr.max(number)[0]) + 1)
-        dr.scatter(table, probability, number)
+        dr.scatter(table, self.probability, dr.gather(mi.UInt32, number, self.place))
         dr.eval(table)
         return table
 
@@ -351,7 +355,8 @@ class Lights:
             ds, weight = self.emitters[0].sample_direction(si, u, active)
             return LightSample(ds, weight, mi.Bool(ds.delta), mi.Float(0))
         index, probability = self.choice.sample_pmf(pick, active)
-        emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), index, active)
+        place = dr.gather(mi.UInt32, self.place, index, active)
+        emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), place, active)
         ds, weight = emitter.sample_direction(si, u, active)
         ds.pdf *= probability
         return LightSample(ds, weight / probability, mi.Bool(ds.delta), mi.Float(0))
@@ -402,6 +407,13 @@ class Lights:
         active &= ~self.scene.ray_test(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
         return weigh(dr.select(active, radiance, 0), pdf)
+
+
+def _order(emitter: Emitter) -> tuple[str, list[float]]:
+    """What lights are sorted by: nothing that changes between two runs."""
+    shape = emitter.get_shape()
+    box = [] if shape is None else [float(x) for x in (*shape.bbox().min, *shape.bbox().max)]
+    return str(emitter), box
 
 
 @dataclass

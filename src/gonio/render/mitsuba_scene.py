@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import engine, formats
 from .passes import power_of_two
 from .request import Request
 from .types import Plugin, Scene
@@ -43,9 +45,22 @@ class MitsubaRender:
         taken = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * taken
-        self._sum = weighted if self._sum is None else self._sum + weighted
+        self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
         self.done += taken
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """The sum so far, and which passes it is of."""
+        assert self._sum is not None, "advance() comes first"
+        return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError for another film."""
+        width, height = self._sensor.film().crop_size()
+        if "sum" not in state or "passes" not in state or state["sum"].shape[:2] != (int(height), int(width)):
+            raise ValueError("no sum of this film")
+        self._sum, (self._passes, self.pass_size) = state["sum"], map(int, state["passes"])
+        self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
         tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
@@ -66,10 +81,12 @@ class MitsubaRender:
 def load(request: Request, mi: ModuleType) -> Scene:
     """The scene of a Mitsuba XML file; the request's overrides are its `$parameters`."""
     where = str(request.scene)
-    if not request.allow_outside:
-        _check_inside(request.scene, request.overrides)
+    check_files(request.scene, request.overrides, request.allow_outside)
     try:
-        scene = mi.load_file(where, **{key: _as_xml(value) for key, value in request.overrides.items()})
+        # one after the other: in parallel the order of shapes, and with it the last bit, is left to chance
+        with engine.file_threads():
+            values = {key: _as_xml(value) for key, value in request.overrides.items()}
+            scene = mi.load_file(where, parallel=False, **values)
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():
@@ -103,8 +120,36 @@ def _mitsuba_text(error: Exception) -> str:
     return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
 
 
-def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
-    """Raise InputError where a Mitsuba scene, or a file it includes, names a file outside the scene's folder."""
+def sources(file: Path, parameters: Mapping[str, object]) -> tuple[str, dict[str, Path]]:
+    """The text of a scene with all that it includes, and every file that it names, by the name that it gives it."""
+    texts, named = [repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))], {}
+    texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
+    for _, name, target, included in _named(file, parameters):
+        named[name] = target
+        if included:
+            texts.append(target.read_text(encoding="utf-8", errors="surrogateescape"))
+    return "\n".join(texts), named
+
+
+def check_files(file: Path, parameters: Mapping[str, object], allow_outside: bool = False) -> None:
+    """Raise InputError where a Mitsuba scene, or a file it includes, names a file that must not be opened: one outside
+    the scene's folder, or a picture that contradicts itself, by which a library in C++ could be corrupted."""
+    folder = file.parent.resolve()
+    for current, name, target, _ in _named(file, parameters):
+        if not allow_outside and not target.is_relative_to(folder):
+            what = f"'{name}' lies outside the scene's folder {folder}"
+            raise InputError(what, str(current), "copy it there, or use --allow-outside")
+        try:
+            formats.check_file(target)
+        except formats.Unreadable as error:
+            raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
+        except OSError as error:
+            raise InputError(f"'{name}' cannot be read: {error.strerror}", str(current), "check the file") from None
+
+
+def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path, str, Path, bool]]:
+    """Each file that exists and is named by a Mitsuba scene, or by a file that it includes: (where, its name there,
+    the file, whether it is included)."""
     folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
     while waiting:
         current = waiting.pop()
@@ -113,7 +158,7 @@ def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
         seen.add(current)
         try:
             root = ElementTree.parse(current).getroot()
-        except (ElementTree.ParseError, OSError, ValueError) as error:
+        except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
             raise InputError(f"not well-formed XML: {error}", str(current), "mend it there") from error
         values = {x.get("name", ""): x.get("value", "") for x in root.iter("default")}
         values |= {name: _as_xml(value) for name, value in parameters.items()}
@@ -125,11 +170,10 @@ def _check_inside(file: Path, parameters: Mapping[str, object]) -> None:
                 name = name.replace("$" + key, values[key])
             try:
                 target = (folder / name).resolve()
-                exists = target.exists()
-            except (OSError, ValueError):  # no file's name, such as a long or odd string
+                exists = target.is_file()
+            except (OSError, ValueError, RuntimeError):  # no file's name, such as a long or odd string, or a loop
                 continue
-            if exists and not target.is_relative_to(folder):
-                what = f"'{name}' lies outside the scene's folder {folder}"
-                raise InputError(what, str(current), "copy it there, or use --allow-outside")
-            if element.tag == "include" and exists:
-                waiting.append(target)
+            if exists:
+                yield current, name, target, element.tag == "include"
+                if element.tag == "include":
+                    waiting.append(target)

@@ -14,6 +14,7 @@ from typing import ClassVar
 import drjit as dr
 import mitsuba as mi
 
+from ..errors import InputError
 from ..models import BSDF, Sample, binding, method
 from ..models.material import Delta
 from ..ops import Direction, Mode, Scalar, Spectrum, backend
@@ -75,6 +76,9 @@ class Native(BSDF):
             si = mi.SurfaceInteraction3f(self._si)
             si.wi = mi.Vector3f(wo)
             return si
+        if self.bsdf.variant_name() != mi.variant():
+            what = f"this BSDF is of the variant {self.bsdf.variant_name()}, and {mi.variant()} is set"
+            raise InputError(what, type(self).__name__, "set its variant again, or build it anew")
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wo))
         si.wi = mi.Vector3f(wo)
         si.t = 1.0

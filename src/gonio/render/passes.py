@@ -14,9 +14,9 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,8 @@ PASS_SECONDS = 0.5  # long enough that a pass's start-up (some 10 ms) is small, 
 
 FIRST_PASS = 1 << 18  # samples: some 50 ms of work, and a first picture soon after the kernel is compiled
 
-INTERRUPTED = 130  # the exit code of a shell for a program that Ctrl-C ended, 128 + SIGINT
+# What ends a render: Ctrl-C, what batch systems send, and what a closing terminal sends; Windows lacks some.
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Renders(Protocol):
@@ -39,6 +40,10 @@ class Renders(Protocol):
     def image(self) -> NDArray[np.float32]: ...
 
     def aov(self) -> dict[str, NDArray[np.float32]]: ...
+
+    def state(self) -> dict[str, NDArray[Any]]: ...
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -58,19 +63,19 @@ def run(
     *,
     timeout: float | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
-    interrupted: Callable[[], bool] = lambda: False,
+    interrupted: Callable[[], object] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
 ) -> str:
     """Advance `render` to `spp` samples per pixel; why it ended: "" (done), "interrupt" or "timeout".
 
-    At least one pass is made, so that there is always a picture. Both wishes to stop are looked at between
-    passes; near the time limit the passes shrink to what still fits.
+    At least one pass is made where samples are missing, so that there is always a picture. Both wishes to stop are
+    looked at between passes; near the time limit the passes shrink to what still fits.
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # a Mitsuba scene's passes are of one size
     count = power_of_two(FIRST_PASS / pixels)
     compiled, counted_samples, counted_seconds = False, 0, 0.0
-    while True:
+    while render.done < spp:
         if fixed:
             count = fixed
         before, started = render.done, clock()
@@ -94,6 +99,7 @@ def run(
             if timeout is not None:
                 count = min(count, max(1, int(left * rate / pixels)))
         compiled = True
+    return ""
 
 
 def _next_count(count: int, elapsed: float, compiled: bool) -> int:
@@ -109,49 +115,55 @@ def power_of_two(x: float) -> int:
 
 
 class Interrupts:
-    """While it is open, the first Ctrl-C sets `asked`, and a second one ends the process at once.
+    """While it is open, the first signal that would end the process sets `asked`, its number, and Ctrl-C after that
+    ends the process at once. SIGTERM and SIGHUP may come together, as systemd sends them: no second one of them does.
 
     A signal handler of Python runs only between two of its instructions, and a pass is one long call. So the
     signal's byte is taken from the wake-up socket by a thread of its own, which runs while the pass does.
     """
 
     def __init__(self, notice: Callable[[], None] = lambda: None) -> None:
-        self.asked = False
+        self.asked = 0
         self._notice = notice
 
     def __enter__(self) -> Interrupts:
-        # Signals belong to the main thread; a shell that ignores Ctrl-C for a background job has its reasons.
+        # Signals belong to the main thread; a shell that ignores Ctrl-C for a background job has its reasons, and so
+        # has nohup for SIGHUP.
         in_main = threading.current_thread() is threading.main_thread()
-        self._active = in_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
-        if self._active:
+        numbers = [number for number in ENDING if in_main and signal.getsignal(number) is not signal.SIG_IGN]
+        self._old = {number: signal.signal(number, lambda number, frame: None) for number in numbers}
+        if self._old:
             self._listen, self._wake = socket.socketpair()
             self._wake.setblocking(False)
-            self._old_handler = signal.signal(signal.SIGINT, lambda number, frame: None)
             self._old_wake = signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
             threading.Thread(target=self._watch, daemon=True).start()
         return self
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt where it was asked for: for work that has nothing to keep yet."""
+        """End by the signal that came, if one did: for work that has nothing to keep yet."""
         if self.asked:
-            raise KeyboardInterrupt
+            self.__exit__()
+            signal.raise_signal(self.asked)
+            raise KeyboardInterrupt  # where the signal's own handler does nothing
 
     def __exit__(self, *exc: object) -> None:
-        if self._active:
+        if self._old:
             signal.set_wakeup_fd(self._old_wake)
-            signal.signal(signal.SIGINT, self._old_handler)
+            for number, handler in self._old.items():
+                signal.signal(number, handler)
             self._wake.close()  # ends the thread
-            self._active = False
+            self._old = {}
 
     def _watch(self) -> None:
         with contextlib.suppress(OSError), self._listen:
             while numbers := self._listen.recv(16):
                 for number in numbers:
-                    if number != signal.SIGINT:
+                    if number not in self._old:
                         continue
-                    if self.asked:
+                    if self.asked and number == signal.SIGINT:
                         if sys.stderr.isatty():
                             os.write(2, b"\x1b[?25h\n")  # the progress bar had hidden the cursor
-                        os._exit(INTERRUPTED)
-                    self.asked = True
-                    self._notice()
+                        os._exit(128 + number)
+                    if not self.asked:
+                        self.asked = number
+                        self._notice()

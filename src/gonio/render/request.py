@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .. import files
 from ..errors import InputError
 from ..models import BSDF
 from . import denoise, exposures, images
@@ -38,6 +39,7 @@ class Request:
     allow_code: bool = False
     overrides: Mapping[str, object] = field(default_factory=dict)
     material: BSDF | None = None  # to be shown on a ball, in place of a scene
+    checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""
@@ -58,6 +60,8 @@ class Request:
             denoise.require()
         if self.output is not None:
             images.check_writable(self.output)
+        if self.checkpoint is not None:
+            files.check_file(self.checkpoint)
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..errors import InputError, did_you_mean
-from . import denoise, engine, images, mitsuba_scene
+from . import checkpoints, denoise, engine, images, mitsuba_scene
+from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
 from .request import Request, check_film, parse_size
 
@@ -29,17 +31,23 @@ __all__ = ["Prepared", "Request", "Result", "finished", "parse_size", "prepare",
 class Prepared:
     """A scene loaded and ready to advance."""
 
+    request: Request
     render: Renders
     spp: int
     size: tuple[int, int]
     output: Path
     settings: dict[str, images.Value]
+    sources: Sources
     warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's."""
+    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's.
+
+    signal      the number of the signal that interrupted it, 0 where none did
+    checkpoint  file from which it goes on, None where there is none
+    """
 
     output: Path
     spp: int
@@ -50,9 +58,12 @@ class Result:
     settings: dict[str, images.Value]
     warnings: tuple[str, ...]
     exposure: float | None = None
+    signal: int = 0
+    checkpoint: Path | None = None
 
     def as_dict(self) -> dict[str, object]:
-        return {**asdict(self), "output": str(self.output)}
+        checkpoint = None if self.checkpoint is None else str(self.checkpoint)
+        return {**asdict(self), "output": str(self.output), "checkpoint": checkpoint}
 
 
 def prepare(request: Request) -> Prepared:
@@ -98,13 +109,31 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     images.check_writable(output)
     render = integrators.Render(scene.build(description, mi), settings, aovs=request.denoise)
     return Prepared(
+        request,
         render,
         request.spp or description.spp,
         (render.width, render.height),
         output,
         _metadata(request, mi, **_own(settings)),
+        Sources.of(mi, *scene.sources(description), _how(settings, request)),
         tuple(description.warnings),
     )
+
+
+def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
+    """The settings that a picture depends on, in words."""
+    ours = {} if settings is None else {**asdict(settings), "program": _code_of(settings.program)}
+    return ", ".join(f"{name} {value}" for name, value in {**ours, **more, "features": request.denoise}.items())
+
+
+def _code_of(program: type) -> str:
+    """A hash of the file of an integrator that is not Gonio's, its name where it is or where there is no file."""
+    if program.__module__.startswith("gonio."):
+        return program.__name__
+    try:
+        return checkpoints.file_hash(Path(inspect.getsourcefile(program) or ""))
+    except TypeError:
+        return program.__qualname__
 
 
 def _settings(scene: Settings, request: Request) -> Settings:
@@ -164,13 +193,14 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
     output = request.output or Path(request.scene.stem + ".exr")
     images.check_writable(output)
     sensor = scene.sensors()[0]
+    files = mitsuba_scene.sources(request.scene, request.overrides)
     spp = request.spp or int(sensor.sampler().sample_count())
     width, height = (int(n) for n in sensor.film().crop_size())
     check_film((width, height), str(request.scene))
     if request.integrator is not None:
         settings = _settings(integrators.Settings(), request)
         render: Renders = integrators.Render(scene, settings, aovs=request.denoise)
-        how = _own(settings)
+        how, all_ = _own(settings), _how(settings, request)
     else:
         seed = request.seed or 0
         render = mitsuba_scene.MitsubaRender(mi, scene, spp, seed)
@@ -179,38 +209,80 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
             "sampler": f"mitsuba:{sensor.sampler().class_name()}",
             "seed": seed,
         }
-    return Prepared(render, spp, (width, height), output, _metadata(request, mi, **how))
+        all_ = _how(None, request, **how)
+    all_ += f", size {width}x{height}"
+    sources = Sources.of(mi, *files, all_)
+    return Prepared(request, render, spp, (width, height), output, _metadata(request, mi, **how), sources)
+
+
+def work(
+    prepared: Prepared,
+    *,
+    temporary: Path | None = None,
+    report: Callable[[Progress], None] = lambda progress: None,
+    interrupted: Callable[[], object] = lambda: False,
+    tell: Callable[[str], None] = lambda text: None,
+) -> tuple[str, Keeper]:
+    """Advance a render to its samples, from where an earlier run left it: why it ended, as `run` has it, and the keeper
+    of its checkpoints, which is told when the picture is written.
+
+    temporary  the checkpoint of a long job whose request names none
+    tell       called at the start with what was found
+    """
+    request, (width, height) = prepared.request, prepared.size
+    path = request.checkpoint or temporary
+    unasked = request.checkpoint is None
+    if path is not None:
+        found, unasked = checkpoints.earlier(path, prepared, unasked)
+        if found:
+            tell(found)
+    keeper = Keeper(path, prepared, unasked)
+
+    def after(progress: Progress) -> None:
+        keeper.after_pass(progress)
+        report(progress)
+
+    stopped = run(
+        prepared.render,
+        prepared.spp,
+        width * height,
+        timeout=request.timeout,
+        report=after,
+        interrupted=interrupted,
+    )
+    keeper.end(bool(stopped))
+    return stopped, keeper
 
 
 def render(
     request: Request,
     report: Callable[[Progress], None] = lambda progress: None,
     notice: Callable[[], None] = lambda: None,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Render a scene to a file; on Ctrl-C or at the time limit, the picture so far.
+    """Render a scene to a file; on Ctrl-C, SIGTERM and SIGHUP or at the time limit, the picture so far.
 
     report  called after each pass
-    notice  called at the first Ctrl-C, from another thread
+    notice  called at the first of these signals, from another thread
+    tell    called at the start with what an earlier run has left
     """
     started = time.perf_counter()
     with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
         prepared = prepare(request)
         interrupts.check()
-        width, height = prepared.size
-        stopped = run(
-            prepared.render,
-            prepared.spp,
-            width * height,
-            timeout=request.timeout,
-            report=report,
-            interrupted=lambda: interrupts.asked,
+        beside = checkpoints.beside(prepared.output)
+        stopped, keeper = work(
+            prepared, temporary=beside, report=report, interrupted=lambda: interrupts.asked, tell=tell
         )
-    picture = finished(prepared.render, request.denoise)
-    settings = prepared.settings | {"spp": prepared.render.done}
-    if stopped:
-        settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
-    seconds = time.perf_counter() - started
-    shown = images.show(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
+        picture = finished(prepared.render, request.denoise)
+        settings = prepared.settings | {"spp": prepared.render.done}
+        if stopped:
+            settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
+        seconds = time.perf_counter() - started
+        shown = images.show(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
+        if not stopped:
+            keeper.remove()
+    failed = f"no checkpoint was written: {keeper.error.what}" if keeper.error else ""
     return Result(
         prepared.output,
         prepared.render.done,
@@ -219,8 +291,10 @@ def render(
         seconds,
         stopped,
         settings,
-        (*prepared.warnings, *filter(None, [shown.notice])),
+        (*prepared.warnings, *filter(None, [shown.notice, failed])),
         shown.exposure,
+        interrupts.asked if stopped == "interrupt" else 0,
+        keeper.path if keeper.written else None,
     )
 
 

@@ -25,9 +25,11 @@ from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, models, notation, outside
 from ..optics.ndf import distributions
+from ..owner import alone
 from . import images
 
 
+@alone
 def bake(
     target: str | Path | BSDF,
     output: str | Path | None = None,
@@ -165,6 +167,8 @@ def _target(target: str | Path | BSDF) -> str | BSDF:
         return target
     if outside.names_code(name):
         return _own(target, name)
+    if outside.reader_of(name):
+        return notation.named(target)[0]
     known = [*distributions(), *models()]
     if name.replace("_", "-") not in known:
         raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))

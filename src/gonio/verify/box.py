@@ -106,8 +106,26 @@ def axes(subject: Subject) -> list[Axis]:
         low, high, ratio = ends
         if leaf.parameter.kind == "spectrum" and subject.black_fails:
             low = max(low, min(DARK, high))
+        if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
+            low += MARGIN * (high - low)
         found.append(Axis(leaf.path, low, high, ratio))
     return found
+
+
+def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
+    """Whether an inner material has a delta lobe at this value, while the one that holds it says that there is none:
+    it was not written for such lobes, and need not answer for them."""
+    if _hides_delta(subject.model):
+        return False  # as given: then it does answer
+    try:
+        return _hides_delta(subject.replace(**{path: value}).model)
+    except InputError:
+        return False
+
+
+def _hides_delta(model: BSDF) -> bool:
+    inner = tree.children(model).values()
+    return any((model.delta == "never" and one.delta != "never") or _hides_delta(one) for one in inner)
 
 
 def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:

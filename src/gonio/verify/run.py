@@ -13,6 +13,7 @@ from typing import NamedTuple
 from .. import members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
+from ..owner import alone
 from . import box, diagnosis, directions, quality, statistics, subject
 from .box import Place
 from .ci.outputs import Outputs
@@ -31,6 +32,7 @@ Target = BSDF | Subject | str
 Begin = Callable[[str], None]
 
 
+@alone
 def verify(
     target: Target | Sequence[Target],
     *,

@@ -71,10 +71,13 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         return Subject(bsdf, target, values)
     if target.endswith(".py"):
         raise InputError(f"'{target}' names a file, but no class in it", "TARGET", f"give {target}:CLASS")
-    if target.lstrip().startswith("{") or target.lower().endswith((".json", ".xml", ".bsdf")):
+    if outside.reader_of(target):
+        bsdf, values = notation.named(target, [f"{name}={value}" for name, value in given.items()])
+        return Subject(bsdf, target, {name: value for name, value in values.items() if name != "file"})
+    if target.lstrip().startswith("{") or target.lower().endswith((".json", ".xml")):
         return _from_file(target, given)
-    if Path(target).suffix in (".binary", ".merl", ".csv", ".txt") or Path(target).is_file():
-        hint = "measurements in the RGL's .bsdf format can be verified"
+    if Path(target).suffix in (".merl", ".csv", ".txt") or Path(target).is_file():
+        hint = "gonio convert reads measurements: .binary, .bsdf, .brdf, .astm, .npz, .gonio"
         raise InputError(f"'{target}' is in no format that can be verified", "TARGET", hint)
     if ":" in target.partition("(")[0] and ".py:" not in target:
         raise InputError(f"'{target}' is no target", "TARGET", "give MODEL, FILE.py:CLASS or mitsuba:PLUGIN")
@@ -105,8 +108,6 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     if not target.lstrip().startswith("{"):
         if not path.is_file():
             raise InputError(f"no file '{target}'", "TARGET")
-        if path.suffix.lower() == ".bsdf":
-            return Subject(foreign.load({"type": "measured", "filename": str(path), **values}), target, values)
         if path.suffix.lower() == ".xml":
             if values:
                 raise InputError("parameters of an XML file cannot be set", "--param", "change the file")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..models import notation
+from ..owner import alone
 from ..render import exposures, images, passes, run
 from . import figures
 from .figures import Drawing
@@ -85,6 +86,7 @@ def parse_variation(text: str) -> Variation:
     return Variation(path, tuple(figures.split_values(values)))
 
 
+@alone
 def study(
     scene: str | Path,
     vary: Mapping[str, Sequence[object]],

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..owner import alone
 from ..render import images, metrics
 from . import figures
 
@@ -19,6 +20,7 @@ _TITLES = {
 }
 
 
+@alone
 def compare(
     test: str | Path | ArrayLike,
     reference: str | Path | ArrayLike,

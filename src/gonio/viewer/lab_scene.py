@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..models import BSDF, notation, tree
-from ..render import engine, scene
+from ..render import scene
 from ..render.scene import schema, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
 from ..render.scene.values import ImageTexture, rgb
@@ -42,7 +42,7 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
     if not parts:
         raise InputError("the scene has no shapes", str(path), "add one, or name a model")
     notes = [f"{part.type}: its {what} is not shown" for part in parts for what in _textured(part)]
-    materials, rows = _rows([_bsdf(part) for part in parts])
+    materials, rows = _rows([_bsdf(part, description) for part in parts])
     lights, more = _lights(description)
     name = path.stem if path.stem != "scene" else path.resolve().parent.name
     if path.is_dir():
@@ -61,9 +61,9 @@ def _materials(description: schema.SceneDescription) -> list[MaterialPart]:
     return found
 
 
-def _bsdf(part: MaterialPart) -> BSDF:
+def _bsdf(part: MaterialPart, description: schema.SceneDescription) -> BSDF:
     """The material with its numbers, those of named presets too; a textured one has its default."""
-    return replaced(part.instance(), dict(_indices(part)))
+    return replaced(part.instance(description.locate), dict(_indices(part)))
 
 
 def _indices(part: MaterialPart, path: str = "") -> Iterator[tuple[str, Value]]:
@@ -223,8 +223,7 @@ def _environment(description: schema.SceneDescription, light: schema.Environment
     if not isinstance(source, ImageTexture):
         return {**found, "constant": [float(x) for x in rgb(source)]}
     where = description.where("/scene/lights")
-    mi = engine.load("cpu")
-    pixels = textures.load_image(mi, description.locate(source.file, where), where, srgb=source.color_space == "srgb")
+    pixels = textures.load_image(description.locate(source.file, where), where, srgb=source.color_space == "srgb")
     pixels = _smaller(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     halves = np.ones((*pixels.shape[:2], 4), "<f2")
     halves[..., :3] = np.clip(pixels, 0.0, np.finfo(np.float16).max)

@@ -11,7 +11,6 @@ import hashlib
 import html as escaping
 import itertools
 import json
-import threading
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +24,7 @@ from ..emit import bundle as written_for
 from ..energy.tables import bake
 from ..errors import InputError, MachineError
 from ..models import BSDF
+from ..owner import alone
 from . import panels, stage
 from .stage import PresetData, Stage, Value
 
@@ -67,7 +67,6 @@ class PageData(TypedDict):
 
 
 VERSION = 1
-_recording = threading.Lock()  # the recorder is one for all threads: the server's, and the one that watches files
 STATIC = Path(__file__).parent / "static"
 # Bilinear lookups are off by 1e-3 (RMS); at low roughness, where B rises within mu < .05, by up to 6e-2.
 DFG_SIZE = 64
@@ -81,6 +80,7 @@ TABLES = {
 }
 
 
+@alone
 def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> PageData:
     """The page's data, as JSON holds it.
 
@@ -129,10 +129,10 @@ def material_data(key: str, material: stage.Material) -> MaterialData:
     }
 
 
+@alone
 def variant_data(bsdf: BSDF, choices: Mapping[str, Value]) -> VariantData:
     """Shader, manifest and tables of a model with some choices made otherwise."""
-    with _recording:
-        bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl")
+    bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl")
     tables = {name: encode(values) for name, values in bundle.tables.items()}
     manifest = bundle.manifest
     for texture in manifest["textures"]:

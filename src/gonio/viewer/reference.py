@@ -57,6 +57,7 @@ class Reference:
 
     def __init__(self, what: Stage, device: str = "cpu"):
         self.mi = engine.load(device)
+        self.variant = str(self.mi.variant())
         adapter.register(self.mi)
         lights.register(self.mi)
         self.stage = what

@@ -15,6 +15,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .._version import __version__
 from ..errors import GonioError, InputError
+from ..owner import COMPUTING, settle
+from ..render import engine
 from . import messages, page
 from .reference import Pixels, Reference
 from .stage import Stage
@@ -25,6 +27,7 @@ MOST_WISHES = 16  # shaders that a session waits for
 RATE = 250.0  # messages a second that are read of one page: it sends one a picture that it draws, one a frame it got
 SHARE = 0.1  # of the server's thread, for reading one page's messages
 BURST_SECONDS = 0.5  # saved up by a page that was silent: 125 messages at once
+GIVE_WAY_SECONDS = 5e-4  # after each pass, so that who waits to compute has a turn: a lock by itself is not fair
 MOST_WAITING = 64  # messages to a page that does not take them: answers to what it sends, and one frame
 
 
@@ -259,10 +262,12 @@ class Renderer:
                 scene = session.scene
             began = time.perf_counter()
             try:
-                if job is not None:
-                    job()
-                elif scene is not None:
-                    self._turn(session, scene)
+                with COMPUTING:
+                    if job is not None:
+                        job()
+                    elif scene is not None:
+                        self._turn(session, scene)
+                    settle()
             except GonioError as error:
                 self._give_up(session, scene, error)
             except Exception as error:
@@ -270,6 +275,7 @@ class Renderer:
                 what = f"the reference failed: {type(error).__name__}: {first}"
                 self._give_up(session, scene, GonioError(what, "reference", "report this; the page itself goes on"))
             session.spent += time.perf_counter() - began
+            time.sleep(GIVE_WAY_SECONDS)
 
     def _next(self, ready: list[Session]) -> Session:
         """Whose turn it is: who has had least of the thread's time. So a large picture does not hold up small ones.
@@ -300,14 +306,15 @@ class Renderer:
             ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
             session.send_from_thread(json.dumps(ready))
             _give_way()
-        if reference.scene is not scene:
-            reference.stage, reference.pictures = stage, pictures
-            reference.show(scene)
-            session.shown_samples = 0
-            session.started = time.perf_counter()
-        reference.advance()
-        if session.sent == session.acknowledged and _worth_showing(reference, session.shown_samples):
-            self._send_frame(session, reference)
+        with engine.using(reference.variant):  # a program that shows the page may have set another meanwhile
+            if reference.scene is not scene:
+                reference.stage, reference.pictures = stage, pictures
+                reference.show(scene)
+                session.shown_samples = 0
+                session.started = time.perf_counter()
+            reference.advance()
+            if session.sent == session.acknowledged and _worth_showing(reference, session.shown_samples):
+                self._send_frame(session, reference)
 
     def _send_frame(self, session: Session, reference: Reference) -> None:
         assert reference.scene is not None

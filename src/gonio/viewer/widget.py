@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, MachineError
 from ..models import BSDF, notation, tree
+from ..owner import alone
 from . import page, stage
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ export default { render };
 """
 
 
+@alone
 def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     """The page of `gonio view` in a notebook cell: balls, sliders, plots.
 

@@ -19,7 +19,6 @@ from typing import ClassVar, get_type_hints
 from ...members import Family
 
 PICTURES, MATERIALS, SUPPORT = "Pictures", "Materials", "Support"
-INTERRUPTED = 130  # what a shell reports of a program that Ctrl-C ended: 128 + SIGINT
 
 
 class Verb:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from ..options import Json, Material, Rendering, SceneFile
+from ..options import Checkpoint, Json, Material, Rendering, SceneFile
 from ..output import Bar, print_warnings
-from .base import INTERRUPTED, PICTURES, verb
+from ..signals import exit_code, words
+from .base import PICTURES, verb
 
 if TYPE_CHECKING:
-    from ...render.run import Result
+    from ...render.exposures import Exposure
+    from ...render.run import Request, Result
 
 
 @verb(PICTURES, place=1)
@@ -27,12 +31,15 @@ def render(
     timeout: Annotated[
         float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
     ] = None,
+    checkpoint: Checkpoint = None,
     as_json: Json = False,
 ) -> None:
     """Render a scene, or a material on a ball, to a picture.
 
     Without -o the picture gets the name that the scene gives it, in the current folder.
-    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once.
+    Ctrl-C ends after the pass (half a second or so) and keeps the picture so far; a second one ends at once. So do
+    SIGTERM and SIGHUP, which batch systems and closing terminals send. A render of over a minute has a checkpoint
+    beside the picture, from which `gonio resume`, or the same command again, goes on.
 
     \b
     Examples:
@@ -42,26 +49,40 @@ def render(
       gonio render ward.py:Ward -p alpha=.1,.4 -o ward.png
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
+
+    request = how.request(scene, output, timeout, made.instead_of(scene), checkpoint)
+    carry_out(request, scene.name, as_json)
+
+
+def carry_out(request: Request, title: str, as_json: bool) -> None:
+    """Render with a bar, and say what came of it."""
     from ...render import run
 
-    request = how.request(scene, output, timeout, made.instead_of(scene))
-    with Bar(scene.name) as bar:
-        result = run.render(request, report=bar.update, notice=bar.stopping)
-    if as_json:
-        print(json.dumps(result.as_dict()))
-    else:
-        _print(result, how.exposure)
+    with Bar(title) as bar:
+        result = run.render(request, report=bar.update, notice=bar.stopping, tell=bar.tell)
+    try:
+        if as_json:
+            print(json.dumps(result.as_dict()))
+        else:
+            _print(result, request.exposure)
+        sys.stdout.flush()
+    except OSError:
+        if not result.signal:  # else it is the terminal, which has closed; the picture is written
+            raise
+        os._exit(exit_code(result.signal))
     if result.stopped == "interrupt":
-        sys.exit(INTERRUPTED)
+        sys.exit(exit_code(result.signal))
 
 
-def _print(result: Result, exposure: str) -> None:
+def _print(result: Result, exposure: Exposure) -> None:
     width, height = result.size
     text = f"{result.output}  {width}x{height}, {result.spp} spp, {result.seconds:.1f} s"
     if exposure == "auto" and result.exposure is not None:
         text += f", exposure {result.exposure:+g} EV"
     print_warnings(result.warnings)
     if result.stopped:
-        why = "stopped by Ctrl-C" if result.stopped == "interrupt" else "stopped at the time limit"
+        why = f"stopped by {words(result.signal)}" if result.stopped == "interrupt" else "stopped at the time limit"
         text += f"; {why}, {result.wanted_spp} spp were asked for"
     print(text)
+    if result.stopped and result.checkpoint is not None:
+        print(f"go on with: gonio resume {shlex.quote(str(result.checkpoint))}")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import _html
+from ... import _html, archives
 from ...errors import InputError
 from ..cache import content_hash
 
@@ -79,12 +79,11 @@ def _seal(text: str) -> str:
 def read(path: Path) -> Baked:
     """The tables in a file. ValueError with the reason where it is damaged, altered or foreign."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = archives.read(path)
         text, seal = str(arrays.pop("manifest")), str(arrays.pop("seal"))
         manifest = json.loads(text)
         hashes = dict(manifest["hash"])
-    except Exception as error:  # a file of any content: zip, zlib, NumPy and json each have their own ways to fail
+    except Exception as error:  # of any content
         raise ValueError("damaged, or not written by gonio bake") from error
     altered = ["manifest"] if seal != _seal(text) else []
     altered += [name for name, value in hashes.items() if name not in arrays or content_hash(arrays[name]) != value]

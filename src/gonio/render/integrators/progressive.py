@@ -10,7 +10,8 @@ How it is fast:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -80,6 +81,15 @@ class Render:
             dr.sync_thread()
         self._sums = sums
         self.done += count
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """The sums so far, as arrays of one entry a lane that stay as they are while more is rendered."""
+        return self._sums.arrays()
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from the sums of so many samples, to the same bits. Raises ValueError for those of another film."""
+        self._sums = Sums.of_arrays(self.mi, state, len(self._order), like=self._sums)
+        self.done = done
 
     def image(self) -> NDArray[np.float32]:
         """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any
 
 import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
 
 from ..types import Float, Mask, UInt
 
@@ -26,6 +29,22 @@ class Sums:
     def zeros(mi: ModuleType, lanes: int, features: int) -> Sums:
         near = [dr.zeros(mi.Float64, lanes) for _ in range(3 + features)]
         return Sums(near, [dr.zeros(mi.Float64, lanes) for _ in range(3)], dr.zeros(mi.UInt32, lanes))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Each sum by its name; a view where the device is the CPU."""
+        found = {f"near{i}": np.asarray(values) for i, values in enumerate(self.near)}
+        found |= {f"far{i}": np.asarray(values) for i, values in enumerate(self.far)}
+        return {**found, "invalid": np.asarray(self.invalid)}
+
+    @staticmethod
+    def of_arrays(mi: ModuleType, arrays: Mapping[str, NDArray[Any]], lanes: int, like: Sums) -> Sums:
+        """Sums of `arrays`. Raises ValueError where they are not so many of so many lanes."""
+        known = like.arrays()
+        for name, values in known.items():
+            if name not in arrays or arrays[name].shape != (lanes,) or arrays[name].dtype != values.dtype:
+                raise ValueError(f"no sums '{name}' of {lanes} lanes")
+        near = [mi.Float64(arrays[f"near{i}"]) for i in range(len(like.near))]
+        return Sums(near, [mi.Float64(arrays[f"far{i}"]) for i in range(len(like.far))], mi.UInt32(arrays["invalid"]))
 
     def add_near(self, values: Sequence[Float]) -> Sums:
         near, invalid = self._add(self.near, values, True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from .ball import of_material
 from .build import build
-from .reader import read
+from .reader import read, sources
 from .schema import SceneDescription, json_schema
 
-__all__ = ["SceneDescription", "build", "json_schema", "of_material", "read"]
+__all__ = ["SceneDescription", "build", "json_schema", "of_material", "read", "sources"]

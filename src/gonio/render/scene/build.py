@@ -30,6 +30,16 @@ def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
     return _Builder(description, mi).scene()
 
 
+def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:
+    """What shapes are sorted by: nothing that changes between two runs."""
+    if shape.id():  # a shape of the scene; those that were merged have lost their names
+        return shape.id(), [], 0, b""
+    box = shape.bbox()
+    corners = [float(x) for corner in (box.min, box.max) for x in np.ravel(corner)]
+    vertices = np.asarray(shape.vertex_positions_buffer()) if shape.is_mesh() else np.zeros(0)
+    return "", corners, shape.primitive_count(), vertices.tobytes()
+
+
 class _Builder:
     def __init__(self, description: schema.SceneDescription, mi: ModuleType) -> None:
         from .. import adapter, lights  # here, since they start Dr.Jit
@@ -43,18 +53,26 @@ class _Builder:
 
     def scene(self) -> Scene:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
+        shapes: PluginDict = {"type": "merge"}
         for index, shape in enumerate(self.description.shapes):
-            scene[f"shape{index}"] = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
+            shapes[f"shape{index}"] = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
         for index, light in enumerate(self.description.lights):
-            scene[f"light{index}"] = self.light(light, pointer("scene", "lights", index), f"light{index}")
-        return self.load(scene, "/scene")
+            part = self.light(light, pointer("scene", "lights", index), f"light{index}")
+            (shapes if isinstance(light, schema.AreaLight) else scene)[f"light{index}"] = part
+        # Mitsuba merges the meshes of a scene by itself, and hands them on in an order of chance: with it would go the
+        # order of the lights, and every picture. So they are merged here, and sorted.
+        merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
+        for index, one in enumerate(sorted(merged if isinstance(merged, list) else [merged], key=_order)):
+            scene[one.id() or f"merged{index}"] = one
+        return self.load(scene, "/scene", optimize=False)
 
-    def load(self, plugin: PluginDict, where: str) -> Plugin:
+    def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
         """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", GonioWarning)  # the reader has said it, with the place
-                return self.mi.load_dict(plugin)
+                # one after the other: in parallel their numbers, and with them the kernels, are left to chance
+                return self.mi.load_dict(plugin, parallel=False, optimize=optimize)
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
         except RuntimeError as error:
@@ -171,6 +189,8 @@ class _Builder:
             here = where + pointer(key)
             if isinstance(value, MaterialPart):
                 plugin[name] = self.plugin(value, here)
+            elif parameters[name].kind == "file":
+                plugin[name] = material.located(str(value), self.description.locate, here)
             elif isinstance(value, (bool, str)):
                 plugin[name] = value
             elif parameters[name].kind == "spectrum":
@@ -213,7 +233,7 @@ class _Builder:
         path = self.description.locate(texture.file, f"{where}/file")
         if (path, srgb) not in self.images:
             here = self.description.where(f"{where}/file")
-            self.images[path, srgb] = textures.load_image(self.mi, path, here, srgb=srgb)
+            self.images[path, srgb] = textures.load_image(path, here, srgb=srgb)
         return self.images[path, srgb]
 
     def check_range(self, pixels: RGB, parameter: Parameter, texture: ImageTexture, where: str) -> None:

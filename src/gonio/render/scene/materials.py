@@ -13,6 +13,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, TypeVar, Union
 
 import numpy as np
@@ -20,6 +21,7 @@ from pydantic import (
     AfterValidator,
     Discriminator,
     Field,
+    PrivateAttr,
     PlainValidator,
     Strict,
     Tag,
@@ -30,11 +32,13 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from ... import measure
 from ...errors import GonioWarning, InputError
 from ...models import BSDF, Parameter, models, outside
 from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
+Locate: TypeAlias = Callable[[str, str], Path]
 T = TypeVar("T")
 
 # What a parameter may be in a scene file
@@ -101,6 +105,7 @@ class MaterialPart(Part):
     two_sided: Annotated[bool, Strict()] | None = None
     """Whether both sides reflect alike; by default all materials do that let no light through."""
 
+    _given: bool = PrivateAttr(False)  # by a program: its files lie where it says
     model: ClassVar[Model]
     declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
     dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
@@ -126,16 +131,26 @@ class MaterialPart(Part):
     def preset(self) -> str | None:
         return getattr(self, _attribute("preset"), None)
 
-    def instance(self) -> BSDF:
+    def located(self, file: str, locate: Locate | None, pointer: str) -> str:
+        """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""
+        path, item = measure.parted(file)
+        if not self._given and locate is not None:
+            path = str(locate(path, pointer))
+        return f"{path}:{item}" if item else path
+
+    def instance(self, locate: Locate | None = None, where: str = "") -> BSDF:
         """The model with this material's values; a textured parameter keeps its default.
 
+        locate, where  what finds a file of the scene, by its name and a JSON pointer; that of this material
         Raises InputError where the model refuses a combination (a two-sided glass).
         """
         parameters = self.model.parameters()
         values: dict[str, Any] = {}
-        for name, (value, _, squared) in self.arguments().items():
+        for name, (value, key, squared) in self.arguments().items():
             if isinstance(value, MaterialPart):
-                values[name] = value.instance()
+                values[name] = value.instance(locate, f"{where}/{key}")
+            elif parameters[name].kind == "file" and isinstance(value, str):
+                values[name] = self.located(value, locate, f"{where}/{key}")
             elif isinstance(value, (bool, str)):
                 values[name] = value
             elif not any(isinstance(item, ImageTexture) for item in _items(value)):
@@ -191,6 +206,7 @@ _KINDS: dict[str, Any] = {
     "spectrum": Colour,
     "alpha": Width,
     "flag": Annotated[bool, Strict()],
+    "file": Annotated[str, Strict(), Field(min_length=1)],
     "bsdf": ForwardRef("Material"),
 }
 
@@ -320,7 +336,9 @@ def described(material: BSDF) -> MaterialPart:
             fields[key] = described(value)
         elif value is not None:
             fields[key] = np.asarray(value).tolist() if parameter.numeric else value
-    return part.model_validate(fields)
+    made = part.model_validate(fields)
+    made._given = True
+    return made
 
 
 def _tag(value: object) -> str | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -100,7 +102,7 @@ def _check_material(description: SceneDescription, where: str, material: Materia
             place = description.where(f"{where}/{key}")
             description._warnings.append(f"{place}: ignored, as in the lab; 'gonio-{material.model.name}' uses it")
     try:
-        outside.probe(material.instance())
+        outside.probe(material.instance(description.locate, where))
     except InputError as error:
         raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
 
@@ -117,6 +119,19 @@ def parts(part: Part, steps: str = "") -> Iterator[tuple[str, Part]]:
             for index, item in enumerate(value):
                 if isinstance(item, Part):
                     yield from parts(item, here + pointer(index))
+
+
+def sources(description: SceneDescription) -> tuple[str, dict[str, Path]]:
+    """The scene as text, overrides and all, and every file that it names: textures, meshes, and Python that it runs."""
+    named: dict[str, Path] = {}
+    for where, part in parts(description):
+        if (name := getattr(part, "file", None)) is not None:
+            named[str(name)] = description.locate(name, f"{where}/file")
+        if isinstance(part, MaterialPart) and outside.is_outside(part.model):
+            code = Path(inspect.getsourcefile(part.model) or "")
+            named[code.name] = code
+    text = json.dumps(description.raw, sort_keys=True, default=lambda part: part.model_dump_json(by_alias=True))
+    return text, named
 
 
 # ---------------------------------------------------------------------- pydantic's errors in our words

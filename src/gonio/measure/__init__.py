@@ -1,0 +1,67 @@
+"""Measured materials: their files (`formats`), their tables (`tables`), and the material that a table is (`materials`).
+
+    table = read("gold.binary")          a table of one kind, with what is known of it
+    write(table, "gold.bsdf")            in another format, found by evaluating it where that one has values
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..errors import InputError, did_you_mean
+from .formats.base import Format, by_suffix, contents
+from .tables.base import Measurement
+
+_read: dict[tuple[str, str], tuple[tuple[int, int], Measurement]] = {}
+KEPT = 8  # tables in memory, the last that were asked for
+
+
+def suffixes() -> list[str]:
+    """The suffixes of all formats."""
+    return sorted({suffix for known in Format.family.all().values() for suffix in known.suffixes})
+
+
+def parted(file: str) -> tuple[str, str]:
+    """File and item of "FILE" or "FILE:ITEM", as files that hold several materials are named."""
+    path, colon, item = file.rpartition(":")
+    return (path, item) if colon and by_suffix(path) is not None and by_suffix(file) is None else (file, "")
+
+
+def names_table(text: str) -> bool:
+    """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome"."""
+    return by_suffix(parted(text)[0]) is not None
+
+
+def format_of(path: Path) -> Format:
+    """The format of a file, by its suffix. InputError where no format has it."""
+    found = by_suffix(path)
+    if found is None:
+        hint = did_you_mean(path.suffix, suffixes())
+        raise InputError(f"'{path.suffix}' is no format of measurements", str(path), hint)
+    return found
+
+
+def read(file: str | os.PathLike[str], folder: Path | None = None) -> Measurement:
+    """The table in a file, read once for each state in which it was saved.
+
+    file    a path, behind a colon the item where the file holds several materials
+    folder  what a relative path starts from
+    Raises InputError for what is missing, damaged, or of no known format.
+    """
+    text, item = parted(os.fspath(file))
+    path = Path(text).expanduser()
+    path = path if folder is None else folder / path
+    kind = format_of(path)
+    try:
+        about = path.stat()
+    except (OSError, ValueError) as error:
+        raise InputError(f"no file '{path}'", str(path), str(getattr(error, "strerror", "") or "")) from None
+    key, stamp = (str(path.absolute()), item), (about.st_mtime_ns, about.st_size)
+    known = _read.pop(key, None)
+    if known is None or known[0] != stamp:
+        known = stamp, kind.read(contents(path), str(path), item)
+    _read[key] = known
+    while len(_read) > KEPT:
+        _read.pop(next(iter(_read)))
+    return known[1]

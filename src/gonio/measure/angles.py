@@ -1,0 +1,59 @@
+"""The angles that tables are stored over, found so that they hold near the normal and near grazing alike."""
+
+from __future__ import annotations
+
+from .. import ops
+from ..ops import Direction, Scalar, dot, function, sqr, vec3, where
+
+HALF_PI = 0.5 * ops.pi
+
+
+@function
+def elevation(w: Direction) -> Scalar:
+    """The angle to the normal, [0, pi]."""
+    return ops.atan2(ops.safe_sqrt(sqr(w.x) + sqr(w.y)), w.z)
+
+
+@function
+def azimuth(w: Direction) -> Scalar:
+    """The angle about the normal from x, (-pi, pi]; 0 at the normal."""
+    at_pole = (w.x == 0.0) & (w.y == 0.0)
+    return where(at_pole, 0.0, ops.atan2(w.y, where(at_pole, 1.0, w.x)))
+
+
+@function
+def between(wo: Direction, wi: Direction) -> Scalar:
+    """|phi_i - phi_o|, [0, pi]; 0 where one of them is the normal."""
+    cross = wo.x * wi.y - wo.y * wi.x
+    along = wo.x * wi.x + wo.y * wi.y
+    none = (cross == 0.0) & (along == 0.0)
+    return where(none, 0.0, ops.atan2(ops.abs(cross), where(none, 1.0, along)))
+
+
+@function
+def half_difference(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar]:
+    """theta_h, theta_d and phi_d of a pair (Rusinkiewicz1998), wi being the one that phi_d is of; phi_d in (-pi, pi].
+
+    sin theta_d = |wi - wo| / 2 and cos theta_d = |wi + wo| / 2, which no cancellation touches. Turned so that the half
+    vector lies above x, half the difference wi - wo is the direction that phi_d is the azimuth of.
+    """
+    h, d = wo + wi, wi - wo
+    flat = ops.safe_sqrt(sqr(h.x) + sqr(h.y))
+    length = ops.safe_sqrt(dot(h, h))
+    theta_h = ops.atan2(flat, h.z)
+    theta_d = ops.atan2(ops.safe_sqrt(dot(d, d)), length)
+    pole = flat == 0.0
+    across = where(pole, 1.0, flat)
+    c, s = where(pole, 1.0, h.x / across), where(pole, 0.0, h.y / across)
+    some = where(length == 0.0, 1.0, length)
+    # d in the frame of h: the first axis is (cos theta_h c, cos theta_h s, -sin theta_h), the second (-s, c, 0)
+    along = (h.z * (c * d.x + s * d.y) - flat * d.z) / some
+    side = c * d.y - s * d.x
+    none = (along == 0.0) & (side == 0.0)
+    return theta_h, theta_d, where(none, 0.0, ops.atan2(side, where(none, 1.0, along)))
+
+
+def direction(theta: Scalar, phi: Scalar) -> Direction:
+    """The unit vector at an elevation and an azimuth."""
+    (s, c), (sin_phi, cos_phi) = ops.sincos(theta), ops.sincos(phi)
+    return vec3(s * cos_phi, s * sin_phi, c)

@@ -1,0 +1,62 @@
+"""MERL's `.binary`: the table of Matusik2003, and its variant with a whole turn of phi_d."""
+
+from __future__ import annotations
+
+import struct
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from ..tables.base import Measurement, in_rgb
+from ..tables.half_difference import HalfDifference, sampled
+from .base import Format
+
+SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0  # of red, green and blue
+CELLS = (90, 90)
+
+
+class Merl(Format):
+    """MERL BRDF: three int32, then red, green and blue planes of float64 over (theta_h, theta_d, phi_d).
+
+    90 x 90 x 180 cells over half a turn of phi_d, or 90 x 90 x 360 over a whole one. Values are f times 1500, 1500 / 1.15
+    and 1500 / 1.66; a negative one marks an invalid cell.
+    """
+
+    name: ClassVar[str] = "merl"
+    suffixes: ClassVar[tuple[str, ...]] = (".binary",)
+    writes: ClassVar[str] = "half-difference"
+
+    def read(self, data: bytes, where: str, item: str = "") -> HalfDifference:
+        if len(data) < 12:
+            raise InputError(f"{len(data)} bytes, not even a header of 12", where, "the file is truncated")
+        shape = struct.unpack("<3i", data[:12])
+        if shape[:2] != CELLS or shape[2] not in (180, 360):
+            what = f"{' x '.join(map(str, shape))} cells, 90 x 90 x 180 or 90 x 90 x 360 expected"
+            raise InputError(what, where, "this is no MERL file, or a damaged one")
+        cells = shape[0] * shape[1] * shape[2]
+        wanted = 12 + 3 * 8 * cells
+        if len(data) != wanted:
+            fault = "truncated" if len(data) < wanted else "longer than its header says"
+            raise InputError(f"{len(data)} bytes, {wanted} expected", where, f"the file is {fault}")
+        planes = np.frombuffer(data, "<f8", offset=12).reshape(3, *shape)
+        return HalfDifference(
+            np.moveaxis(planes, 0, -1) * SCALE,
+            np.pi if shape[2] == 180 else 2.0 * np.pi,
+            where=where,
+            source={"format": self.name},
+        )
+
+    def write(self, table: Measurement) -> bytes:
+        assert isinstance(table, HalfDifference), "`resampled` made it so"
+        values = in_rgb(table.values, table.wavelengths) / SCALE
+        values[~table.valid] = -1.0
+        return struct.pack("<3i", *table.values.shape[:3]) + np.moveaxis(values, -1, 0).astype("<f8").tobytes()
+
+    def resampled(self, source: Measurement) -> Measurement:
+        """The table itself where it has MERL's cells; else the values at the middle of each cell."""
+        if isinstance(source, HalfDifference) and source.values.shape[:3] in ((*CELLS, 180), (*CELLS, 360)):
+            halves = source.values.shape[2] == 180
+            if halves == (source.turn < 4.0):
+                return source
+        return sampled(source.rgb, (*CELLS, 180), title=source.title, source=source.source)

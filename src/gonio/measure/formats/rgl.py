@@ -1,0 +1,137 @@
+"""The RGL's `.bsdf`: tensor files with tables in adaptive coordinates (Dupuy2018)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ..tables.adaptive import Adaptive
+from ..tables.base import Measurement
+from ..tables.adapted import adapted
+from .base import Format
+
+MAGIC = b"tensor_file\0"
+TYPES = {
+    1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8",
+}  # fmt: skip
+FIELDS, NAME, RANK = 64, 256, 8  # most of each that a sane file has
+
+
+class Rgl(Format):
+    """RGL BSDF: a tensor file (`tensor_file`, version 1.0) of Dupuy2018, RGB or spectral.
+
+    A field is a u16 length and the name, u16 number of axes, u8 type, u64 offset, and a u64 for each axis. Needed are
+    phi_i, theta_i, ndf, sigma, vndf, luminance, and rgb or wavelengths with spectra; the others are left alone.
+    """
+
+    name: ClassVar[str] = "rgl"
+    suffixes: ClassVar[tuple[str, ...]] = (".bsdf",)
+    writes: ClassVar[str] = "adaptive"
+
+    def read(self, data: bytes, where: str, item: str = "") -> Adaptive:
+        if not data.startswith(MAGIC):
+            hint = "Zemax's .bsdf is text, and starts with Source or a comment"
+            raise InputError("no tensor file: it does not start with 'tensor_file'", where, hint)
+        fields = tensors(data, where)
+        spectral = "wavelengths" in fields
+        names = ["phi_i", "theta_i", "ndf", "sigma", "vndf", "luminance", "spectra" if spectral else "rgb"]
+        for name in names:
+            if name not in fields:
+                raise InputError(f"the field '{name}' is missing", where, "it has " + ", ".join(sorted(fields)))
+            if fields[name].dtype.kind != "f":
+                raise InputError(f"the field '{name}' is of type {fields[name].dtype}, floats expected", where)
+        wavelengths = fields["wavelengths"].astype(np.float64).ravel() if spectral else None
+        if wavelengths is not None and (not np.all(np.isfinite(wavelengths)) or np.any(np.diff(wavelengths) <= 0.0)):
+            raise InputError("the wavelengths do not increase", where)
+        jacobian = bool(fields["jacobian"].ravel()[0]) if fields.get("jacobian", np.ones(1)).size else True
+        text = fields.get("description", np.zeros(0, np.uint8))
+        title = text.tobytes().decode("utf-8", "replace").strip("\0 \n") if text.dtype == np.uint8 else ""
+        parts = (fields[name] for name in names)
+        return Adaptive(
+            *parts, jacobian, where=where, title=title, source={"format": self.name}, wavelengths=wavelengths
+        )
+
+    def write(self, table: Measurement) -> bytes:
+        assert isinstance(table, Adaptive), "`resampled` made it so"
+        values = {"rgb": table.values}
+        if table.wavelengths is not None:
+            values = {"wavelengths": table.wavelengths, "spectra": table.values}
+        floats = {
+            "phi_i": table.phi,
+            "theta_i": table.theta,
+            "sigma": table.sigma,
+            "ndf": table.ndf,
+            "vndf": table.vndf,
+            "luminance": table.luminance,
+            **values,
+        }
+        return written({
+            "description": np.frombuffer(table.title.encode() or b"-", np.uint8),
+            **{name: np.asarray(part, np.float32) for name, part in floats.items()},
+            "jacobian": np.array([table.jacobian], np.uint8),
+        })  # fmt: skip
+
+    def resampled(self, source: Measurement) -> Measurement:
+        """The table itself where it is adaptive; else one with a warp of its own (`tables.adapted`)."""
+        return source if isinstance(source, Adaptive) else adapted(source)
+
+
+def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
+    """The fields of a tensor file, as views into its bytes: nothing is allocated that the file does not hold."""
+    place = len(MAGIC)
+
+    def take(form: str) -> tuple[int, ...]:
+        nonlocal place
+        size = struct.calcsize(form)
+        if place + size > len(data):
+            raise InputError(f"the list of fields ends at byte {len(data)}", where, "the file is truncated")
+        found = struct.unpack_from(form, data, place)
+        place += size
+        return found
+
+    major, minor, count = take("<BBI")
+    if (major, minor) != (1, 0):
+        raise InputError(f"version {major}.{minor} of tensor files, 1.0 expected", where)
+    if not 0 < count <= FIELDS:
+        raise InputError(f"{count} fields, 1 to {FIELDS} expected", where, "the file is damaged")
+    found: dict[str, NDArray[np.generic]] = {}
+    for _ in range(count):
+        (length,) = take("<H")
+        if not 0 < length <= NAME or place + length > len(data):
+            raise InputError(f"a field's name of {length} letters", where, "the file is damaged")
+        name = data[place : place + length].decode("utf-8", "replace")
+        place += length
+        rank, kind, offset = take("<HBQ")
+        if rank > RANK or kind not in TYPES:
+            raise InputError(f"the field '{name}' has {rank} axes and type {kind}", where, "the file is damaged")
+        shape = take(f"<{rank}Q")
+        dtype = np.dtype(TYPES[kind])
+        size = dtype.itemsize
+        for side in shape:  # Python's integers do not overflow
+            size *= side
+        if size == 0 or offset + size > len(data):
+            what = f"the field '{name}' claims {' x '.join(map(str, shape))} values at byte {offset}"
+            raise InputError(f"{what}, the file has {len(data)} bytes", where, "the file is truncated or damaged")
+        if name in found:
+            raise InputError(f"the field '{name}' stands twice", where, "the file is damaged")
+        found[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
+    return found
+
+
+def written(fields: Mapping[str, NDArray[np.generic]]) -> bytes:
+    """A tensor file."""
+    numbers = {np.dtype(text): number for number, text in TYPES.items()}
+    arrays = {name: np.ascontiguousarray(array) for name, array in fields.items()}
+    start = len(MAGIC) + 6 + sum(13 + len(name.encode()) + 8 * array.ndim for name, array in arrays.items())
+    head, body = bytearray(MAGIC + struct.pack("<BBI", 1, 0, len(arrays))), bytearray()
+    for name, array in arrays.items():
+        body += b"\0" * (-(start + len(body)) % 8)
+        head += struct.pack("<H", len(name.encode())) + name.encode()
+        head += struct.pack(f"<HBQ{array.ndim}Q", array.ndim, numbers[array.dtype], start + len(body), *array.shape)
+        body += array.tobytes()
+    return bytes(head + body)

@@ -1,0 +1,66 @@
+"""An adaptive table of any isotropic material: the warp of Dupuy2018, found from values instead of by measuring."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from .. import colours
+from .adaptive import Adaptive
+from .base import Floats, Measurement
+
+VIEWS, NORMALS, PLACES = 16, 128, 48  # of theta_i; of the normals' square a side; of the values' square a side
+
+
+def adapted(source: Measurement) -> Adaptive:
+    """An adaptive table of a measurement that is alike under turns and mirrors.
+
+    D comes from retro-reflection, where half vector and direction coincide: f(w, w) = D F G / (4 cos^2), so that
+    D ~ f cos^2 up to what masking does (Dupuy2018, sec. 3.2, without its iteration: any D will do for a warp, what it
+    misses stays in the values). sigma is its projected area, vndf = D max(0, wo.m) / sigma.
+    """
+    theta_m = np.linspace(0.0, 1.0, NORMALS) ** 2 * (0.5 * np.pi)
+    held = np.minimum(theta_m, 0.5 * np.pi - 0.02)
+    w = np.stack([np.sin(held), 0.0 * held, np.cos(held)], -1)
+    retro = source.rgb(w, w) @ colours.LUMINANCE * np.cos(held)
+    ndf = np.maximum(retro, 1e-4 * max(float(retro.max()), 1e-12))
+    phi_m = np.linspace(-np.pi, np.pi, NORMALS)
+    theta = 0.5 * np.pi * (1.0 - (1.0 - np.linspace(0.0, 1.0, VIEWS)) ** 1.4)
+    theta[-1] -= 1e-3  # at the horizon there is no eval
+    weight = 2.0 * np.pi**2 * np.sqrt(theta_m * (2.0 / np.pi)) * np.sin(theta_m)  # d omega_m over du
+    mean = np.gradient(np.linspace(0.0, 1.0, NORMALS))
+
+    def cosines(angle: Floats) -> Floats:
+        """max(0, wo.m), (view, phi_m, theta_m)."""
+        along = np.sin(angle)[:, None, None] * np.sin(theta_m) * np.cos(phi_m)[:, None]
+        return np.maximum(along + np.cos(angle)[:, None, None] * np.cos(theta_m), 0.0)
+
+    around = np.full(NORMALS, 1.0 / (NORMALS - 1))
+    around[[0, -1]] *= 0.5
+
+    def area(angle: Floats) -> Floats:
+        """The projected area of the facets, int D max(0, wo.m) dm."""
+        return np.einsum("vpt,p,t->v", cosines(angle), around, ndf * weight * mean)
+
+    ndf = ndf / float(area(np.zeros(1))[0])  # seen from above, facets are as large as the surface
+    sigma = area(theta_m)
+    vndf = cosines(theta) * (ndf * weight) / np.maximum(area(theta), 1e-9)[:, None, None]
+    return _filled(source, theta, np.repeat(ndf[None], 2, 0), np.repeat(sigma[None], 2, 0), vndf[None])
+
+
+def _filled(source: Measurement, theta: Floats, ndf: Floats, sigma: Floats, vndf: Floats) -> Adaptive:
+    """The table whose values are those of `source` where each node of it stands."""
+    blank = np.ones((1, len(theta), PLACES, PLACES))
+    about = {"title": source.title, "source": source.source}
+    empty = Adaptive(np.zeros(1), theta, ndf, sigma, vndf, blank, np.repeat(blank[:, :, None], 3, axis=2))
+    wo, wi, factor = empty.nodes()
+    lit = (wi[..., 2] > 1e-6) & (wo[..., 2] > 0.0) & (factor > 0.0)
+    values = np.zeros((*lit.shape, 3))
+    values[lit] = source.rgb(wo[lit], wi[lit]) / factor[lit][:, None]
+    for one, seen in zip(values, lit, strict=True):  # below the horizon the nearest, so that none above turns dark
+        if seen.any():
+            one[:] = one[tuple(distance_transform_edt(~seen, return_distances=False, return_indices=True))]
+    luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
+    least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # what is black at a node need not be beside it
+    values, luminance = np.moveaxis(values, -1, 1)[None], (luminance + least)[None]
+    return Adaptive(np.zeros(1), theta, ndf, sigma, vndf, luminance, values, **about)  # type: ignore[arg-type]

@@ -1,0 +1,258 @@
+"""Tables in coordinates that follow the material's own distribution of normals, as the RGL measures (Dupuy2018)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...errors import InputError
+from ...ops import Direction, Scalar, Spectrum, backend, copysign, dot, floor, maximum, sqrt, vec3, where
+from ...optics.frame import reflect
+from ..angles import azimuth, direction
+from ..warp import Nodes, Slices, Warp, named
+from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
+
+ROUNDING = 1e-6  # densities below 0 by such a share of the largest are noise: one of nine files has -1e-10
+TINY_JACOBIAN = 1e-6  # as Mitsuba's `measured`, so that densities agree at the normal too
+
+
+class Adaptive(Measurement):
+    """A table over warped half vectors, for each direction of view (Dupuy2018, sec. 4).
+
+    A half vector m is a point of the unit square, u = (sqrt(2 theta_m / pi), phi_m / 2 pi + 1/2). Of each direction of
+    view the visible normals have a density `vndf` there; the numbers s that would draw m from it are the coordinates of
+    the values: f cos theta_i = rgb(s) ndf(u) / (4 sigma). So the table is dense where the lobe is.
+
+    arrays: phi_i, theta_i (nodes of view), ndf, sigma (phi, theta), vndf (phi_i, theta_i, phi_m, theta_m),
+    luminance (phi_i, theta_i, y, x), values (phi_i, theta_i, channel, y, x); all bilinear between nodes on the edges.
+    Isotropic where phi_i has 2 entries or fewer. Beyond the last angle of view the last one's values are taken.
+    """
+
+    name = "adaptive"
+    axes: ClassVar[Mapping[str, str]] = {"phi_i": "azimuth of view, rad", "theta_i": "angle of view, rad"}
+
+    def __init__(
+        self,
+        phi: NDArray[np.generic],
+        theta: NDArray[np.generic],
+        ndf: NDArray[np.generic],
+        sigma: NDArray[np.generic],
+        vndf: NDArray[np.generic],
+        luminance: NDArray[np.generic],
+        values: NDArray[np.generic],
+        jacobian: bool = True,
+        where: str = "",
+        title: str = "",
+        source: Mapping[str, str] | None = None,
+        wavelengths: Floats | None = None,
+    ) -> None:
+        super().__init__(title, source, wavelengths)
+        self.phi = axis(phi, "phi_i", where, -np.pi, 2.0 * np.pi)
+        self.theta = axis(theta, "theta_i", where, 0.0, 0.5 * np.pi)
+        parts = {"ndf": ndf, "sigma": sigma, "vndf": vndf, "luminance": luminance, "values": values}
+        self.ndf, self.sigma, self.vndf, self.luminance, self.values = (
+            finite(part, name, where) for name, part in parts.items()
+        )
+        self.jacobian = bool(jacobian)
+        views = (len(self.phi), len(self.theta))
+        for name, part, rank in (("ndf", self.ndf, 2), ("sigma", self.sigma, 2), ("vndf", self.vndf, 4)):
+            if part.ndim != rank or min(part.shape[-2:]) < 2 or (rank == 4 and part.shape[:2] != views):
+                raise InputError(f"{name} has shape {part.shape}, which does not fit {views} views", where)
+        channels = 3 if wavelengths is None else len(wavelengths)
+        if self.luminance.ndim != 4 or self.luminance.shape[:2] != views or min(self.luminance.shape[2:]) < 2:
+            raise InputError(f"luminance has shape {self.luminance.shape}, which does not fit {views} views", where)
+        if self.values.shape != (*views, channels, *self.luminance.shape[2:]):
+            raise InputError(f"the values have shape {self.values.shape}, which does not fit the luminance", where)
+        for name, part in (("vndf", self.vndf), ("luminance", self.luminance)):
+            if part.min() < -ROUNDING * part.max() or part.max() <= 0.0:
+                raise InputError(f"{name} is a density, and has values from {part.min():.3g} to {part.max():.3g}", where, "the file is damaged")
+        if self.sigma.min() <= 0.0 or self.ndf.min() < 0.0:
+            raise InputError("sigma is not positive, or ndf negative, somewhere", where, "the file is damaged")
+
+    # ------------------------------------------------------------------ as formulas
+
+    @property
+    def isotropic(self) -> bool:
+        return len(self.phi) <= 2
+
+    @cached_property
+    def _reduction(self) -> int:
+        """How many times the measured azimuths go into a turn: the others are mirrored into them."""
+        span = self.phi[-1] - self.phi[0]
+        return 1 if self.isotropic else max(1, round(2.0 * np.pi / span))
+
+    @cached_property
+    def _phis(self) -> Nodes:
+        return Nodes("phi_i", self.phi)
+
+    @cached_property
+    def _thetas(self) -> Nodes:
+        return Nodes("theta_i", self.theta)
+
+    @cached_property
+    def _visible(self) -> Warp:
+        return Warp("visible_normals", self.vndf.reshape(-1, *self.vndf.shape[2:]))
+
+    @cached_property
+    def _bright(self) -> Warp:
+        return Warp("luminance", self.luminance.reshape(-1, *self.luminance.shape[2:]))
+
+    @cached_property
+    def _ndf(self) -> ops.Table:
+        return named("ndf", self.ndf[..., None])
+
+    @cached_property
+    def _sigma(self) -> ops.Table:
+        return named("sigma", self.sigma[..., None])
+
+    @cached_property
+    def _colours(self) -> ops.Table:
+        rgb = in_rgb(np.moveaxis(self.values, 2, -1), self.wavelengths)
+        return named("rgb", padded(rgb.reshape(-1, *rgb.shape[2:])))
+
+    def _folded(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction]:
+        """Both directions, mirrored so that wo lies among the measured azimuths."""
+        if self._reduction < 2:
+            return wo, wi
+        flip_y = -copysign(1.0 + 0.0 * wo.y, wo.y)
+        flip_x = -copysign(1.0 + 0.0 * wo.x, wo.x) if self._reduction == 4 else flip_y
+        return vec3(wo.x * flip_x, wo.y * flip_y, wo.z), vec3(wi.x * flip_x, wi.y * flip_y, wi.z)
+
+    def _slices(self, wo: Direction) -> tuple[Slices, Scalar]:
+        """The views around wo with their weights, and wo's azimuth."""
+        theta, phi = polar(wo), azimuth(wo)
+        row, t = self._thetas.find(theta)
+        if len(self.phi) == 1:
+            return [(row, 1.0 - t), (row + 1.0, t)], phi
+        column, p = self._phis.find(phi)
+        count = float(len(self.theta))
+        first, second = column * count + row, (column + 1.0) * count + row
+        pairs = [(first, (1.0 - t) * (1.0 - p)), (first + 1.0, t * (1.0 - p))]
+        return [*pairs, (second, (1.0 - t) * p), (second + 1.0, t * p)], phi
+
+    def _square(self, m: Direction, phi: Scalar) -> tuple[Scalar, Scalar]:
+        """A half vector's point in the unit square."""
+        turn = azimuth(m) - phi if self.isotropic else azimuth(m)
+        y = turn * (0.5 / ops.pi) + 0.5
+        return sqrt(polar(m) * (2.0 / ops.pi)), y - floor(y)
+
+    @ops.function
+    def value(self, wo: Direction, wi: Direction) -> Spectrum:
+        """rgb(s) ndf(u_m) / (4 sigma(u_o)), the cosine included (Dupuy2018, eq. 3)."""
+        wo, wi = self._folded(wo, wi)
+        slices, phi = self._slices(wo)
+        x, y = self._square(ops.normalize(wo + wi), phi)
+        place = self._visible.invert(slices, x, y)
+        colour = of_channels(bilinear(self._colours, place.x, place.y, slices))
+        return colour * self._factor(wo, x, y, phi) if self.jacobian else colour
+
+    def _factor(self, wo: Direction, x: Scalar, y: Scalar, phi: Scalar) -> Scalar:
+        """ndf(u_m) / (4 sigma(u_o))."""
+        (density,) = bilinear(self._ndf, x, y)
+        (area,) = bilinear(self._sigma, sqrt(polar(wo) * (2.0 / ops.pi)), phi * (0.5 / ops.pi) + 0.5)
+        return density / (4.0 * area)
+
+    @ops.function
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The density of the visible normal, times that of its place in the luminance, per solid angle of wi."""
+        wo, wi = self._folded(wo, wi)
+        m = ops.normalize(wo + wi)
+        slices, phi = self._slices(wo)
+        x, y = self._square(m, phi)
+        place = self._visible.invert(slices, x, y)
+        return place.pdf * self._bright.pdf(slices, place.x, place.y) / _jacobian(x, m, wi)
+
+    @ops.function
+    def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
+        """A place by luminance, from it a normal by its density, at which wo is mirrored."""
+        folded, _ = self._folded(wo, wo)
+        slices, phi = self._slices(folded)
+        bright = self._bright.sample(slices, u.y, u.z)
+        seen = self._visible.sample(slices, bright.x, bright.y)
+        turn = (2.0 * seen.y - 1.0) * ops.pi
+        m = direction(seen.x * seen.x * (0.5 * ops.pi), turn + phi if self.isotropic else turn)
+        mirrored = reflect(folded, m)
+        pdf = seen.pdf * bright.pdf / _jacobian(seen.x, m, mirrored)
+        _, wi = self._folded(wo, mirrored)  # mirroring is its own inverse
+        return wi, where(dot(folded, m) > 0.0, pdf, 0.0)
+
+    # ------------------------------------------------------------------ as numbers
+
+    def nodes(self) -> tuple[Floats, Floats, Floats]:
+        """wo and wi of every value of an isotropic table, (theta_i, y, x, 3), and the factor before it."""
+        types = backend.types("float64")
+        shape = (len(self.theta), *self.luminance.shape[2:])
+        view, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, shape), indexing="ij"))
+        row, at_x, at_y = (backend.float_of(a, types) for a in (view, x / (shape[2] - 1), y / (shape[1] - 1)))
+        wo = direction(backend.float_of(self.theta[view], types), row * 0.0)
+        seen = self._visible.sample([(row, 1.0 + 0.0 * row)], at_x, at_y)
+        m = direction(seen.x * seen.x * (0.5 * ops.pi), (2.0 * seen.y - 1.0) * ops.pi)
+        factor = self._factor(wo, seen.x, seen.y, 0.0 * row)
+        o, i = (backend.to_numpy(w, len(view)).reshape(*shape, 3) for w in (wo, reflect(wo, m)))
+        return o, i, backend.to_numpy(factor, len(view)).reshape(shape)
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        return {
+            "phi_i": self.phi,
+            "theta_i": self.theta,
+            "ndf": self.ndf,
+            "sigma": self.sigma,
+            "vndf": self.vndf,
+            "luminance": self.luminance,
+            "values": self.values,
+            "jacobian": np.array([self.jacobian], np.uint8),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Adaptive:
+        names = ("phi_i", "theta_i", "ndf", "sigma", "vndf", "luminance", "values")
+        return cls(*(arrays[name] for name in names), bool(arrays["jacobian"].ravel()[0]), **about)
+
+    @property
+    def flaws(self) -> dict[str, float]:
+        return {"negative": float(np.mean(self.values < 0.0))}
+
+    @property
+    def shape(self) -> dict[str, int]:
+        phi, theta, channels, y, x = self.values.shape
+        return {"phi_i": phi, "theta_i": theta, "channel": channels, "y": y, "x": x}
+
+    @property
+    def range(self) -> tuple[float, float]:
+        return float(self.values.min()), float(self.values.max())
+
+
+@ops.function
+def polar(w: Direction) -> Scalar:
+    """The angle to the normal, by its chord: 2 asin(|w - z| / 2)."""
+    chord2 = w.x * w.x + w.y * w.y + (w.z - 1.0) * (w.z - 1.0)
+    return 2.0 * ops.atan2(sqrt(chord2), ops.safe_sqrt(4.0 - chord2))
+
+
+@ops.function
+def _jacobian(x: Scalar, m: Direction, wi: Direction) -> Scalar:
+    """d omega_i / du: 4 (wi.m) for the mirroring, 2 pi^2 x sin theta_m for the square."""
+    sin = ops.safe_sqrt(m.x * m.x + m.y * m.y)
+    return maximum((2.0 * ops.pi**2) * x * sin, TINY_JACOBIAN) * (4.0 * ops.abs(dot(wi, m)))
+
+
+def bilinear(table: ops.Table, x: Scalar, y: Scalar, slices: Slices | None = None) -> tuple[Scalar, ...]:
+    """Every channel of a table with nodes on the edges of the unit square, of some slices mixed, or of the only one."""
+    rows, columns = table.shape[-2:]
+    at_x, at_y = ops.clamp(x, 0.0, 1.0) * (columns - 1.0), ops.clamp(y, 0.0, 1.0) * (rows - 1.0)
+    column, row = ops.minimum(floor(at_x), columns - 2.0), ops.minimum(floor(at_y), rows - 2.0)
+    tx, ty = at_x - column, at_y - row
+    total: list[ops.Value] = [0.0] * table.channels
+    for one, weight in slices or [(None, 1.0)]:
+        for dy, wy in ((0.0, 1.0 - ty), (1.0, ty)):
+            for dx, wx in ((0.0, 1.0 - tx), (1.0, tx)):
+                place = (row + dy, column + dx) if one is None else (one, row + dy, column + dx)
+                texel = ops.fetch(table, *place)
+                share = weight * wy * wx
+                total = [sum_ + share * channel for sum_, channel in zip(total, texel, strict=True)]
+    return tuple(total)

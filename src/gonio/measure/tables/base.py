@@ -1,0 +1,157 @@
+"""What the kinds of tables share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...errors import InputError
+from ...members import Family, subclasses_of
+from ...ops import Direction, Mask, Scalar, Spectrum, backend, vec3
+from .. import colours
+
+Floats = NDArray[np.float64]
+
+
+class Measurement:
+    """Values of a BRDF over directions, as they were stored, with what is known of them.
+
+    name         of the kind: "half-difference", ...
+    title        what was measured, as the file says
+    source       where it comes from: format, and what else the file tells
+    wavelengths  nm, one a channel; None where the channels are red, green and blue, or one grey
+
+    A kind gives `value`, `pdf` and `sample` in the words of `gonio.ops`, so that it runs in a render and in a shader.
+    """
+
+    family: ClassVar[Family[type[Measurement]]]
+    name: ClassVar[str] = ""
+    axes: ClassVar[Mapping[str, str]] = {}  # of its arrays: name -> what it is and in which unit
+
+    def __init__(
+        self, title: str = "", source: Mapping[str, str] | None = None, wavelengths: Floats | None = None
+    ) -> None:
+        self.title, self.source = title, dict(source or {})
+        self.wavelengths = None if wavelengths is None else np.asarray(wavelengths, np.float64)
+
+    # ------------------------------------------------------------------ as formulas
+
+    def value(self, wo: Direction, wi: Direction) -> Spectrum:
+        """f(wo, wi) cos theta_i of two directions above the surface, linear sRGB."""
+        raise NotImplementedError
+
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of `draw`, 1/sr."""
+        raise NotImplementedError
+
+    def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
+        """A direction, and its density; what lies below the surface has failed."""
+        raise NotImplementedError
+
+    def prepare(self) -> None:
+        """Find what formulas need and is expensive; while a renderer records its kernels nothing could be computed."""
+
+    @property
+    def isotropic(self) -> bool:
+        return True
+
+    # ------------------------------------------------------------------ as numbers
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        """What it is made of, as `.gonio` files hold it: axes in radians, values in 1/sr."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: object) -> Measurement:
+        """The inverse of `arrays`. InputError where they do not fit together."""
+        raise NotImplementedError
+
+    @property
+    def flaws(self) -> dict[str, float]:
+        """What is odd in the numbers, as shares of them: "negative", "invalid"; it is kept as it is."""
+        return {}
+
+    @property
+    def shape(self) -> dict[str, int]:
+        """Values along each axis, by the axis's name."""
+        raise NotImplementedError
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The lowest and the highest stored value that is valid."""
+        raise NotImplementedError
+
+    def rgb(self, wo: Floats, wi: Floats) -> Floats:
+        """f cos theta_i of pairs, (N, 3), in float64; 0 below the surface."""
+        types = backend.types("float64")
+        found = np.empty((len(wo), 3))
+        for start in range(0, len(wo), CHUNK):
+            part = slice(start, start + CHUNK)
+            o, i = (backend.vector_of(w[part], 3, types) for w in (wo, wi))
+            above = (o.z > 0.0) & (i.z > 0.0)
+            found[part] = backend.to_numpy(ops.where(above, self.value(o, i), 0.0), len(wo[part]))
+        return found
+
+
+CHUNK = 1 << 19  # pairs at a time, so that memory stays flat
+
+
+def _named(thing: object) -> tuple[str, type[Measurement]] | None:
+    return subclasses_of(Measurement)(thing)
+
+
+Measurement.family = Family("kind of table", "gonio.tables", ["gonio.measure.tables"], _named)
+
+
+def above(wo: Direction, wi: Direction) -> Mask:
+    """Whether both lie above the surface."""
+    return (wo.z > 0.0) & (wi.z > 0.0)
+
+
+def in_rgb(values: Floats, wavelengths: Floats | None, where: str = "") -> Floats:
+    """Values with channels last as red, green, blue: spectra are seen under D65, one channel is grey."""
+    channels = values.shape[-1]
+    if wavelengths is not None:
+        return values @ colours.to_rgb(wavelengths)
+    if channels == 1:
+        return np.repeat(values, 3, axis=-1)
+    if channels != 3:
+        raise InputError(f"{channels} channels without wavelengths, 1 or 3 expected", where)
+    return values
+
+
+def of_channels(channels: tuple[Scalar, ...]) -> Spectrum:
+    """The first three of a texel's channels, as a colour."""
+    colour: ops.Value = vec3(*channels[:3])
+    return colour
+
+
+def padded(values: Floats) -> Floats:
+    """Colours with a fourth channel of 0: four come in one fetch."""
+    return np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
+
+
+def axis(values: NDArray[np.generic], name: str, where: str, low: float, high: float) -> Floats:
+    """An axis as float64: finite, increasing, within its range up to rounding. InputError where not."""
+    nodes = np.asarray(values, np.float64)
+    if nodes.ndim != 1 or len(nodes) < 1 or not np.all(np.isfinite(nodes)):
+        raise InputError(f"the axis {name} is no list of finite numbers", where)
+    if np.any(np.diff(nodes) <= 0.0):
+        raise InputError(f"the axis {name} does not increase", where)
+    if nodes[0] < low - 1e-4 or nodes[-1] > high + 1e-4:
+        raise InputError(f"the axis {name} leaves [{low:.5g}, {high:.5g}]", where)
+    return nodes
+
+
+def finite(values: NDArray[np.generic], name: str, where: str) -> Floats:
+    """Values as float64. InputError where one is no finite number."""
+    array = np.asarray(values, np.float64)
+    bad = int(np.size(array) - np.count_nonzero(np.isfinite(array)))
+    if bad:
+        raise InputError(f"{bad} of {array.size} values of {name} are not finite", where, "the file is damaged")
+    return array
+

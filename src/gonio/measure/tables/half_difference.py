@@ -1,0 +1,161 @@
+"""Tables over half vector and difference angle, as the MERL database (Matusik2003)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from ... import ops
+from ...errors import InputError
+from ...ops import Direction, Spectrum, Table, clamp, floor, maximum, minimum, sqrt, where
+from ..angles import half_difference
+from ..warp import named
+from .base import Floats, Measurement, finite, in_rgb, of_channels, padded
+from .guided import Guided
+
+
+class HalfDifference(Guided, Measurement):
+    """f over (theta_h, theta_d, phi_d) in cells, theta_h by its square root (Rusinkiewicz1998, Matusik2003).
+
+    Cell (i, j, k) of (n, m, l) holds theta_h from (i / n)^2 to ((i + 1) / n)^2 quarter turns, theta_d in equal steps of
+    a quarter turn, phi_d in equal steps of half a turn, or of a whole one. Half a turn is what reciprocity leaves:
+    swapping wo and wi adds pi to phi_d. Values stand at the middle of cells, in the square root too, and are linear
+    between them; phi_d goes round. Before the first middle and beyond the last values are held: theta_h > 89.0 and
+    theta_d > 89.5 degrees are extrapolated so in a table of MERL's size.
+
+    A cell that is negative is invalid: no light, and no negative light either. It keeps its numbers; where the
+    interpolation needs it, it takes those of the valid cell before it along theta_d, where both directions are higher.
+    """
+
+    name = "half-difference"
+    axes: ClassVar[Mapping[str, str]] = {
+        "theta_h": "angle of the half vector, by its square root",
+        "theta_d": "angle of the difference",
+        "phi_d": "azimuth of the difference",
+    }
+
+    def __init__(
+        self,
+        values: NDArray[np.generic],
+        turn: float = np.pi,
+        where: str = "",
+        title: str = "",
+        source: Mapping[str, str] | None = None,
+        wavelengths: Floats | None = None,
+    ) -> None:
+        """values  (theta_h, theta_d, phi_d, channel); turn: pi or 2 pi, what the axis phi_d spans"""
+        super().__init__(title, source, wavelengths)
+        self.values = finite(values, "the table", where)
+        self.turn = float(turn)
+        if self.values.ndim != 4 or min(self.values.shape) < 1 or max(self.values.shape[:2]) < 2:
+            raise InputError(f"a table of shape {self.values.shape}, (theta_h, theta_d, phi_d, channel) expected", where)
+        if not min(abs(self.turn - np.pi), abs(self.turn - 2.0 * np.pi)) < 1e-6:
+            raise InputError(f"phi_d spans {self.turn:g}, pi or 2 pi expected", where)
+        if not np.any(self.valid):
+            raise InputError("every cell is invalid (negative)", where, "there is nothing to be shown")
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """Which cells are not negative."""
+        return np.asarray(self.values.min(axis=-1) >= 0.0)
+
+    # ------------------------------------------------------------------ as formulas
+
+    @cached_property
+    def _table(self) -> Table:
+        values = in_rgb(self.values, self.wavelengths)
+        if not self.valid.all():
+            values = self._held(values)
+        return named("half_difference", padded(values))
+
+    def _held(self, values: Floats) -> Floats:
+        """Invalid cells with the numbers of the last valid one at a smaller theta_d, as both directions rise with it;
+        where there is none, of the nearest, a step along theta_h being taken as four of the others."""
+        step = np.arange(values.shape[1])[None, :, None]
+        last = np.maximum.accumulate(np.where(self.valid, step, -1), axis=1)
+        held = np.take_along_axis(values, np.maximum(last, 0)[..., None], axis=1)
+        if last.min() < 0:
+            found = last >= 0
+            nearest = distance_transform_edt(~found, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
+            held = held[tuple(nearest)]
+        return held
+
+    @ops.function
+    def value(self, wo: Direction, wi: Direction) -> Spectrum:
+        """f cos theta_i, linear in the table's own coordinates."""
+        theta_h, theta_d, phi_d = half_difference(wo, wi)
+        n, m, count = map(float, self.values.shape[:3])
+        x = clamp(sqrt(maximum(theta_h * (2.0 / ops.pi), 0.0)) * n - 0.5, 0.0, n - 1.0)
+        y = clamp(theta_d * (2.0 / ops.pi) * m - 0.5, 0.0, m - 1.0)
+        z = phi_d * (count / self.turn) - 0.5
+        i, j, k = minimum(floor(x), max(n - 2.0, 0.0)), minimum(floor(y), max(m - 2.0, 0.0)), floor(z)
+        tx, ty, tz = x - i, y - j, z - k
+        first = k - floor(k * (1.0 / count) + 0.25 / count) * count  # the remainder, in [0, count)
+        second = where(first + 1.5 > count, 0.0, first + 1.0)
+        total: ops.Value = 0.0
+        for di, wx in ((0.0, 1.0 - tx), (1.0, tx)):
+            for dj, wy in ((0.0, 1.0 - ty), (1.0, ty)):
+                for cell, wz in ((first, 1.0 - tz), (second, tz)):
+                    total = total + of_channels(ops.fetch(self._table, i + di, j + dj, cell)) * (wx * wy * wz)
+        return total * wi.z
+
+    # ------------------------------------------------------------------ as numbers
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        return {"values": self.values, "turn": np.array([self.turn])}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> HalfDifference:
+        return cls(arrays["values"], float(np.asarray(arrays["turn"], np.float64).ravel()[0]), **about)
+
+    @property
+    def flaws(self) -> dict[str, float]:
+        return {"invalid": float(1.0 - self.valid.mean())}
+
+    @property
+    def shape(self) -> dict[str, int]:
+        return dict(zip(("theta_h", "theta_d", "phi_d", "channel"), self.values.shape, strict=True))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        kept = self.values[self.valid]
+        return float(kept.min()), float(kept.max())
+
+
+def centres(shape: tuple[int, int, int], turn: float = np.pi) -> tuple[Floats, Floats]:
+    """wo and wi at the middle of every cell, (N, 3) each, in the order of the table; some lie below the surface."""
+    n, m, count = shape
+    theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)
+    theta_d = (np.arange(m) + 0.5) / m * (0.5 * np.pi)
+    phi_d = (np.arange(count) + 0.5) / count * turn
+    return pair_at(*(a.ravel() for a in np.meshgrid(theta_h, theta_d, phi_d, indexing="ij")))
+
+
+def pair_at(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats]:
+    """wo and wi of a half vector in the plane of x and z and a difference: the inverse of `angles.half_difference`."""
+    sin_h, cos_h, sin_d, cos_d = np.sin(theta_h), np.cos(theta_h), np.sin(theta_d), np.cos(theta_d)
+    along, side = sin_d * np.cos(phi_d), sin_d * np.sin(phi_d)
+    offset = np.stack([along * cos_h, side, -along * sin_h], -1)
+    middle = np.stack([cos_d * sin_h, 0.0 * cos_d, cos_d * cos_h], -1)
+    return middle - offset, middle + offset
+
+
+def sampled(
+    value: ops.Value, shape: tuple[int, int, int] = (90, 90, 180), turn: float = np.pi, **about: ops.Value
+) -> HalfDifference:
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at the middles of the cells.
+
+    A cell whose middle lies below the surface is invalid: -1.
+    """
+    wo, wi = centres(shape, turn)
+    lowest = np.minimum(wo[:, 2], wi[:, 2])
+    values = np.full((len(wo), 3), -1.0)
+    lit = lowest > 1e-9
+    found = value(wo[lit], wi[lit])
+    values[lit] = np.maximum(found, 0.0) / wi[lit, 2:]
+    return HalfDifference(values.reshape(*shape, 3), turn, **about)

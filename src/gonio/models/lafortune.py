@@ -1,0 +1,88 @@
+"""Lafortune's generalized cosine lobe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from .. import ops
+from ..ops import Direction, Scalar, Spectrum, abs, dot, exp, function, inv_pi, maximum, minimum, sqr, vec3
+from ..optics.special import logrel, power_of_cosine
+from ..optics.warp import around, square_to_power_lobe
+from .glossy import _Glossy, sum_breach
+from .material import Breach
+from .parameters import Colour, Number, number, spectrum
+
+
+class Lafortune(_Glossy):
+    """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
+
+    The three C are cx, cy, cz over the largest of their sizes, n is `exponent`, the base is cut at 0 (Lafortune1997,
+    eq. 4, with the normalization of Ngan2005). C = (-1, -1, 1) is Phong's lobe about the mirror direction, normalized
+    (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans it toward the horizon, a negative cz throws
+    light back. Reciprocal. Sampled by a power lobe about (C o_x, C o_y, C o_z).
+    """
+
+    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at C = (-1, -1, 1), seen from the normal", low=0.0)
+    cx: Number = number(default=-1.0, doc="factor of o_x i_x: negative mirrors")
+    cy: Number = number(default=-1.0, doc="factor of o_y i_y: negative mirrors")
+    cz: Number = number(default=1.0, doc="factor of o_z i_z")
+    exponent: Number = number(default=50.0, doc="falloff of the lobe", low=0.0)
+
+    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether x and y count alike."""
+        return bool(np.array_equal(np.asarray(self.plain.cx), np.asarray(self.plain.cy)))
+
+    def _most(self) -> np.ndarray:
+        """(n + 2) / (n + 1): the lobe's integral, cosine left out."""
+        n = np.asarray(self.exponent, float)
+        return np.max(np.asarray(self.specular)) * np.max((n + 2.0) / (n + 1.0))
+
+    @function
+    def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
+        """(unit axis of the lobe, its length to the n-th power): the length from what is missing to 1, as a length so
+        near 1 has no digits left for a large n."""
+        over = 1.0 / maximum(maximum(abs(self.cx), abs(self.cy)), maximum(abs(self.cz), 1e-30))
+        c = vec3(self.cx * over, self.cy * over, self.cz * over)
+        axis = vec3(c.x * wo.x, c.y * wo.y, c.z * wo.z)
+        missing = (1.0 - sqr(c.x)) * sqr(wo.x) + (1.0 - sqr(c.y)) * sqr(wo.y) + (1.0 - sqr(c.z)) * sqr(wo.z)
+        missing = minimum(missing, 1.0 - 1e-7)
+        log_length = -0.5 * missing * logrel(-missing)
+        return axis * exp(-log_length), exp(self.exponent * log_length)
+
+    @function
+    def _power(self, axis: Direction, wi: Direction) -> Scalar:
+        """(axis.wi)^n, from the distance of the two: near the peak their product has no digits left for a large n."""
+        off = wi - axis
+        versine = 0.5 * dot(off, off)
+        return power_of_cosine(dot(axis, wi), versine * (2.0 - versine), self.exponent)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular (n + 2) / (2 pi) |C o|^n (axis.wi)^n cos theta_i."""
+        axis, length = self._axis(wo)
+        norm = (self.exponent + 2.0) * (0.5 * inv_pi)
+        return self.specular * (norm * length * self._power(axis, wi) * wi.z)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """(n + 1) / (2 pi) (axis.wi)^n."""
+        axis, _ = self._axis(wo)
+        return (self.exponent + 1.0) * (0.5 * inv_pi) * self._power(axis, wi)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """A direction of the power lobe about the axis."""
+        axis, _ = self._axis(wo)
+        return around(axis, square_to_power_lobe(u.y, u.z, self.exponent))
+
+    @function
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular |C o|^n times the axis's cosine: of a narrow lobe."""
+        axis, length = self._axis(wo)
+        return self.specular * (length * ops.clamp(axis.z, 0.1, 1.0))

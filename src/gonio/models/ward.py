@@ -1,0 +1,67 @@
+"""Ward's model of 1992."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ..ops import Direction, Pair, Scalar, Spectrum, dot, function, sqr, sqrt
+from ..optics import frame
+from ..optics.ndf import distribution
+from . import microfacet
+from .glossy import _Glossy, sum_breach
+from .material import Breach
+from .parameters import Angle, Colour, Width, spectrum, width
+
+
+class Ward(_Glossy):
+    """Ward's anisotropic Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
+
+    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), h the half vector (Walter2005). Reciprocal. A narrow lobe
+    reflects specular cos theta_o, so it loses energy as the view gets flat, and beyond, where a wide one has spread to
+    the normal's side, it gains without bound. Sampled by all half vectors, with density D (n.h) of Beckmann's D.
+    """
+
+    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe, seen from the normal", low=0.0)
+    alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=microfacet.SMOOTH, high=4.0)
+    rotation: Angle = microfacet.rotation_angle()
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing, and "),
+    }
+
+    def _most(self) -> float:
+        return math.inf
+
+    def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Pair]:
+        """(half vector, the same along the axes of the anisotropy, widths)."""
+        h = frame.half_vector(wo, wi)
+        return h, frame.rotate(h, self.rotation), self.alpha
+
+    @function
+    def _shape(self, wo: Direction, wi: Direction, h: Direction) -> Scalar:
+        """f of the lobe over D specular: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
+        return 0.25 * sqr(sqr(h.z)) / sqrt(wo.z * wi.z)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) cos theta_i."""
+        h, turned, alpha = self._facet(wo, wi)
+        return self.specular * (distribution("beckmann").D(turned, alpha) * self._shape(wo, wi, h) * wi.z)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """D (n.h) / (4 (o.h)) (Walter2005)."""
+        h, turned, alpha = self._facet(wo, wi)
+        return distribution("beckmann").pdf(turned, alpha) / (4.0 * dot(wo, h))
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a Gaussian half vector."""
+        h = distribution("beckmann").sample(u.y, u.z, self.alpha)
+        return frame.reflect(wo, frame.rotate_back(h, self.rotation))
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular cos theta_o: of a narrow lobe."""
+        return self.specular * wo.z

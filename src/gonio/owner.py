@@ -1,0 +1,50 @@
+"""Dr.Jit and Mitsuba have one owner at a time.
+
+Both are imported step by step, have one variant for all threads, and order kernels within a thread only; our recorder
+has one stack. So every public call that computes holds `COMPUTING` until its values are there: calls from several
+threads, or by `asyncio.to_thread`, wait for each other. Who uses Dr.Jit or Mitsuba in threads beside Gonio
+holds it too:
+
+    from gonio.owner import COMPUTING
+    with COMPUTING:
+        mi.set_variant("llvm_ad_spectral")
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+import threading
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# Plain, and taken by `with`: a lock written in Python could be left behind by a Ctrl-C between two of its lines.
+COMPUTING = threading.RLock()
+
+if hasattr(os, "register_at_fork"):  # not on Windows; who held it may be a thread that the child has not
+    os.register_at_fork(after_in_child=lambda: COMPUTING._at_fork_reinit())  # type: ignore[attr-defined]
+
+
+def settle() -> None:
+    """Wait for this thread's kernels: another thread's would not wait for them."""
+    dr = sys.modules.get("drjit")
+    if dr is not None and hasattr(dr, "sync_thread"):
+        dr.sync_thread()
+
+
+def alone(call: Callable[P, R]) -> Callable[P, R]:
+    """The function, run while no other thread computes."""
+
+    @functools.wraps(call)
+    def held(*args: P.args, **kwargs: P.kwargs) -> R:
+        with COMPUTING:
+            try:
+                return call(*args, **kwargs)
+            finally:
+                settle()
+
+    return held

@@ -1,0 +1,349 @@
+"""Checkpoints of a render: the sums so far, and all that the picture depends on besides.
+
+A render that goes on from one gives the same bits as one that was never interrupted, since sums are carried on in the
+order of the samples. That holds as long as nothing else has changed; so the file has the hash of the scene, of every
+file that it names, of the settings, of Gonio's own code, and of what computes, and a change is refused by name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._version import __version__
+from ..errors import GonioError, InputError
+from ..models import BSDF, notation
+from ..work import kept
+from ..work.kept import Arrays, Facts
+from .passes import Progress, Renders
+from .request import Request
+
+if TYPE_CHECKING:
+    from .run import Prepared
+
+EVERY = 3.0  # seconds between two checkpoints: with a pass and the writing, less than 5 are lost
+MOST_COST = 0.015  # of the time; where writing takes more, it is done less often
+LONG = 60.0  # seconds that a job must take for a checkpoint that nobody asked for
+SUFFIX = ".checkpoint"  # beside the picture
+KIND = "render"
+
+_ROOMS = ("models", "ops", "optics", "energy", "render")  # whose code a picture depends on
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What a picture is made from.
+
+    text     the scene as it is rendered, overrides and all
+    files    those that it names, by the name that it gives them
+    how      integrator, sampler, seed and what else there is to set
+    version  of Gonio and Mitsuba
+    device   what computes
+    """
+
+    text: str
+    files: Mapping[str, Path]
+    how: str
+    version: str
+    device: str
+
+    @staticmethod
+    def of(mi: ModuleType, text: str, files: Mapping[str, Path], how: str) -> Sources:
+        return Sources(text, files, how, f"gonio {__version__}, mitsuba {mi.__version__}", _device(mi))
+
+    def identity(self) -> dict[str, str]:
+        """A hash or a name of each thing that the picture depends on, by what a person calls it."""
+        found = {"version": self.version, "code of Gonio": _own_code(), "device": self.device}
+        found |= {"settings": self.how, "scene": _hash(self.text.encode("utf-8", "surrogateescape"))}
+        for name, path in self.files.items():
+            found[f"file {name}"] = file_hash(path)
+        return found
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's content, "missing" where there is none."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return "missing"
+
+
+@lru_cache
+def _own_code() -> str:
+    """Hash of Gonio's code that a picture depends on: a checkout changes between two versions, too."""
+    package = Path(__file__).parent.parent
+    found = hashlib.sha256()
+    for path in sorted(p for room in _ROOMS for p in (package / room).rglob("*.py")):
+        found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return found.hexdigest()
+
+
+def _device(mi: ModuleType) -> str:
+    """What computes: another compiler or another processor may round otherwise."""
+    import drjit as dr
+
+    variant = str(mi.variant())
+    if not variant.startswith("llvm"):
+        return variant
+    version = ".".join(map(str, dr.detail.llvm_version()))
+    return f"{variant}, LLVM {version}, {platform.machine()} {_vectors()}".strip()
+
+
+@lru_cache
+def _vectors() -> str:
+    """The vector instructions of this processor, where the system tells."""
+    try:
+        flags = set(Path("/proc/cpuinfo").read_text().partition("flags")[2].partition("\n")[0].split())
+    except OSError:
+        return platform.processor()
+    return " ".join(name for name in ("avx2", "fma", "avx512f") if name in flags)
+
+
+# ---------------------------------------------------------------------- a request as JSON
+
+
+def described(request: Request) -> Facts:
+    """A request as a file can hold it. Raises InputError for a material that this program alone knows."""
+    found: Facts = {}
+    for one in fields(Request):
+        value = getattr(request, one.name)
+        if one.name in ("checkpoint", "timeout"):
+            continue
+        if isinstance(value, Path):
+            value = str(value.absolute()) if one.name == "output" or request.material is None else str(value)
+        found[one.name] = _plain(value)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, BSDF):
+        return {"$material": notation.as_json(value)}
+    if isinstance(value, Mapping):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def request_of(found: Facts, where: str, allow_code: bool) -> Request:
+    """The request that `described` made. A file alone never makes Gonio run Python: `allow_code` is asked for again."""
+    if not allow_code and (found.get("allow_code") or ".py:" in json.dumps(found)):
+        raise InputError(
+            "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
+        )
+    try:
+        values = {name: _rebuilt(value) for name, value in found.items()}
+        for name in ("scene", "output"):
+            values[name] = None if values[name] is None else Path(values[name])
+        values["size"] = None if values["size"] is None else tuple(values["size"])
+        return Request(**values)
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, GonioError):
+            raise
+        raise InputError("this checkpoint is of another version of Gonio", where, "render anew") from None
+
+
+def _rebuilt(value: Any) -> Any:
+    if isinstance(value, dict):
+        if set(value) == {"$material"}:
+            return notation.from_json(value["$material"])
+        return {name: _rebuilt(item) for name, item in value.items()}
+    return [_rebuilt(item) for item in value] if isinstance(value, list) else value
+
+
+# ---------------------------------------------------------------------- going on
+
+
+def check(found: Facts, identity: Mapping[str, str], where: str) -> None:
+    """Raise InputError that names the first thing that is not as it was."""
+    before = found.get("identity")
+    before = before if isinstance(before, dict) else {}
+    for name in [*identity, *before]:
+        old, new = before.get(name), identity.get(name)
+        if old == new:
+            continue
+        if name in ("version", "device", "settings"):
+            what = f"{name}: the checkpoint was made with {old}, this is {new}"
+        elif name == "code of Gonio":
+            what = "the code of Gonio has changed since the checkpoint was made"
+        elif new == "missing":
+            what = f"the {name} is no longer there"
+        else:
+            what = f"the {name} has changed since the checkpoint was made"
+        raise InputError(what, where, "put back what it was, or render anew without this checkpoint")
+
+
+def load(path: Path) -> kept.Kept:
+    """The checkpoint in a file, or the one before where it is damaged. Raises InputError where there is none."""
+    found = kept.read(path)
+    if found.facts.get("kind") != KIND:
+        raise InputError("this is no checkpoint of a render", str(path), "give one that `gonio render` has written")
+    return found
+
+
+def restore(render: Renders, found: kept.Kept, where: str) -> None:
+    """Carry the sums over."""
+    try:
+        render.restore(int(found.facts["done"]), found.arrays)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError("this checkpoint does not fit the picture", where, "render anew") from error
+
+
+class Keeper:
+    """Writes checkpoints while a render goes on, by a thread of its own.
+
+    path       the file; None writes nothing
+    temporary  nobody asked for the file: it begins only once the job shows to take over `LONG` seconds, and goes when
+               the picture is there
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        prepared: Prepared,
+        temporary: bool = False,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.path, self._prepared, self._temporary, self._clock = path, prepared, temporary, clock
+        self.written = path is not None and kept.exists(path)
+        self.error: GonioError | None = None
+        self._began = self._last = clock()
+        self._remaining = float("inf")
+        self._thread: threading.Thread | None = None
+        self._held: Arrays | None = None  # what the thread reads stays alive until this one lets it go
+        self._identity: dict[str, str] = {}
+        self._cost = 0.0  # seconds that the last one took away from the render
+        self._request = None if path is None else self._describe()
+
+    def _describe(self) -> Facts | None:
+        try:
+            return described(self._prepared.request)
+        except InputError:
+            if not self._temporary:
+                raise
+            self.path = None
+            return None
+
+    def _short(self, now: float) -> bool:
+        """Whether the job is too short for a file that nobody asked for."""
+        return self._temporary and not self.written and now - self._began + self._remaining < LONG
+
+    def after_pass(self, progress: Progress) -> None:
+        """Write, where it is time for it."""
+        now, self._remaining = self._clock(), progress.remaining
+        if self.path is None or now - self._last < max(EVERY, self._cost / MOST_COST) or self._short(now):
+            return
+        if self._thread is not None and self._thread.is_alive():
+            return
+        self._last = now
+        self._begin()
+
+    def end(self, stopped: bool) -> None:
+        """Write what there is, for a render that is to go on later, or to more samples."""
+        self._wait()
+        if self.path is not None and (stopped or not self._temporary) and not self._short(self._clock()):
+            self._begin()
+            self._wait()
+
+    def remove(self) -> None:
+        """The picture is there: remove the file that nobody asked for."""
+        self._wait()
+        if self.path is not None and self._temporary:
+            kept.remove(self.path)
+            self.written = False
+
+    def _wait(self) -> None:
+        if self._thread is not None:
+            self._thread.join()
+        self._thread = self._held = None
+
+    def _begin(self) -> None:
+        started = self._clock()
+        self._held = self._prepared.render.state()
+        facts = {
+            "kind": KIND,
+            "done": self._prepared.render.done,
+            "wanted": self._prepared.spp,
+            "size": [*self._prepared.size],
+            "request": self._request,
+            "temporary": self._temporary,
+        }
+        self._thread = threading.Thread(target=self._write, args=(facts, self._held, self._clock() - started))
+        self._thread.start()
+
+    def _write(self, facts: Facts, arrays: Arrays, before: float) -> None:
+        assert self.path is not None
+        began = time.thread_time()
+        try:
+            if not self._identity:  # here, so that hashing large files costs the render nothing
+                self._identity = self._prepared.sources.identity()
+            kept.write(self.path, {**facts, "identity": self._identity}, arrays, previous=True)
+            self.written, self.error = True, None
+        except GonioError as error:
+            self.error = error
+        except OSError as error:
+            self.error = InputError(f"no checkpoint: {error.strerror or error}", str(self.path))
+        self._cost = before + (time.thread_time() - began) / (os.cpu_count() or 1)
+
+
+def beside(output: Path) -> Path:
+    """Where the checkpoint of a picture is that nobody asked for."""
+    return output.with_name(output.name + SUFFIX)
+
+
+def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:
+    """Go on from a checkpoint that an earlier run of the same render has left: (what to tell of it, whether it is one
+    that nobody asked for).
+
+    temporary  nobody asks for it now either: one that does not fit is left alone, and said
+    """
+    if not kept.exists(path):
+        return "", temporary
+    try:
+        found = load(path)
+        check(found.facts, prepared.sources.identity(), str(path))
+        done = int(found.facts["done"])
+        if done > prepared.spp:
+            what = f"the checkpoint holds {done} samples per pixel, {prepared.spp} are asked for"
+            raise InputError(what, str(path), f"give --spp {done} or more, or another --checkpoint")
+        restore(prepared.render, found, str(path))
+    except InputError as error:
+        if not temporary:
+            raise
+        kept.remove(path)
+        return f"{path} is not used, and removed: {error.what}", temporary
+    text = f"goes on from {path}: {done} of {prepared.spp} samples per pixel are done"
+    return text, temporary or bool(found.facts.get("temporary"))
+
+
+def asked_again(path: Path, change: Request, allow_code: bool) -> Request:
+    """The request of a checkpoint, changed as `gonio resume` was asked to: output, spp, timeout and threads."""
+    found = load(path)
+    old = request_of(found.facts.get("request") or {}, str(path), allow_code)
+    return replace(
+        old,
+        output=change.output or old.output,
+        spp=change.spp or int(found.facts["wanted"]),
+        timeout=change.timeout,
+        threads=change.threads,
+        checkpoint=path,
+    )

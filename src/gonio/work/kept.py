@@ -1,0 +1,147 @@
+"""Facts and arrays in one file, whole or not at all, which says itself whether it is undamaged.
+
+    "gonio kept 1\\n"   what it is
+    8 bytes            length of the header, little-endian
+    header             JSON: {"facts": ..., "arrays": [[name, dtype, shape], ...]}
+    arrays             one after the other, little-endian, in C order
+    4 bytes            CRC-32 of all before
+
+A file that was cut short has another length than its header says, and damage shows in the sum. The file before is kept
+beside it as NAME.previous: whatever happens to the newest one, the one before is there. Nothing that is read here is
+ever run.
+"""
+
+from __future__ import annotations
+
+import glob
+import json
+import math
+import os
+import struct
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import files
+from ..errors import InputError
+
+Facts: TypeAlias = dict[str, Any]  # what JSON holds
+Arrays: TypeAlias = dict[str, NDArray[Any]]
+
+_MAGIC = b"gonio kept 1\n"
+_TYPES = ("float64", "float32", "int64", "uint32", "uint8", "bool")
+_CHUNK = 1 << 24  # bytes at a time, so that a sum needs no second copy
+
+
+class Kept(NamedTuple):
+    """What a file holds."""
+
+    facts: Facts
+    arrays: Arrays
+
+
+def write(path: Path, facts: Facts, arrays: Mapping[str, NDArray[Any]], previous: bool = False) -> None:
+    """Write the file; at every moment the old one or the new one is there.
+
+    previous  keep the file that was there as NAME.previous
+    Raises MachineError where the disk is full, TypeError for an array of another type than a file can have.
+    """
+    parts = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    for name, array in parts.items():
+        if array.dtype.name not in _TYPES:
+            raise TypeError(f"array '{name}' is {array.dtype}, expected one of {', '.join(_TYPES)}")
+    listed = [[name, array.dtype.name, [*array.shape]] for name, array in parts.items()]
+    header = json.dumps({"facts": facts, "arrays": listed}).encode()
+
+    def fill(part: Path) -> None:
+        total = 0
+        with open(part, "wb") as file:
+            begin = _MAGIC + struct.pack("<Q", len(header)) + header
+            for piece in (memoryview(begin), *(_bytes(array) for array in parts.values())):
+                for at in range(0, len(piece), _CHUNK):
+                    total = zlib.crc32(piece[at : at + _CHUNK], total)
+                file.write(piece)
+            file.write(struct.pack("<I", total))
+
+    if not previous:
+        files.write_whole(path, fill, rescue=False)
+        return
+    newest = path.with_name(path.name + ".next")
+    files.write_whole(newest, fill, rescue=False)
+    if path.exists():
+        os.replace(path, _previous(path))
+    os.replace(newest, path)  # a death just before leaves the one before, under its other name
+
+
+def _bytes(array: NDArray[Any]) -> memoryview:
+    little = array.astype(array.dtype.newbyteorder("<"), copy=False)
+    return little.reshape(-1).view(np.uint8).data if little.size else memoryview(b"")
+
+
+def _previous(path: Path) -> Path:
+    return path.with_name(path.name + ".previous")
+
+
+def remove(path: Path) -> None:
+    """Remove the file, and what is kept beside it."""
+    newest = path.with_name(path.name + ".next")
+    left = path.parent.glob(f".{glob.escape(path.name)}.*.part.next")  # of a process that was killed while it wrote
+    for name in (path, _previous(path), newest, *left):
+        name.unlink(missing_ok=True)
+
+
+def exists(path: Path) -> bool:
+    """Whether there is such a file, or the one before it."""
+    return path.is_file() or _previous(path).is_file()
+
+
+def read(path: Path) -> Kept:
+    """What the file holds, or the one before where it is damaged. Raises InputError where neither can be used."""
+    problem = None
+    for name in (path, _previous(path)):
+        try:
+            return _read(name)
+        except InputError as error:
+            problem = problem or error
+    assert problem is not None
+    raise problem
+
+
+def _read(path: Path) -> Kept:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", str(path), "check the name") from None
+    damaged = InputError("this file is damaged or was cut short", str(path), "remove it, and begin anew")
+    start = len(_MAGIC) + 8
+    if content[: len(_MAGIC)] != _MAGIC:
+        raise InputError("this is no checkpoint of Gonio", str(path), "give a file that --checkpoint has written")
+    if len(content) < start + 4:
+        raise damaged
+    (length,) = struct.unpack("<Q", content[len(_MAGIC) : start])
+    body = memoryview(content)[:-4]
+    if start + length > len(body) or zlib.crc32(body) != struct.unpack("<I", content[-4:])[0]:
+        raise damaged
+    try:
+        header = json.loads(bytes(body[start : start + length]))
+        at, arrays = start + length, {}
+        for name, kind, shape in header["arrays"]:
+            if kind not in _TYPES or any(not isinstance(n, int) or n < 0 for n in shape):
+                raise damaged
+            dtype = np.dtype(kind).newbyteorder("<")
+            count = math.prod(shape)
+            if count * dtype.itemsize > len(body) - at:
+                raise damaged
+            values = np.frombuffer(body, dtype, count, at).reshape(shape)
+            arrays[str(name)] = values.astype(np.dtype(kind), copy=False)
+            at += count * dtype.itemsize
+        facts = header["facts"]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise error if isinstance(error, InputError) else damaged from None
+    if at != len(body) or not isinstance(facts, dict):
+        raise damaged
+    return Kept(facts, arrays)

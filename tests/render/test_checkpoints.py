@@ -1,0 +1,254 @@
+"""A render that was stopped and goes on is the one that was never stopped, to the bit; what has changed is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import GonioWarning, InputError
+from gonio.render import checkpoints, images, passes, run
+from gonio.work import kept
+
+
+@pytest.fixture(autouse=True)
+def small_passes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Passes of one sample, and a checkpoint after each of them."""
+    monkeypatch.setattr(passes, "FIRST_PASS", 1)
+    monkeypatch.setattr(passes, "PASS_SECONDS", 1e-9)
+    monkeypatch.setattr(checkpoints, "EVERY", 0.0)
+    monkeypatch.setattr(checkpoints, "MOST_COST", 1e9)
+
+
+def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options: object) -> None:
+    """Render so many passes, and leave as `kill -9` does: nothing is written at the end."""
+
+    class Killed(Exception):
+        pass
+
+    request = run.Request(
+        Path(scene.name) if isinstance(scene, go.BSDF) else scene,
+        checkpoint=checkpoint,
+        material=scene if isinstance(scene, go.BSDF) else None,
+        **options,  # type: ignore[arg-type]
+    )
+    prepared = run.prepare(request)
+    keeper = checkpoints.Keeper(checkpoint, prepared)
+
+    def after(progress: passes.Progress) -> None:
+        keeper.after_pass(progress)
+        keeper._wait()
+        if progress.done == count:
+            raise Killed
+
+    with pytest.raises(Killed):
+        run.run(prepared.render, prepared.spp, 24 * 16, report=after)
+
+
+@pytest.mark.parametrize("options", [{}, {"integrator": "path"}, {"denoise": True}, {"integrator": "normal"}])
+def test_a_render_that_goes_on_has_the_same_bits(scene: Path, tmp_path: Path, options: dict[str, object]) -> None:
+    whole = go.render(scene, spp=7, seed=3, **options)  # type: ignore[arg-type]
+    stopped_after(scene, 4, tmp_path / "c", spp=7, seed=3, **options)
+    assert kept.read(tmp_path / "c").facts["done"] == 4
+    with pytest.warns(GonioWarning, match="4 of 7 samples per pixel are done"):
+        assert np.array_equal(go.resume(tmp_path / "c"), whole)
+
+
+def test_the_same_call_again_goes_on_too(scene: Path, tmp_path: Path) -> None:
+    whole = go.render(scene, spp=5)
+    stopped_after(scene, 2, tmp_path / "c", spp=5)
+    with pytest.warns(GonioWarning, match="2 of 5 samples"):
+        assert np.array_equal(go.render(scene, spp=5, checkpoint=tmp_path / "c"), whole)
+
+
+def test_a_finished_picture_goes_on_to_more_samples(scene: Path, tmp_path: Path) -> None:
+    go.render(scene, spp=4, checkpoint=tmp_path / "c")
+    with pytest.warns(GonioWarning, match="4 of 9 samples"):
+        more = go.resume(tmp_path / "c", spp=9, output=tmp_path / "more.exr")
+    assert np.array_equal(more, go.render(scene, spp=9))
+    assert np.array_equal(images.read(tmp_path / "more.exr").pixels, more)
+    with pytest.raises(InputError, match="holds 9 samples per pixel, 4 are asked for"):
+        go.resume(tmp_path / "c", spp=4)
+
+
+def test_a_material_goes_on_by_its_exact_values(tmp_path: Path) -> None:
+    material = go.Conductor(eta=(0.2, 0.9, 1.1), k=(3.9, 2.4, 2.2), alpha=0.123456789123)
+    options = {
+        "spp": 4,
+        "size": (24, 16),
+        "overrides": {"/scene/shapes/1/material": go.Lambert(albedo=(0.1, 0.2, 1 / 3))},
+    }
+    whole = go.render(material, **options)  # type: ignore[arg-type]
+    stopped_after(material, 2, tmp_path / "c", **options)
+    with pytest.warns(GonioWarning, match="2 of 4"):
+        assert np.array_equal(go.resume(tmp_path / "c"), whole)
+
+
+def test_a_newest_file_that_is_cut_short_falls_back_to_the_one_before(scene: Path, tmp_path: Path) -> None:
+    whole = go.render(scene, spp=6)
+    stopped_after(scene, 4, tmp_path / "c", spp=6)
+    content = (tmp_path / "c").read_bytes()
+    for length in (0, 10, len(content) // 2, len(content) - 1):
+        (tmp_path / "c").write_bytes(content[:length])
+        assert kept.read(tmp_path / "c").facts["done"] == 3
+    (tmp_path / "c").write_bytes(content[:-40] + bytes([content[-40] ^ 1]) + content[-39:])
+    with pytest.warns(GonioWarning, match="3 of 6"):
+        assert np.array_equal(go.resume(tmp_path / "c"), whole)
+
+
+def test_both_files_damaged_is_one_clear_error(scene: Path, tmp_path: Path) -> None:
+    stopped_after(scene, 2, tmp_path / "c", spp=6)
+    (tmp_path / "c").write_bytes((tmp_path / "c").read_bytes()[:-1])
+    (tmp_path / "c.previous").unlink()
+    with pytest.raises(InputError, match="damaged or was cut short"):
+        go.resume(tmp_path / "c")
+    (tmp_path / "picture.exr").write_bytes(b"\x76\x2f\x31\x01")
+    with pytest.raises(InputError, match="no checkpoint of Gonio"):
+        go.resume(tmp_path / "picture.exr")
+
+
+def test_what_has_changed_is_refused_by_name(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = scene / "scene.json"
+    raw = json.loads(file.read_text())
+    raw["scene"]["shapes"][0]["material"] = {"type": "matte", "albedo": {"type": "imageTex", "file": "wood.png"}}
+    file.write_text(json.dumps(raw))
+    images.write(scene / "wood.png", np.full((4, 4, 3), 0.5, np.float32))
+    stopped_after(scene, 2, tmp_path / "c", spp=4)
+
+    def refused(match: str) -> None:
+        with pytest.raises(InputError, match=match):
+            go.resume(tmp_path / "c")
+
+    images.write(scene / "wood.png", np.full((4, 4, 3), 0.6, np.float32))
+    refused(r"file wood.png has changed")
+    images.write(scene / "wood.png", np.full((4, 4, 3), 0.5, np.float32))
+    raw["scene"]["lights"][0]["energy"] = [40, 40, 41]
+    file.write_text(json.dumps(raw))
+    refused("the scene has changed")
+    raw["scene"]["lights"][0]["energy"] = [40, 40, 40]
+    file.write_text(json.dumps(raw, indent=1))  # other blanks are no other scene
+    with monkeypatch.context() as other:
+        other.setattr(checkpoints, "__version__", "9.9")
+        refused("version: the checkpoint was made with gonio .*, this is gonio 9.9")
+    with monkeypatch.context() as other:
+        other.setattr(checkpoints, "_vectors", lambda: "abacus")
+        refused("device: .* abacus")
+    with pytest.raises(InputError, match=r"settings: .*seed 0.*, this is .*seed 8"):
+        go.render(scene, spp=4, seed=8, checkpoint=tmp_path / "c")
+    with pytest.warns(GonioWarning, match="2 of 4"):
+        go.resume(tmp_path / "c")
+    shutil.rmtree(scene)
+    refused("no such scene")
+
+
+def test_a_checkpoint_runs_no_code_unasked(scene: Path, tmp_path: Path) -> None:
+    source = "import gonio as go\n\nclass Flat(go.Lambert):\n    'Flat.'\n    name = 'flat-for-checkpoints'\n"
+    (tmp_path / "flat.py").write_text(source)
+    material = go.models.notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]  # type: ignore[attr-defined]
+    stopped_after(material, 2, tmp_path / "c", spp=4, size=(24, 16))
+    with pytest.raises(InputError, match="runs Python files") as caught:
+        go.resume(tmp_path / "c")
+    assert "--allow-code" in caught.value.hint
+    with pytest.warns(GonioWarning, match="2 of 4"):
+        go.resume(tmp_path / "c", allow_code=True)
+    (tmp_path / "flat.py").write_text(source + "\n# another\n")
+    with pytest.raises(InputError, match=r"file flat.py has changed"):
+        go.resume(tmp_path / "c", allow_code=True)
+
+
+def test_a_material_of_this_program_alone_is_refused_before_the_render(tmp_path: Path) -> None:
+    namespace: dict[str, object] = {}
+    exec("import gonio as go\nclass Mine(go.Lambert):\n    'Mine.'\n    name = 'mine-for-checkpoints'\n", namespace)
+    mine = namespace["Mine"]()  # type: ignore[operator]
+    with pytest.raises(InputError, match="known to this program alone"):
+        go.render(mine, spp=4, size=(24, 16), checkpoint=tmp_path / "c")
+    assert go.render(mine, spp=2, size=(24, 16), output=tmp_path / "a.exr").shape == (16, 24, 3)
+
+
+# --- a checkpoint that nobody asked for ----------------------------------------------------------------
+
+
+def test_a_long_render_has_a_checkpoint_beside_it_until_it_is_done(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output, seen = tmp_path / "a.exr", []
+    monkeypatch.setattr(checkpoints, "LONG", 0.0)
+
+    def look(progress: passes.Progress) -> None:
+        time.sleep(0.05)  # the file is written by a thread of its own
+        seen.append(checkpoints.beside(output).exists())
+
+    run.render(run.Request(scene, output, spp=6), report=look)
+    assert seen[-1]
+    assert [entry.name for entry in tmp_path.iterdir() if entry.is_file()] == ["a.exr"]
+
+
+def test_a_short_render_has_none(scene: Path, tmp_path: Path) -> None:
+    result = run.render(run.Request(scene, tmp_path / "a.exr", spp=2**20, timeout=0.2))
+    assert result.stopped == "timeout"
+    monkey = run.render(run.Request(scene, tmp_path / "b.exr", spp=3))
+    assert (monkey.stopped, monkey.checkpoint) == ("", None)
+    assert not (tmp_path / "b.exr.checkpoint").exists()
+
+
+def test_a_time_limit_leaves_what_goes_on_and_the_end_removes_it(scene: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.exr"
+    result = run.render(run.Request(scene, output, spp=2**29, timeout=0.2))
+    assert result.checkpoint == tmp_path / "a.exr.checkpoint" and result.checkpoint.is_file()
+    told: list[str] = []
+    change = run.Request(Path(), spp=result.spp + 3)
+    again = run.render(checkpoints.asked_again(result.checkpoint, change, False), tell=told.append)
+    assert (again.spp, again.stopped, again.checkpoint) == (result.spp + 3, "", None)
+    assert f"{result.spp} of {result.spp + 3}" in told[0]
+    assert np.array_equal(images.read(output).pixels, go.render(scene, spp=again.spp))
+    assert [entry.name for entry in tmp_path.iterdir() if entry.is_file()] == ["a.exr"]
+
+
+def test_one_that_does_not_fit_is_told_and_not_used(scene: Path, tmp_path: Path) -> None:
+    output, told = tmp_path / "a.exr", list[str]()
+    run.render(run.Request(scene, output, spp=2**29, timeout=0.2))
+    result = run.render(run.Request(scene, output, spp=3, seed=9), tell=told.append)
+    assert result.spp == 3 and "is not used, and removed: settings" in told[0]
+    assert np.array_equal(images.read(output).pixels, go.render(scene, spp=3, seed=9))
+
+
+def test_a_full_disk_costs_the_checkpoint_and_not_the_picture(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise go.MachineError("the disk is full", "c")
+
+    monkeypatch.setattr(kept, "write", full)
+    result = run.render(run.Request(scene, tmp_path / "a.exr", spp=4, checkpoint=tmp_path / "c"))
+    assert result.warnings == ("no checkpoint was written: the disk is full",)
+    assert images.read(tmp_path / "a.exr").metadata["spp"] == 4
+
+
+# --- Mitsuba's scenes ----------------------------------------------------------------------------------
+
+sys.path.insert(0, str(Path(__file__).parent))
+from test_run import XML  # noqa: E402
+
+
+@pytest.mark.parametrize("integrator", [None, "path"])
+def test_a_mitsuba_scene_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str | None) -> None:
+    from gonio.render import mitsuba_scene
+
+    monkeypatch.setattr(mitsuba_scene, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
+    xml = tmp_path / "ball.xml"
+    xml.write_text(XML)
+    whole = go.render(xml, spp=8, integrator=integrator)
+    stopped_after(xml, 4, tmp_path / "c", spp=8, integrator=integrator)
+    with pytest.warns(GonioWarning, match="4 of 8"):
+        picture = go.resume(tmp_path / "c")
+    if integrator:
+        assert np.array_equal(picture, whole)
+    np.testing.assert_allclose(picture, whole, rtol=1e-5)  # Mitsuba's film adds up with atomics, in any order
+    xml.write_text(XML.replace('value="0.2"', 'value="0.3"'))
+    with pytest.raises(InputError, match="the scene has changed"):
+        go.resume(tmp_path / "c")

@@ -1,0 +1,106 @@
+"""Bytes of pictures: what a library in C++ would be corrupted by never reaches it, and Radiance is read exactly."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gonio.errors import InputError
+from gonio.render import engine, formats, images, run
+
+
+def radiance(width: int, height: int, lines: bytes) -> bytes:
+    return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + lines
+
+
+def line(width: int, *runs: bytes) -> bytes:
+    return bytes((2, 2, width >> 8, width & 255)) + b"".join(runs)
+
+
+GREY = bytes((128 + 9, 7))  # a run of 9
+
+
+def refused(content: bytes) -> str:
+    kind = formats.kind_of(content)
+    assert kind is not None
+    with pytest.raises(formats.Unreadable) as caught:
+        formats.decode(Path("a"), content, kind)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("runs", "reason"),
+    [
+        ([bytes((128 + 100, 7)), *[GREY] * 3], "longer than its scanline"),
+        ([bytes((100,)) + b"x" * 100, *[GREY] * 3], "longer than its scanline"),
+        ([bytes((0,)), *[GREY] * 4], "empty"),
+        ([GREY, GREY], "cut off"),
+        ([GREY, GREY, GREY, bytes((9, 1, 2))], "cut off"),
+        ([GREY, GREY, GREY, bytes((128 + 9,))], "cut off"),
+    ],
+)
+def test_wrong_runs_of_a_radiance_picture_are_refused(runs: list[bytes], reason: str) -> None:
+    assert reason in refused(radiance(9, 1, line(9, *runs)))
+
+
+def test_a_radiance_picture_whose_lines_run_wild_corrupts_nothing() -> None:
+    # the find: 1.1 kB by which Mitsuba's reader writes past its buffer
+    assert "longer" in refused(radiance(9, 60, line(9, *[GREY] * 4) * 20 + line(9, *[bytes((255, 7))] * 8) * 40))
+
+
+@pytest.mark.parametrize("width", [3, 8, 9, 300])
+def test_radiance_is_read_as_mitsuba_does(tmp_path: Path, width: int) -> None:
+    mi = engine.load()
+    rng = np.random.default_rng(width)
+    pixels = (10.0 ** rng.uniform(-3, 3, (5, width, 3))).astype(np.float32)
+    pixels[1] = 0.25  # runs
+    pixels[2] = 0.0
+    mi.Bitmap(pixels).write(str(tmp_path / "a.hdr"))
+    expected = np.array(mi.Bitmap(str(tmp_path / "a.hdr")))
+    np.testing.assert_array_equal(images.read(tmp_path / "a.hdr").pixels, expected)
+
+
+def test_flat_radiance_is_read() -> None:
+    content = radiance(2, 1, bytes((128, 64, 32, 129, 255, 0, 0, 128)))
+    values, whole = formats.decode(Path("a"), content, "RGBE")
+    assert not whole
+    np.testing.assert_array_equal(values, [[[1.0, 0.5, 0.25], [255 / 256, 0, 0]]])
+
+
+def test_headers_that_contradict_their_file_are_refused(tmp_path: Path) -> None:
+    png = images.png_bytes(np.zeros((4, 4, 3), np.uint8))
+    assert "cut off" in refused(png[:-9])
+    at = png.index(b"IDAT") - 4
+    assert "cut off" in refused(png[:at] + struct.pack(">I", 2**31 - 1) + png[at + 4 :])
+    exr = images.write(tmp_path / "a.exr", np.zeros((4, 4, 3), np.float32), {"scene": "müll"}).read_bytes()
+    assert "lacks 'compression'" in refused(exr.replace(b"compression\0", b"compressiom\0"))
+    at = exr.index(b"compression\0") + len(b"compression\0compression\0")
+    assert "longer than the file" in refused(exr[:at] + struct.pack("<i", 2**30) + exr[at + 4 :])
+    assert "unknown version" in refused(exr[:4] + b"\x03" + exr[5:])
+    assert "XYZ" in refused(radiance(9, 1, b"").replace(b"rgbe", b"xyze"))
+
+
+def test_an_attribute_that_is_not_utf8_is_no_traceback(tmp_path: Path) -> None:
+    path = images.write(tmp_path / "a.exr", np.ones((4, 4, 3), np.float32), {"scene": "müll"})
+    path.write_bytes(path.read_bytes().replace("ü".encode(), b"\xff\xfe"))
+    assert images.read(path).metadata["scene"] == "m��ll"
+
+
+def test_a_file_whose_name_is_no_text_is_one_clear_error(tmp_path: Path) -> None:
+    path = images.write(tmp_path / "a.exr", np.ones((4, 4, 3), np.float32))
+    odd = path.rename(tmp_path / "b\udcff.exr")
+    with pytest.raises(InputError, match="not UTF-8"):
+        images.read(odd)
+
+
+def test_a_mitsuba_scene_opens_no_picture_that_would_corrupt_it(tmp_path: Path) -> None:
+    (tmp_path / "sky.hdr").write_bytes(radiance(9, 60, line(9, *[bytes((255, 7))] * 8) * 60))
+    scene = tmp_path / "scene.xml"
+    scene.write_text(
+        '<scene version="3.0.0"><emitter type="envmap"><string name="filename" value="sky.hdr"/></emitter></scene>'
+    )
+    for allowed in (False, True):
+        with pytest.raises(InputError, match="longer than its scanline"):
+            run.prepare(run.Request(scene, allow_outside=allowed))
