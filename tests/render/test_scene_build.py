@@ -405,3 +405,16 @@ def test_two_lamps_that_are_alike_are_two_lamps(build):
     }
     other = {**lamp, "shape": {**lamp["shape"], "base": [2, 3, 0]}}
     assert len(build([{"type": "sphere", "center": [0, 0, 0], "radius": 1}], [lamp, other]).emitters()) == 2
+
+
+def test_shapes_and_lights_stand_in_the_order_of_the_scene():
+    # Mitsuba's optimization merges and shuffles them, another way each time: then a seed stands for several pictures
+    import gonio as go
+    from gonio.render.scene import ball
+
+    mi = engine.load("cpu")
+    built = scene.build(ball.of_material(go.Lambert()), mi)
+    names = [shape.id() for shape in built.shapes()]
+    tiles = ball.TILES**2
+    assert names == [*(f"shape{index}" for index in range(tiles + 1)), "light0", "light1"]
+    assert [emitter.id() for emitter in built.emitters()][-1] == "light2"

@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import model, outside
+from . import model, outside, tree
 from .material import BSDF
 from .parameters import Parameter, Value
 
@@ -175,6 +175,8 @@ def spelled(cls: type[BSDF]) -> str:
 
 def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
     """The class and the text of each parameter of NAME or NAME(parameter=value,...)."""
+    if text.count("(") + text.count("{") > tree.MOST:
+        raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
     match = _CALL.fullmatch(text)
     if not match or re.fullmatch(r"[\d.-]+", match[1]):
         raise _no_material(text, where)

@@ -66,6 +66,7 @@ class Material:
     derives: ClassVar[bool] = False  # whether `derive` is written
 
     _bound: ClassVar[bool] = False
+    _count: int = 1  # of materials in the tree; no field of its own
     _plain: Self | None = None
     _derived: object = None
 

@@ -70,7 +70,11 @@ def load(request: Request, mi: ModuleType) -> Scene:
     check_files(request.scene, request.overrides, request.allow_outside)
     try:
         with engine.file_threads():
-            scene = mi.load_file(where, **{key: _as_xml(value) for key, value in request.overrides.items()})
+            # under our integrators a seed stands for one picture: see `scene.build`
+            optimize = request.integrator is None
+            scene = mi.load_file(
+                where, optimize=optimize, **{key: _as_xml(value) for key, value in request.overrides.items()}
+            )
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():

@@ -54,7 +54,9 @@ class _Builder:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", GonioWarning)  # the reader has said it, with the place
-                return self.mi.load_dict(plugin)
+                # Mitsuba's optimization merges shapes in an order of its own, another each time: lights would be chosen
+                # in another order too, and a seed would stand for several pictures
+                return self.mi.load_dict(plugin, optimize=False)
         except InputError as error:
             raise InputError(error.what, self.description.where(where), error.hint) from None
         except RuntimeError as error:
