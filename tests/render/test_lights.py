@@ -133,3 +133,9 @@ def test_a_bright_light_is_chosen_more_often_and_none_never() -> None:
     assert sum(chance) == pytest.approx(1)
     assert chance[0] == pytest.approx(1 / 6, abs=1e-6)  # the dark one: its uniform half
     assert chance[2] > chance[1] > chance[0]
+
+
+def test_an_area_light_without_radiance_is_one_clear_error() -> None:
+    lights.register(mi)
+    with pytest.raises(RuntimeError, match=r"gonio_area.radiance: missing"):  # a null pointer, before
+        mi.load_dict({"type": "sphere", "emitter": {"type": "gonio_area"}})

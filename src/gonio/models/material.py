@@ -125,6 +125,7 @@ class BSDF(Material):
     def __post_init__(self) -> None:
         for parameter in self.parameters().values():
             parameter.check(getattr(self, parameter.name), f"{type(self).__name__}.{parameter.name}")
+        object.__setattr__(self, "_count", tree.count(self))
 
     @classmethod
     def parameters(cls) -> dict[str, Parameter]:

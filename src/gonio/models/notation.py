@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import model, outside
+from . import model, outside, tree
 from .material import BSDF
 from .parameters import Parameter, Value
 
@@ -206,6 +206,8 @@ def spelled(cls: type[BSDF]) -> str:
 
 def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
     """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...)."""
+    if text.count("(") + text.count("{") > tree.MOST:
+        raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
     head = text.strip()
     while True:  # a file's name may have brackets in it
         reader = outside.reader_of(head)

@@ -67,6 +67,7 @@ class Material:
     guided: ClassVar[bool] = False  # whether of eval, pdf and sample only `eval` is: a guide is found for sampling
 
     _bound: ClassVar[bool] = False
+    _count: int = 1  # of materials in the tree; no field of its own
     _plain: Self | None = None
     _derived: object = None
 

@@ -32,6 +32,18 @@ class Leaf(NamedTuple, Generic[M]):
     owner: M
 
 
+MOST = 64  # materials in a tree: its formula then takes about a second to compile
+
+
+def count(material: Material) -> int:
+    """How many materials a tree holds, itself among them. InputError where these are more than MOST."""
+    found = 1 + sum(inner._count for inner in children(material).values())
+    if found > MOST:
+        what = f"{found} materials inside each other, {MOST} at most are expected"
+        raise InputError(what, type(material).__name__, "mix fewer materials")
+    return found
+
+
 def children(material: M) -> dict[str, M]:
     """The materials that a material holds, by the parameter's name."""
     return {name: getattr(material, name) for name, p in material.parameters().items() if p.inner}

@@ -16,6 +16,7 @@ from types import ModuleType
 
 import drjit as dr
 
+from ..errors import InputError
 from .types import (
     DirectionSample,
     Emitter,
@@ -192,6 +193,8 @@ def register(mi: ModuleType) -> None:
 
         def __init__(self, properties: Properties):
             base.__init__(self, properties)
+            if "radiance" not in properties:  # Mitsuba would follow a null pointer
+                raise InputError("missing", "gonio_area.radiance", "give the radiance: a number, a colour or a texture")
             self.radiance = properties.get_emissive_texture("radiance")
             properties.get("tag", "")
             self.m_flags = mi.EmitterFlags.Surface

@@ -83,10 +83,10 @@ def load(request: Request, mi: ModuleType) -> Scene:
     where = str(request.scene)
     check_files(request.scene, request.overrides, request.allow_outside)
     try:
-        # one after the other: in parallel the order of shapes, and with it the last bit, is left to chance
+        # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance
         with engine.file_threads():
             values = {key: _as_xml(value) for key, value in request.overrides.items()}
-            scene = mi.load_file(where, parallel=False, **values)
+            scene = mi.load_file(where, parallel=False, optimize=False, **values)
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():

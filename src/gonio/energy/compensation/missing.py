@@ -39,5 +39,8 @@ def check_base(base: BSDF, where: str, transmitting: bool, any_base: bool = Fals
     if base.delta != "never" or base.stochastic:
         why = "has a perfectly specular part" if base.delta != "never" else "is random"
         raise InputError(f"{name} {why}, a material with a finite lobe expected", where, hint)
+    if base.needs_uniform:  # each measurement would ask the one inside it at every point: seconds, then minutes
+        what = f"{name} holds a base whose energy is measured; it can be measured in one material, not again around it"
+        raise InputError(what, where, hint)
     if not base.isotropic:
         raise InputError(f"{name} has two widths inside, one expected", where, hint)

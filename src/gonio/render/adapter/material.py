@@ -33,7 +33,9 @@ class PlacedMaterial:
     def __init__(self, variant: Variant, props: Properties, model: type[BSDF]) -> None:
         self.variant, self.name = variant, plugin_name(model.name)
         preset = _preset(props, model)
-        sides = bool(props.get("two_sided", False))
+        sides = props.get("two_sided", False)
+        if not isinstance(sides, bool):
+            raise InputError(f"'{sides}' given, true or false expected", f"{self.name}.two_sided")
         self.slots: dict[str, Slot] = {}
         self.inner: dict[str, tuple[MitsubaBSDF, PlacedMaterial | Native]] = {}
         values: dict[str, OfVariant] = {}
