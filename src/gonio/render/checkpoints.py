@@ -214,6 +214,7 @@ class Keeper:
     path       the file; None writes nothing
     temporary  nobody asked for the file: it begins only once the job shows to take over `LONG` seconds, and goes when
                the picture is there
+    long       seconds that such a job must take, `LONG` where None
     """
 
     def __init__(
@@ -221,10 +222,12 @@ class Keeper:
         path: Path | None,
         prepared: Prepared,
         temporary: bool = False,
+        long: float | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.path, self._prepared, self._temporary, self._clock = path, prepared, temporary, clock
         self.written = path is not None and kept.exists(path)
+        self._long = LONG if long is None else long
         self.error: GonioError | None = None
         self._began = self._last = clock()
         self._remaining = float("inf")
@@ -245,7 +248,7 @@ class Keeper:
 
     def _short(self, now: float) -> bool:
         """Whether the job is too short for a file that nobody asked for."""
-        return self._temporary and not self.written and now - self._began + self._remaining < LONG
+        return self._temporary and not self.written and now - self._began + self._remaining < self._long
 
     def after_pass(self, progress: Progress) -> None:
         """Write, where it is time for it."""

@@ -219,6 +219,7 @@ def work(
     prepared: Prepared,
     *,
     temporary: Path | None = None,
+    long: float | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
     interrupted: Callable[[], object] = lambda: False,
     tell: Callable[[str], None] = lambda text: None,
@@ -227,6 +228,7 @@ def work(
     of its checkpoints, which is told when the picture is written.
 
     temporary  the checkpoint of a long job whose request names none
+    long       seconds that such a job must take; a minute where None
     tell       called at the start with what was found
     """
     request, (width, height) = prepared.request, prepared.size
@@ -236,7 +238,7 @@ def work(
         found, unasked = checkpoints.earlier(path, prepared, unasked)
         if found:
             tell(found)
-    keeper = Keeper(path, prepared, unasked)
+    keeper = Keeper(path, prepared, unasked, long)
 
     def after(progress: Progress) -> None:
         keeper.after_pass(progress)
