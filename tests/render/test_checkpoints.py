@@ -42,7 +42,7 @@ def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options
 
     def after(progress: passes.Progress) -> None:
         keeper.after_pass(progress)
-        keeper._wait()
+        keeper.close()
         if progress.done == count:
             raise Killed
 

@@ -7,6 +7,7 @@ file that it names, of the settings, of Gonio's own code, and of what computes, 
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import json
 import os
@@ -235,6 +236,7 @@ class Keeper:
         self._held: Arrays | None = None  # what the thread reads stays alive until this one lets it go
         self._identity: dict[str, str] = {}
         self._cost = 0.0  # seconds that the last one took away from the render
+        self._collects = False  # whether garbage is to be collected again once the thread has ended
         self._request = None if path is None else self._describe()
 
     def _describe(self) -> Facts | None:
@@ -253,31 +255,36 @@ class Keeper:
     def after_pass(self, progress: Progress) -> None:
         """Write, where it is time for it."""
         now, self._remaining = self._clock(), progress.remaining
+        if self._thread is not None and not self._thread.is_alive():
+            self.close()
         if self.path is None or now - self._last < max(EVERY, self._cost / MOST_COST) or self._short(now):
             return
-        if self._thread is not None and self._thread.is_alive():
+        if self._thread is not None:
             return
         self._last = now
         self._begin()
 
     def end(self, stopped: bool) -> None:
         """Write what there is, for a render that is to go on later, or to more samples."""
-        self._wait()
+        self.close()
         if self.path is not None and (stopped or not self._temporary) and not self._short(self._clock()):
             self._begin()
-            self._wait()
+            self.close()
 
     def remove(self) -> None:
         """The picture is there: remove the file that nobody asked for."""
-        self._wait()
         if self.path is not None and self._temporary:
             kept.remove(self.path)
             self.written = False
 
-    def _wait(self) -> None:
+    def close(self) -> None:
+        """Wait for what is being written."""
         if self._thread is not None:
             self._thread.join()
         self._thread = self._held = None
+        if self._collects:
+            gc.enable()
+            self._collects = False
 
     def _begin(self) -> None:
         started = self._clock()
@@ -290,6 +297,10 @@ class Keeper:
             "request": self._request,
             "temporary": self._temporary,
         }
+        # Garbage that Python collects in the other thread may be a scene, and Dr.Jit and Mitsuba crash when one goes
+        # there while a kernel is traced here. So none is collected while that thread runs.
+        self._collects = self._collects or gc.isenabled()
+        gc.disable()
         self._thread = threading.Thread(target=self._write, args=(facts, self._held, self._clock() - started))
         self._thread.start()
 

@@ -244,15 +244,18 @@ def work(
         keeper.after_pass(progress)
         report(progress)
 
-    stopped = run(
-        prepared.render,
-        prepared.spp,
-        width * height,
-        timeout=request.timeout,
-        report=after,
-        interrupted=interrupted,
-    )
-    keeper.end(bool(stopped))
+    try:
+        stopped = run(
+            prepared.render,
+            prepared.spp,
+            width * height,
+            timeout=request.timeout,
+            report=after,
+            interrupted=interrupted,
+        )
+        keeper.end(bool(stopped))
+    finally:
+        keeper.close()
     return stopped, keeper
 
 
