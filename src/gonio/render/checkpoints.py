@@ -11,22 +11,19 @@ import gc
 import hashlib
 import json
 import os
-import platform
 import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._version import __version__
 from ..errors import GonioError, InputError
 from ..models import BSDF, notation
-from ..work import kept
+from ..work import facts, kept
 from ..work.kept import Arrays, Facts
 from .passes import Progress, Renders
 from .request import Request
@@ -39,8 +36,6 @@ MOST_COST = 0.015  # of the time; where writing takes more, it is done less ofte
 LONG = 60.0  # seconds that a job must take for a checkpoint that nobody asked for
 SUFFIX = ".checkpoint"  # beside the picture
 KIND = "render"
-
-_ROOMS = ("models", "ops", "optics", "energy", "render")  # whose code a picture depends on
 
 
 @dataclass(frozen=True)
@@ -62,14 +57,14 @@ class Sources:
 
     @staticmethod
     def of(mi: ModuleType, text: str, files: Mapping[str, Path], how: str) -> Sources:
-        return Sources(text, files, how, f"gonio {__version__}, mitsuba {mi.__version__}", _device(mi))
+        return Sources(text, files, how, facts.versions(), _device(mi))
 
     def identity(self) -> dict[str, str]:
         """A hash or a name of each thing that the picture depends on, by what a person calls it."""
-        found = {"version": self.version, "code of Gonio": _own_code(), "device": self.device}
+        found = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
         found |= {"settings": self.how, "scene": _hash(self.text.encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
-            found[f"file {name}"] = file_hash(path)
+            found[f"file {name}"] = facts.file_hash(path)
         return found
 
 
@@ -77,44 +72,10 @@ def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content, "missing" where there is none."""
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return "missing"
-
-
-@lru_cache
-def _own_code() -> str:
-    """Hash of Gonio's code that a picture depends on: a checkout changes between two versions, too."""
-    package = Path(__file__).parent.parent
-    found = hashlib.sha256()
-    for path in sorted(p for room in _ROOMS for p in (package / room).rglob("*.py")):
-        found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return found.hexdigest()
-
-
 def _device(mi: ModuleType) -> str:
     """What computes: another compiler or another processor may round otherwise."""
-    import drjit as dr
-
     variant = str(mi.variant())
-    if not variant.startswith("llvm"):
-        return variant
-    version = ".".join(map(str, dr.detail.llvm_version()))
-    return f"{variant}, LLVM {version}, {platform.machine()} {_vectors()}".strip()
-
-
-@lru_cache
-def _vectors() -> str:
-    """The vector instructions of this processor, where the system tells."""
-    try:
-        flags = set(Path("/proc/cpuinfo").read_text().partition("flags")[2].partition("\n")[0].split())
-    except OSError:
-        return platform.processor()
-    return " ".join(name for name in ("avx2", "fma", "avx512f") if name in flags)
+    return f"{variant}, {facts.processor()}" if variant.startswith("llvm") else variant
 
 
 # ---------------------------------------------------------------------- a request as JSON
@@ -289,7 +250,7 @@ class Keeper:
     def _begin(self) -> None:
         started = self._clock()
         self._held = self._prepared.render.state()
-        facts = {
+        about = {
             "kind": KIND,
             "done": self._prepared.render.done,
             "wanted": self._prepared.spp,
@@ -301,16 +262,16 @@ class Keeper:
         # there while a kernel is traced here. So none is collected while that thread runs.
         self._collects = self._collects or gc.isenabled()
         gc.disable()
-        self._thread = threading.Thread(target=self._write, args=(facts, self._held, self._clock() - started))
+        self._thread = threading.Thread(target=self._write, args=(about, self._held, self._clock() - started))
         self._thread.start()
 
-    def _write(self, facts: Facts, arrays: Arrays, before: float) -> None:
+    def _write(self, about: Facts, arrays: Arrays, before: float) -> None:
         assert self.path is not None
         began = time.thread_time()
         try:
             if not self._identity:  # here, so that hashing large files costs the render nothing
                 self._identity = self._prepared.sources.identity()
-            kept.write(self.path, {**facts, "identity": self._identity}, arrays, previous=True)
+            kept.write(self.path, {**about, "identity": self._identity}, arrays, previous=True)
             self.written, self.error = True, None
         except GonioError as error:
             self.error = error

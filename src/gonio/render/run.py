@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..errors import InputError, did_you_mean
+from ..work import facts
 from . import checkpoints, denoise, engine, images, mitsuba_scene
 from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
@@ -131,7 +132,7 @@ def _code_of(program: type) -> str:
     if program.__module__.startswith("gonio."):
         return program.__name__
     try:
-        return checkpoints.file_hash(Path(inspect.getsourcefile(program) or ""))
+        return facts.file_hash(Path(inspect.getsourcefile(program) or ""))
     except TypeError:
         return program.__qualname__
 
