@@ -53,10 +53,13 @@ def check_folder(folder: str | Path) -> Path:
     return folder
 
 
-def write_whole(path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True) -> Path:
+def write_whole(
+    path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True, durable: bool = True
+) -> Path:
     """Write a file so that at every moment `path` is the old one or the whole new one.
 
     content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
+    durable  force it to the disk first, so that not even a power cut leaves half of it
     rescue   where it cannot be written, write it to the temporary folder, so that hours of work are not lost
     Raises MachineError where the disk is full, which says where the content is; nothing of it is left beside `path`.
     """
@@ -66,13 +69,15 @@ def write_whole(path: str | Path, content: bytes | Callable[[Path], None], rescu
     try:
         if callable(content):
             content(temporary)
-            with open(temporary, "rb") as file:
-                os.fsync(file.fileno())
+            if durable:
+                with open(temporary, "rb") as file:
+                    os.fsync(file.fileno())
         else:
             with open(temporary, "wb") as file:
                 file.write(content)
                 file.flush()
-                os.fsync(file.fileno())  # a full disk can show itself as late as here
+                if durable:
+                    os.fsync(file.fileno())  # a full disk can show itself as late as here
         os.replace(temporary, target)
     except OSError as error:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

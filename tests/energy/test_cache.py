@@ -102,7 +102,7 @@ def test_two_widths_of_a_material_are_part_of_its_name(folder):
 
 def test_changed_formulas_make_new_tables(folder, monkeypatch):
     cache.remember(("trial", 1), lambda: np.arange(3.0))
-    monkeypatch.setattr(cache, "_formulas", lambda: "other")
+    monkeypatch.setattr(cache, "formulas", lambda: "other")
     assert cache.remember(("trial", 1), lambda: np.ones(1))[0] == 1.0
     assert len(list(folder.glob("trial-*"))) == 2
 
@@ -119,15 +119,15 @@ def test_every_room_that_a_table_depends_on_is_hashed():
 
 
 def test_the_hash_of_formulas_is_kept_until_a_file_changes(folder, monkeypatch):
-    cache._formulas.cache_clear()
-    first = cache._formulas()
+    cache.formulas.cache_clear()
+    first = cache.formulas()
     with monkeypatch.context() as patch:
         patch.setattr(cache, "_meaning", lambda source: never())
-        cache._formulas.cache_clear()
-        assert cache._formulas() == first
+        cache.formulas.cache_clear()
+        assert cache.formulas() == first
     (folder / "formulas.txt").write_text("nonsense")
-    cache._formulas.cache_clear()
-    assert cache._formulas() == first
+    cache.formulas.cache_clear()
+    assert cache.formulas() == first
 
 
 def test_a_distribution_that_changed_in_its_file_makes_new_tables(folder, tmp_path):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gonio.errors import GonioWarning, InputError
 from gonio.render import checkpoints, images, passes, run
-from gonio.work import kept
+from gonio.work import facts, kept
 
 
 @pytest.fixture(autouse=True)
@@ -42,7 +42,7 @@ def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options
 
     def after(progress: passes.Progress) -> None:
         keeper.after_pass(progress)
-        keeper._wait()
+        keeper.close()
         if progress.done == count:
             raise Killed
 
@@ -133,10 +133,10 @@ def test_what_has_changed_is_refused_by_name(scene: Path, tmp_path: Path, monkey
     raw["scene"]["lights"][0]["energy"] = [40, 40, 40]
     file.write_text(json.dumps(raw, indent=1))  # other blanks are no other scene
     with monkeypatch.context() as other:
-        other.setattr(checkpoints, "__version__", "9.9")
+        other.setattr(facts, "__version__", "9.9")
         refused("version: the checkpoint was made with gonio .*, this is gonio 9.9")
     with monkeypatch.context() as other:
-        other.setattr(checkpoints, "_vectors", lambda: "abacus")
+        other.setattr(facts, "_vectors", lambda: "abacus")
         refused("device: .* abacus")
     with pytest.raises(InputError, match=r"settings: .*seed 0.*, this is .*seed 8"):
         go.render(scene, spp=4, seed=8, checkpoint=tmp_path / "c")

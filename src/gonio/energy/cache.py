@@ -13,7 +13,6 @@ import functools
 import hashlib
 import inspect
 import io
-import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -29,16 +28,9 @@ from ..members import Family
 from ..optics.fresnel import Fresnel
 from ..optics.masking import Masking
 from ..optics.ndf import NDF
+from ..work.parts import folder
 
 Kept = TypeVar("Kept")
-
-
-def folder() -> Path:
-    """Where tables are kept."""
-    given = os.environ.get("GONIO_CACHE")
-    if given:
-        return Path(given)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gonio"
 
 
 def content_hash(values: np.ndarray) -> str:
@@ -51,7 +43,7 @@ ROOMS = ("energy", "models", "ops", "optics")  # whose formulas a table depends 
 
 
 @lru_cache
-def _formulas() -> str:
+def formulas() -> str:
     """Hash of what the code of these rooms says, comments and docstrings left out: changed optics make new tables.
 
     Parsing takes a tenth of a second, so the hash is kept for as long as no file changes.
@@ -116,7 +108,7 @@ def origin(*names: str) -> tuple[str, ...]:
 
 def _path(key: tuple) -> tuple[Path, str]:
     """(file, full name) of what `key` names; its first entry says what kind of thing it is."""
-    name = hashlib.sha256((repr(key) + _formulas()).encode()).hexdigest()
+    name = hashlib.sha256((repr(key) + formulas()).encode()).hexdigest()
     return folder() / f"{key[0]}-{name[:32]}.npz", name
 
 

@@ -7,25 +7,23 @@ file that it names, of the settings, of Gonio's own code, and of what computes, 
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import json
 import os
-import platform
 import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._version import __version__
 from ..errors import GonioError, InputError
 from ..models import BSDF, notation
-from ..work import kept
+from ..work import facts, kept
 from ..work.kept import Arrays, Facts
 from .passes import Progress, Renders
 from .request import Request
@@ -38,8 +36,6 @@ MOST_COST = 0.015  # of the time; where writing takes more, it is done less ofte
 LONG = 60.0  # seconds that a job must take for a checkpoint that nobody asked for
 SUFFIX = ".checkpoint"  # beside the picture
 KIND = "render"
-
-_ROOMS = ("models", "ops", "optics", "energy", "render")  # whose code a picture depends on
 
 
 @dataclass(frozen=True)
@@ -61,14 +57,14 @@ class Sources:
 
     @staticmethod
     def of(mi: ModuleType, text: str, files: Mapping[str, Path], how: str) -> Sources:
-        return Sources(text, files, how, f"gonio {__version__}, mitsuba {mi.__version__}", _device(mi))
+        return Sources(text, files, how, facts.versions(), _device(mi))
 
     def identity(self) -> dict[str, str]:
         """A hash or a name of each thing that the picture depends on, by what a person calls it."""
-        found = {"version": self.version, "code of Gonio": _own_code(), "device": self.device}
+        found = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
         found |= {"settings": self.how, "scene": _hash(self.text.encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
-            found[f"file {name}"] = file_hash(path)
+            found[f"file {name}"] = facts.file_hash(path)
         return found
 
 
@@ -76,44 +72,10 @@ def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content, "missing" where there is none."""
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return "missing"
-
-
-@lru_cache
-def _own_code() -> str:
-    """Hash of Gonio's code that a picture depends on: a checkout changes between two versions, too."""
-    package = Path(__file__).parent.parent
-    found = hashlib.sha256()
-    for path in sorted(p for room in _ROOMS for p in (package / room).rglob("*.py")):
-        found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return found.hexdigest()
-
-
 def _device(mi: ModuleType) -> str:
     """What computes: another compiler or another processor may round otherwise."""
-    import drjit as dr
-
     variant = str(mi.variant())
-    if not variant.startswith("llvm"):
-        return variant
-    version = ".".join(map(str, dr.detail.llvm_version()))
-    return f"{variant}, LLVM {version}, {platform.machine()} {_vectors()}".strip()
-
-
-@lru_cache
-def _vectors() -> str:
-    """The vector instructions of this processor, where the system tells."""
-    try:
-        flags = set(Path("/proc/cpuinfo").read_text().partition("flags")[2].partition("\n")[0].split())
-    except OSError:
-        return platform.processor()
-    return " ".join(name for name in ("avx2", "fma", "avx512f") if name in flags)
+    return f"{variant}, {facts.processor()}" if variant.startswith("llvm") else variant
 
 
 # ---------------------------------------------------------------------- a request as JSON
@@ -214,6 +176,7 @@ class Keeper:
     path       the file; None writes nothing
     temporary  nobody asked for the file: it begins only once the job shows to take over `LONG` seconds, and goes when
                the picture is there
+    long       seconds that such a job must take, `LONG` where None
     """
 
     def __init__(
@@ -221,10 +184,12 @@ class Keeper:
         path: Path | None,
         prepared: Prepared,
         temporary: bool = False,
+        long: float | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.path, self._prepared, self._temporary, self._clock = path, prepared, temporary, clock
         self.written = path is not None and kept.exists(path)
+        self._long = LONG if long is None else long
         self.error: GonioError | None = None
         self._began = self._last = clock()
         self._remaining = float("inf")
@@ -232,6 +197,7 @@ class Keeper:
         self._held: Arrays | None = None  # what the thread reads stays alive until this one lets it go
         self._identity: dict[str, str] = {}
         self._cost = 0.0  # seconds that the last one took away from the render
+        self._collects = False  # whether garbage is to be collected again once the thread has ended
         self._request = None if path is None else self._describe()
 
     def _describe(self) -> Facts | None:
@@ -245,41 +211,46 @@ class Keeper:
 
     def _short(self, now: float) -> bool:
         """Whether the job is too short for a file that nobody asked for."""
-        return self._temporary and not self.written and now - self._began + self._remaining < LONG
+        return self._temporary and not self.written and now - self._began + self._remaining < self._long
 
     def after_pass(self, progress: Progress) -> None:
         """Write, where it is time for it."""
         now, self._remaining = self._clock(), progress.remaining
+        if self._thread is not None and not self._thread.is_alive():
+            self.close()
         if self.path is None or now - self._last < max(EVERY, self._cost / MOST_COST) or self._short(now):
             return
-        if self._thread is not None and self._thread.is_alive():
+        if self._thread is not None:
             return
         self._last = now
         self._begin()
 
     def end(self, stopped: bool) -> None:
         """Write what there is, for a render that is to go on later, or to more samples."""
-        self._wait()
+        self.close()
         if self.path is not None and (stopped or not self._temporary) and not self._short(self._clock()):
             self._begin()
-            self._wait()
+            self.close()
 
     def remove(self) -> None:
         """The picture is there: remove the file that nobody asked for."""
-        self._wait()
         if self.path is not None and self._temporary:
             kept.remove(self.path)
             self.written = False
 
-    def _wait(self) -> None:
+    def close(self) -> None:
+        """Wait for what is being written."""
         if self._thread is not None:
             self._thread.join()
         self._thread = self._held = None
+        if self._collects:
+            gc.enable()
+            self._collects = False
 
     def _begin(self) -> None:
         started = self._clock()
         self._held = self._prepared.render.state()
-        facts = {
+        about = {
             "kind": KIND,
             "done": self._prepared.render.done,
             "wanted": self._prepared.spp,
@@ -287,16 +258,20 @@ class Keeper:
             "request": self._request,
             "temporary": self._temporary,
         }
-        self._thread = threading.Thread(target=self._write, args=(facts, self._held, self._clock() - started))
+        # Garbage that Python collects in the other thread may be a scene, and Dr.Jit and Mitsuba crash when one goes
+        # there while a kernel is traced here. So none is collected while that thread runs.
+        self._collects = self._collects or gc.isenabled()
+        gc.disable()
+        self._thread = threading.Thread(target=self._write, args=(about, self._held, self._clock() - started))
         self._thread.start()
 
-    def _write(self, facts: Facts, arrays: Arrays, before: float) -> None:
+    def _write(self, about: Facts, arrays: Arrays, before: float) -> None:
         assert self.path is not None
         began = time.thread_time()
         try:
             if not self._identity:  # here, so that hashing large files costs the render nothing
                 self._identity = self._prepared.sources.identity()
-            kept.write(self.path, {**facts, "identity": self._identity}, arrays, previous=True)
+            kept.write(self.path, {**about, "identity": self._identity}, arrays, previous=True)
             self.written, self.error = True, None
         except GonioError as error:
             self.error = error

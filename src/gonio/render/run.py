@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..errors import InputError, did_you_mean
+from ..work import facts
 from . import checkpoints, denoise, engine, images, mitsuba_scene
 from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
@@ -131,7 +132,7 @@ def _code_of(program: type) -> str:
     if program.__module__.startswith("gonio."):
         return program.__name__
     try:
-        return checkpoints.file_hash(Path(inspect.getsourcefile(program) or ""))
+        return facts.file_hash(Path(inspect.getsourcefile(program) or ""))
     except TypeError:
         return program.__qualname__
 
@@ -219,6 +220,7 @@ def work(
     prepared: Prepared,
     *,
     temporary: Path | None = None,
+    long: float | None = None,
     report: Callable[[Progress], None] = lambda progress: None,
     interrupted: Callable[[], object] = lambda: False,
     tell: Callable[[str], None] = lambda text: None,
@@ -227,6 +229,7 @@ def work(
     of its checkpoints, which is told when the picture is written.
 
     temporary  the checkpoint of a long job whose request names none
+    long       seconds that such a job must take; a minute where None
     tell       called at the start with what was found
     """
     request, (width, height) = prepared.request, prepared.size
@@ -236,21 +239,24 @@ def work(
         found, unasked = checkpoints.earlier(path, prepared, unasked)
         if found:
             tell(found)
-    keeper = Keeper(path, prepared, unasked)
+    keeper = Keeper(path, prepared, unasked, long)
 
     def after(progress: Progress) -> None:
         keeper.after_pass(progress)
         report(progress)
 
-    stopped = run(
-        prepared.render,
-        prepared.spp,
-        width * height,
-        timeout=request.timeout,
-        report=after,
-        interrupted=interrupted,
-    )
-    keeper.end(bool(stopped))
+    try:
+        stopped = run(
+            prepared.render,
+            prepared.spp,
+            width * height,
+            timeout=request.timeout,
+            report=after,
+            interrupted=interrupted,
+        )
+        keeper.end(bool(stopped))
+    finally:
+        keeper.close()
     return stopped, keeper
 
 

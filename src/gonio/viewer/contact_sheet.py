@@ -6,9 +6,12 @@ compiles and the others only render.
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import itertools
 import math
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,10 +20,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import GonioWarning, InputError
 from ..models import notation
 from ..owner import alone
-from ..render import exposures, images, passes, run
+from ..render import checkpoints, exposures, images, passes, run
+from ..work import parts
 from . import figures
 from .figures import Drawing
 
@@ -133,7 +137,8 @@ def study(
         allow_code=allow_code,
     )
     variations = [Variation(path, tuple(values)) for path, values in vary.items()]
-    return render_sheet(request, variations, None if output is None else Path(output), title)
+    tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)
+    return render_sheet(request, variations, None if output is None else Path(output), title, tell=tell)
 
 
 def render_sheet(
@@ -142,10 +147,12 @@ def render_sheet(
     output: Path | None,
     title: str = "",
     report: Callable[[int, int, str], None] = lambda done, total, state: None,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> Sheet:
     """Render every combination and draw the sheet; raises InputError before rendering where it can.
 
     report  called before each picture with pictures done, all pictures, and what is next
+    tell    called at the start with what an earlier run of the same study has left
     """
     started = time.perf_counter()
     if output is not None:
@@ -161,29 +168,46 @@ def render_sheet(
         raise InputError(what, "--vary", "give fewer values")
     cells = tuple(dict(zip(names, combination, strict=True)) for combination in combinations)
     pictures: list[exposures.RGB] = []
-    warnings: dict[str, None] = {}
-    with passes.Interrupts() as interrupts:
+    notices: dict[str, None] = {}
+    whole = sorted(checkpoints.described(request).items()), [(one.path, repr(one.values)) for one in variations]
+    with passes.Interrupts() as interrupts, parts.job("study", *whole) as job:
+        if job.found:
+            tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
         for index, cell in enumerate(cells):
             state = f"{index + 1}/{len(cells)}  " + ", ".join(map(figures.show_value, cell.values()))
             report(index, len(cells), state)
             # Each picture has the same seed, so that what differs is the parameter, not the noise.
             prepared = run.prepare(replace(request, overrides={**request.overrides, **cell}))
-            warnings |= dict.fromkeys(prepared.warnings)
+            notices |= dict.fromkeys(prepared.warnings)
             width, height = prepared.size
-            passes.run(prepared.render, prepared.spp, width * height, interrupted=lambda: interrupts.asked)
-            interrupts.check()
-            pictures.append(run.finished(prepared.render, request.denoise))
-    report(len(cells), len(cells), "drawing")
+            pictures.append(_picture(prepared, job, interrupts))
+        report(len(cells), len(cells), "drawing")
     exposure = exposures.stops(request.exposure, *pictures)
     clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
-    warnings |= dict.fromkeys(filter(None, [clipped]))
+    notices |= dict.fromkeys(filter(None, [clipped]))
     heading = title or _scene_name(request.scene)
     subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {prepared.settings['integrator']}"  # noqa: RUF001
     drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
     if output is not None:
         drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
-    return Sheet(cells, prepared.spp, prepared.size, exposure, seconds, tuple(warnings), drawing)
+    return Sheet(cells, prepared.spp, prepared.size, exposure, seconds, tuple(notices), drawing)
+
+
+def _picture(prepared: run.Prepared, job: parts.Parts, interrupts: passes.Interrupts) -> exposures.RGB:
+    """One picture of a study: as an earlier run has left it, or from where that one was stopped."""
+    key = parts.key_of(sorted(prepared.sources.identity().items()), prepared.spp, prepared.request.denoise)
+    if (found := job.get(key)) is not None:
+        return found.arrays["picture"]
+    begun = job.path(key, ".checkpoint")
+    with contextlib.suppress(OSError):
+        job.open()
+    _, keeper = run.work(prepared, temporary=begun, long=0.0, interrupted=lambda: interrupts.asked)
+    interrupts.check()
+    picture = run.finished(prepared.render, prepared.request.denoise)
+    job.put(key, {"picture": picture})
+    keeper.remove()
+    return picture
 
 
 def _scene_name(scene: Path) -> str:

@@ -44,10 +44,13 @@ class Kept(NamedTuple):
     arrays: Arrays
 
 
-def write(path: Path, facts: Facts, arrays: Mapping[str, NDArray[Any]], previous: bool = False) -> None:
+def write(
+    path: Path, facts: Facts, arrays: Mapping[str, NDArray[Any]], previous: bool = False, durable: bool = True
+) -> None:
     """Write the file; at every moment the old one or the new one is there.
 
     previous  keep the file that was there as NAME.previous
+    durable   force it to the disk
     Raises MachineError where the disk is full, TypeError for an array of another type than a file can have.
     """
     parts = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -68,10 +71,10 @@ def write(path: Path, facts: Facts, arrays: Mapping[str, NDArray[Any]], previous
             file.write(struct.pack("<I", total))
 
     if not previous:
-        files.write_whole(path, fill, rescue=False)
+        files.write_whole(path, fill, rescue=False, durable=durable)
         return
     newest = path.with_name(path.name + ".next")
-    files.write_whole(newest, fill, rescue=False)
+    files.write_whole(newest, fill, rescue=False, durable=durable)
     if path.exists():
         os.replace(path, _previous(path))
     os.replace(newest, path)  # a death just before leaves the one before, under its other name

@@ -43,7 +43,7 @@ def study(
 
     variations = [contact_sheet.parse_variation(text) for text in vary]
     with Bar(scene.name) as bar:
-        sheet = contact_sheet.render_sheet(request, variations, output, title, report=bar.step)
+        sheet = contact_sheet.render_sheet(request, variations, output, title, report=bar.step, tell=bar.tell)
     if as_json:
         print(json.dumps(sheet.as_dict()))
     else:

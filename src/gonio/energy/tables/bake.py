@@ -11,6 +11,7 @@ The axes are in `axes`, files and the homework's pictures in `baked`.
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -18,11 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, did_you_mean
+from ...errors import GonioWarning, InputError, did_you_mean
 from ...models import BSDF
 from ...models.parameters import pair_of
 from ...ops import backend
 from ...optics.ndf import distribution
+from ...work import crew, parts
 from .. import cache
 from ..albedo import albedo, monte_carlo, quadrature
 from ..albedo.directional import check_uniform
@@ -44,6 +46,7 @@ LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
 LARGEST_ROOT = 2.0 / 3.0  # (eta - 1) / (eta + 1) of eta = 5
 SCHEMA = 2
+BLOCK = 1024  # points of a part: a tenth of a second or so, and a second where they are judged
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +58,15 @@ class _Target:
     masking: str
 
     def exact(self, points: Points, fine: bool = False) -> dict[str, np.ndarray]:
-        """E, and dfg of a distribution, by quadrature; `fine` judges the other."""
+        """E, and dfg of a distribution, by quadrature; `fine` judges the other. Done in parts."""
+        shape = np.shape(points.mu)
+        given = [np.broadcast_to(v, shape).ravel() if v is not None else None for v in points]
+        arguments = [(self, *(v if v is None else v[at : at + BLOCK] for v in given), fine) for at in _blocks(shape)]
+        found = _together(_exact, arguments)
+        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in found.items()}
+
+    def at(self, points: Points, fine: bool) -> dict[str, np.ndarray]:
+        """As `exact`, all at once."""
         shape = {"mu": points.mu, "alpha": points.alpha, "alpha_y": points.alpha_y, "phi": points.phi}
         judge = quadrature.JUDGE if points.alpha_y is None else quadrature.TURNED_JUDGE
         nodes = judge if fine else None
@@ -92,6 +103,43 @@ class _Target:
         along_x, along_y = axes.widths(roughness[:, None])
         values = self.exact(Points(*np.broadcast_arrays(x**2, along_x, along_y, phi)), fine)["E"]
         return np.einsum("prm...,m,p->r...", values, 4.0 * w * x**3, share)
+
+
+def _blocks(shape: tuple[int, ...]) -> range:
+    """Where the parts of so many points begin."""
+    return range(0, int(np.prod(shape)), BLOCK)
+
+
+def _exact(
+    asked: _Target, mu: np.ndarray, alpha: np.ndarray, alpha_y: np.ndarray | None, phi: np.ndarray, fine: bool
+) -> dict[str, np.ndarray]:
+    """A part of `_Target.exact`."""
+    return asked.at(Points(mu, alpha, alpha_y, phi), fine)
+
+
+def _power(
+    ndf: str, masking: str, fresnel: str, mu: np.ndarray, alpha: np.ndarray, eta: np.ndarray, fine: bool
+) -> dict[str, np.ndarray]:
+    """A part of `_glass`: reflected and transmitted power."""
+    nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
+    return {"power": np.stack(quadrature.glass(ndf, masking, fresnel, mu, alpha, eta, nodes=nodes), -1)}
+
+
+def _together(function: crew.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
+    """The results of parts, one behind the other."""
+    keys = [parts.key_of(function.__name__, *map(_content, given), cache.formulas()) for given in arguments]
+    done = dict(crew.each(function, arguments, keys))
+    return {name: np.concatenate([done[i][name] for i in range(len(arguments))]) for name in done[0]}
+
+
+def _content(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return value.tobytes()
+    if isinstance(value, _Target):
+        names = (value.ndf, value.masking) + (value.model.microsurface[2:3] if value.model is not None else ())
+        model = None if value.model is None else _describe(value.model)
+        return repr((model, value.ndf, value.masking, cache.origin(*names)))
+    return value
 
 
 def bake(
@@ -187,7 +235,14 @@ def cached(target: str | BSDF, **options: Any) -> Baked:
             raise ValueError("not what was asked for")
         return found
 
-    return cache.keep(key, lambda: bake(target, **options), write, read)
+    def made() -> Baked:
+        with parts.job("bake", text, cache.formulas()) as job:
+            if job.found:
+                notice = f"goes on with a table that was begun: {job.found} parts of it are done"
+                warnings.warn(notice, GonioWarning, stacklevel=5)
+            return bake(target, **options)
+
+    return cache.keep(key, made, write, read)
 
 
 def _sealed(
@@ -349,9 +404,11 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
     def power(dense: bool, fine: bool, step: Any, *index: Any) -> np.ndarray:
         at = axes.at(*index)
         eta = (1.0 + root(step)) / (1.0 - root(step))
-        nodes = quadrature.GLASS_JUDGE if fine else quadrature.GLASS_NODES
-        ratio = 1.0 / eta if dense else eta
-        return np.stack(quadrature.glass(axes.ndf, axes.masking, fresnel, at.mu, at.alpha, ratio, nodes=nodes), -1)
+        given = np.broadcast_arrays(at.mu, at.alpha, 1.0 / eta if dense else eta)
+        shape, flat = given[0].shape, [values.ravel() for values in given]
+        names = (axes.ndf, axes.masking, fresnel)
+        arguments = [(*names, *(values[at : at + BLOCK] for values in flat), fine) for at in _blocks(shape)]
+        return _together(_power, arguments)["power"].reshape(*shape, 2)
 
     arrays: dict[str, np.ndarray] = {"sqrt_f0": root(np.arange(GLASS_STEPS))}
     errors = {}

@@ -43,8 +43,19 @@ class Sums:
         for name, values in known.items():
             if name not in arrays or arrays[name].shape != (lanes,) or arrays[name].dtype != values.dtype:
                 raise ValueError(f"no sums '{name}' of {lanes} lanes")
-        near = [mi.Float64(arrays[f"near{i}"]) for i in range(len(like.near))]
-        return Sums(near, [mi.Float64(arrays[f"far{i}"]) for i in range(len(like.far))], mi.UInt32(arrays["invalid"]))
+
+        def own(values: NDArray[Any]) -> Float:
+            # In memory of Dr.Jit's own: it would take NumPy's as it is, and compile another kernel where that is not
+            # aligned. Times one, which keeps every bit, also the sign of a zero.
+            kind = mi.Float64 if values.dtype == np.float64 else mi.UInt32
+            copied = kind(values) * dr.opaque(kind, 1)
+            dr.eval(copied)
+            return copied
+
+        near = [own(arrays[f"near{i}"]) for i in range(len(like.near))]
+        found = Sums(near, [own(arrays[f"far{i}"]) for i in range(len(like.far))], own(arrays["invalid"]))
+        dr.sync_thread()  # while NumPy's memory is there
+        return found
 
     def add_near(self, values: Sequence[Float]) -> Sums:
         near, invalid = self._add(self.near, values, True)

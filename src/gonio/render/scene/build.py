@@ -55,10 +55,12 @@ class _Builder:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
         shapes: PluginDict = {"type": "merge"}
         for index, shape in enumerate(self.description.shapes):
-            shapes[f"shape{index}"] = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
+            part = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
+            (shapes if isinstance(part, dict) else scene)[f"shape{index}"] = part
         for index, light in enumerate(self.description.lights):
             part = self.light(light, pointer("scene", "lights", index), f"light{index}")
-            (shapes if isinstance(light, schema.AreaLight) else scene)[f"light{index}"] = part
+            plain = isinstance(light, schema.AreaLight) and isinstance(part, dict)
+            (shapes if plain else scene)[f"light{index}"] = part
         # Mitsuba merges the meshes of a scene by itself, and hands them on in an order of chance: with it would go the
         # order of the lights, and every picture. So they are merged here, and sorted.
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []

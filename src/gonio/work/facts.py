@@ -1,0 +1,62 @@
+"""What the bits of a result depend on besides its input: the version and code of Gonio, and what computes."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from .._version import __version__
+
+ROOMS = ("models", "ops", "optics", "energy", "render", "work")  # whose code results depend on
+
+
+def versions() -> str:
+    """Gonio's and those of what it computes with."""
+    return ", ".join([f"gonio {__version__}", *(f"{name} {_version(name)}" for name in ("mitsuba", "drjit"))])
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "none"
+
+
+@lru_cache
+def code() -> str:
+    """Hash of Gonio's code that results depend on: a checkout changes between two versions, too."""
+    package = Path(__file__).parent.parent
+    found = hashlib.sha256()
+    for path in sorted(p for room in ROOMS for p in (package / room).rglob("*.py")):
+        found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return found.hexdigest()
+
+
+def processor() -> str:
+    """The processor as far as rounding goes, and the LLVM that compiles for it."""
+    import drjit as dr
+
+    llvm = ".".join(map(str, dr.detail.llvm_version()))
+    return f"LLVM {llvm}, {platform.machine()} {_vectors()}".strip()
+
+
+@lru_cache
+def _vectors() -> str:
+    """The vector instructions of this processor, where the system tells."""
+    try:
+        flags = set(Path("/proc/cpuinfo").read_text().partition("flags")[2].partition("\n")[0].split())
+    except OSError:
+        return platform.processor()
+    return " ".join(name for name in ("avx2", "fma", "avx512f") if name in flags)
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's content, "missing" where there is none."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return "missing"
