@@ -33,6 +33,9 @@ class Rgl(Format):
     suffixes: ClassVar[tuple[str, ...]] = (".bsdf",)
     writes: ClassVar[str] = "adaptive"
 
+    def fits(self, data: bytes) -> bool:
+        return data.startswith(b"tensor_file")
+
     def read(self, data: bytes, where: str, item: str = "") -> Adaptive:
         if not data.startswith(MAGIC):
             hint = "Zemax's .bsdf is text, and starts with Source or a comment"

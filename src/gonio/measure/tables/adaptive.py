@@ -34,6 +34,7 @@ class Adaptive(Measurement):
     """
 
     name = "adaptive"
+    sums = True
     axes: ClassVar[Mapping[str, str]] = {"phi_i": "azimuth of view, rad", "theta_i": "angle of view, rad"}
 
     def __init__(

@@ -29,6 +29,7 @@ class Angles(Guided, Measurement):
     """
 
     name = "angles"
+    mirrored = True
     axes: ClassVar[Mapping[str, str]] = {
         "theta_i": "angle of the light, rad",
         "theta_r": "angle of view, rad",

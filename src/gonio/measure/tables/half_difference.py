@@ -64,6 +64,16 @@ class HalfDifference(Guided, Measurement):
         """Which cells are not negative."""
         return np.asarray(self.values.min(axis=-1) >= 0.0)
 
+    @cached_property
+    def mirrored(self) -> bool:
+        """Whether phi_d and its opposite have the same values."""
+        return bool(np.allclose(self.values, self.values[:, :, ::-1], rtol=1e-9, atol=0.0))
+
+    @property
+    def reciprocal(self) -> bool:
+        """By its coordinates, over half a turn of phi_d."""
+        return self.turn < 4.0
+
     # ------------------------------------------------------------------ as formulas
 
     @cached_property
