@@ -1,7 +1,7 @@
 """Measured materials: their files (`formats`), their tables (`tables`), and the material that a table is (`materials`).
 
-    table = read("gold.binary")          a table of one kind, with what is known of it
-    write(table, "gold.bsdf")            in another format, found by evaluating it where that one has values
+table = read("gold.binary")                  a table of one kind, with what is known of it
+compare.convert("gold.binary", "gold.bsdf").error    in another format, and how far off that is
 """
 
 from __future__ import annotations
@@ -29,8 +29,13 @@ def parted(file: str) -> tuple[str, str]:
 
 
 def names_table(text: str) -> bool:
-    """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome"."""
-    return bool(by_suffix(parted(text)[0]))
+    """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome".
+
+    Of a format whose files hold several materials, only with one of them: a .npz alone may be anything.
+    """
+    path, item = parted(text)
+    found = by_suffix(path)
+    return bool(found) and (bool(item) or not found[0].several)
 
 
 def format_of(path: Path, data: bytes | None = None) -> Format:

@@ -23,8 +23,8 @@ from .table import Table
 from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Value, Vector, Vector3
 
 __all__ = [
-    "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum",
-    "Table", "Vector", "Vector3", "abs", "atan2", "clamp", "copysign", "cos", "dot", "erf", "exp", "fetch", "floor", "fma",
+    "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum", "Table",
+    "Vector", "Vector3", "abs", "atan2", "clamp", "copysign", "cos", "dot", "erf", "exp", "fetch", "floor", "fma",
     "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log", "lookup", "max_component",
     "maximum", "mean", "minimum", "norm", "normalize", "pi", "pow", "record", "rsqrt", "safe_div", "safe_sqrt",
     "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3", "where",

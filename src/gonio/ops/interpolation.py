@@ -58,9 +58,7 @@ def fetch(table: Table, *places: Scalar) -> tuple[Scalar, ...]:
     For grids whose axes are no plain [0, 1]: angles that wrap, nodes at uneven steps, cumulative sums to search in.
     """
     if any(isinstance(x, graph.Node) for x in places):
-        symbols: list[Array] = [
-            graph.emit("fetch", "float", *places, static=(table, c)) for c in range(table.channels)
-        ]
+        symbols: list[Array] = [graph.emit("fetch", "float", *places, static=(table, c)) for c in range(table.channels)]
         return tuple(symbols)
     if not any(is_drjit(x) for x in places):
         values = fetch_in_numpy(table, *places)

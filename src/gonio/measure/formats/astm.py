@@ -111,13 +111,15 @@ def _grid(rows: Floats, where: str, title: str, source: dict[str, str], nm: Floa
     if count != len(rows) or min(map(len, found)) < 2:
         return None
     place = np.ravel_multi_index(
-        [np.searchsorted(nodes, column) for nodes, column in zip(found, (rows[:, 0], rows[:, 2], between), strict=True)],
+        [
+            np.searchsorted(nodes, column)
+            for nodes, column in zip(found, (rows[:, 0], rows[:, 2], between), strict=True)
+        ],
         tuple(map(len, found)),
     )
     if len(np.unique(place)) != count:
         return None
+    theta_i, theta_r, phi = found
     values = np.empty((int(count), rows.shape[1] - 4))
     values[place] = rows[:, 4:]
-    return Angles(*found, values.reshape(*map(len, found), -1), where, title, source, nm)
-
-
+    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, found), -1), where, title, source, nm)

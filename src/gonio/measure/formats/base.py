@@ -28,6 +28,7 @@ class Format:
     name: ClassVar[str] = ""
     suffixes: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[str] = ""
+    several: ClassVar[bool] = False  # whether a file holds several materials
 
     def fits(self, data: bytes) -> bool:
         """Whether a file of its suffix is its own, where formats share one."""

@@ -27,6 +27,7 @@ class Networks(Format):
 
     name: ClassVar[str] = "networks"
     suffixes: ClassVar[tuple[str, ...]] = (".npz",)
+    several: ClassVar[bool] = True
 
     def items(self, data: bytes, where: str) -> list[str]:
         names = sorted({name.rpartition("/")[0] for name in arrays(data, where) if "/" in name})

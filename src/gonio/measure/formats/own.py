@@ -35,7 +35,9 @@ class Own(Format):
             title = str(manifest.get("title", ""))
             source = {str(key): str(value) for key, value in dict(manifest.get("source", {})).items()}
         except Exception:  # JSON of any shape
-            raise InputError("no manifest of a Gonio table in it", where, "gonio convert IN OUT.gonio writes one") from None
+            raise InputError(
+                "no manifest of a Gonio table in it", where, "gonio convert IN OUT.gonio writes one"
+            ) from None
         if version != VERSION:
             raise InputError(f"version {version} of Gonio's tables, {VERSION} expected", where, "is Gonio up to date?")
         cls = Measurement.family.get(kind, where)

@@ -129,8 +129,8 @@ def albedo(table: Measurement, theta: Floats) -> Floats:
     found = []
     for angle in theta:
         wo = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], (POINTS, 3))
-        wi, pdf = table.draw(backend.vector_of(wo, 3, types), backend.vector_of(lattice, 3, types))
-        wi, pdf = backend.to_numpy(wi, POINTS), backend.to_numpy(pdf, POINTS)
+        drawn = table.draw(backend.vector_of(wo, 3, types), backend.vector_of(lattice, 3, types))
+        wi, pdf = (backend.to_numpy(part, POINTS) for part in drawn)
         kept = (pdf > 0.0) & (wi[:, 2] > 0.0)
         found.append((table.rgb(wo[kept], wi[kept]) / pdf[kept, None]).sum(axis=0) / POINTS)
     return np.array(found)
@@ -193,4 +193,3 @@ def finite(values: NDArray[np.generic], name: str, where: str) -> Floats:
     if bad:
         raise InputError(f"{bad} of {array.size} values of {name} are not finite", where, "the file is damaged")
     return array
-

@@ -138,7 +138,7 @@ def _features(wo: Floats, wi: Floats) -> Floats:
 
 
 def plan() -> Floats:
-    """Directions of a goniometer for an isotropic material, (N, 4): light from 10 to 80 degrees, and views all round."""
+    """Directions of a goniometer for isotropic materials, (N, 4): light from 10 to 80 degrees, views all round."""
     theta_i = np.radians(np.arange(10.0, 81.0, 10.0))
     theta_r = np.radians(np.concatenate([np.arange(0.0, 76.0, 5.0), [79.0]]))
     phi = np.radians(np.arange(-170.0, 181.0, 10.0))

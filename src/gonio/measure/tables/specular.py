@@ -130,10 +130,12 @@ def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Sca
 
 
 def sampled(value: ops.Value, **about: ops.Value) -> Specular:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes; below the horizon the view is raised to it."""
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes, or straight above where those lie too low."""
     theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
     azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
-    radial = np.radians(np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(10.0, 30.0, 1.0), np.arange(30.0, 180.1, 3.0)]))
+    radial = np.radians(
+        np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(10.0, 30.0, 1.0), np.arange(30.0, 180.1, 3.0)])
+    )
     i, a, r = (v.ravel() for v in np.meshgrid(theta_i, azimuth, radial, indexing="ij"))
     along, up, y = np.cos(r), np.sin(r) * np.cos(a), np.sin(r) * np.sin(a)
     wi = np.stack([np.sin(i), 0.0 * i, np.cos(i)], -1)
