@@ -66,7 +66,9 @@ class Material:
 
         text = str(scene)
         head = text.partition("(")[0]
-        if outside.reader_of(head) or not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models()):
+        if outside.reader_of(head) or (
+            not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models())
+        ):
             return notation.named(self.text(text))[0]
         if self.param or self.preset:
             what = "parameters of a material given, and a scene"

@@ -71,7 +71,7 @@ def reader(language: Language, table: Table) -> list[str]:
 
 def fetcher(language: Language, table: Table) -> list[str]:
     """The function that reads one texel, at whole-numbered places; held outside (`gonio.ops.fetch`)."""
-    names, sizes, lines = _head(language, table, "fetch")
+    _, sizes, lines = _head(language, table, "fetch")
     whole = language.type("int")
     places = [f"{whole}(clamp({axis}, 0.0, {count - 1}.0))" for axis, count in sizes.items()]
     return [*lines, f"    return {_texel(language, table, places)};", "}"]

@@ -1,7 +1,7 @@
 """Measured materials: their files (`formats`), their tables (`tables`), and the material that a table is (`materials`).
 
-    table = read("gold.binary")          a table of one kind, with what is known of it
-    write(table, "gold.bsdf")            in another format, found by evaluating it where that one has values
+table = read("gold.binary")                  a table of one kind, with what is known of it
+compare.convert("gold.binary", "gold.bsdf").error    in another format, and how far off that is
 """
 
 from __future__ import annotations
@@ -25,21 +25,29 @@ def suffixes() -> list[str]:
 def parted(file: str) -> tuple[str, str]:
     """File and item of "FILE" or "FILE:ITEM", as files that hold several materials are named."""
     path, colon, item = file.rpartition(":")
-    return (path, item) if colon and by_suffix(path) is not None and by_suffix(file) is None else (file, "")
+    return (path, item) if colon and by_suffix(path) and not by_suffix(file) else (file, "")
 
 
 def names_table(text: str) -> bool:
-    """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome"."""
-    return by_suffix(parted(text)[0]) is not None
+    """Whether a text names a file of measurements by its suffix: "gold.binary", "merl.npz:chrome".
 
-
-def format_of(path: Path) -> Format:
-    """The format of a file, by its suffix. InputError where no format has it."""
+    Of a format whose files hold several materials, only with one of them: a .npz alone may be anything.
+    """
+    path, item = parted(text)
     found = by_suffix(path)
-    if found is None:
+    return bool(found) and (bool(item) or not found[0].several)
+
+
+def format_of(path: Path, data: bytes | None = None) -> Format:
+    """The format of a file, by its suffix, and by its contents where formats share one; InputError where none fits.
+
+    data  None: the file is to be written
+    """
+    found = by_suffix(path)
+    if not found:
         hint = did_you_mean(path.suffix, suffixes())
         raise InputError(f"'{path.suffix}' is no format of measurements", str(path), hint)
-    return found
+    return next((one for one in found if data is not None and one.fits(data)), found[0])
 
 
 def read(file: str | os.PathLike[str], folder: Path | None = None) -> Measurement:
@@ -52,7 +60,7 @@ def read(file: str | os.PathLike[str], folder: Path | None = None) -> Measuremen
     text, item = parted(os.fspath(file))
     path = Path(text).expanduser()
     path = path if folder is None else folder / path
-    kind = format_of(path)
+    format_of(path)
     try:
         about = path.stat()
     except (OSError, ValueError) as error:
@@ -60,7 +68,8 @@ def read(file: str | os.PathLike[str], folder: Path | None = None) -> Measuremen
     key, stamp = (str(path.absolute()), item), (about.st_mtime_ns, about.st_size)
     known = _read.pop(key, None)
     if known is None or known[0] != stamp:
-        known = stamp, kind.read(contents(path), str(path), item)
+        data = contents(path)
+        known = stamp, format_of(path, data).read(data, str(path), item)
     _read[key] = known
     while len(_read) > KEPT:
         _read.pop(next(iter(_read)))

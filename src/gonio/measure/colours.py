@@ -8,6 +8,7 @@ a colour, a linear map, so that colour -> spectrum -> colour changes nothing.
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def _to_rgb(wavelengths: tuple[float, ...]) -> Floats:
     nm = np.array(wavelengths)
     if len(nm) == 1:
         return np.ones((1, 3))
-    fine = np.unique(np.concatenate([np.linspace(a, b, STEPS + 1) for a, b in zip(nm[:-1], nm[1:], strict=True)]))
+    fine = np.unique(np.concatenate([np.linspace(a, b, STEPS + 1) for a, b in pairwise(nm)]))
     hats = np.stack([np.interp(fine, nm, row) for row in np.eye(len(nm))])  # what one measured value stands for
     light = np.interp(fine, np.arange(380.0, 781.0, 10.0), D65, left=0.0, right=0.0)
     width = np.gradient(fine)

@@ -4,9 +4,9 @@
     guide.pdf(wo, wi);  guide.draw(wo, u)
 
 For angles of view from the normal to grazing the luminance is laid over half vectors, in the unit square of
-`tables.adaptive` (sqrt(2 theta_m / pi) and phi_m), times the solid angle of each place: there a narrow lobe has room, and
-hardly moves with the view. Between two angles of view one of both densities is drawn by chance, and
-some samples are cosine's, so that nothing is missed; `pdf` is that mixture's, exactly.
+`tables.adaptive` (sqrt(2 theta_m / pi) and phi_m), times the solid angle of each place: there a narrow lobe has room,
+and hardly moves with the view. Between two angles of view one of both densities is drawn by chance, and some samples
+are cosine's, so that nothing is missed; `pdf` is that mixture's, exactly.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Guide:
         far = v < t
         chosen = row + where(far, 1.0, 0.0)
         v = where(far, ops.safe_div(v, t), ops.safe_div(v - t, 1.0 - t))
-        place = self._warp.sample([(chosen, 1.0)], u.y, u.z)
+        place = self._warp.sample([(chosen, 1.0 + 0.0 * t)], u.y, u.z)
         turn = place.y * ops.pi
         phi = azimuth(wo) + where(v < 0.5, turn, -turn)
         m = direction(place.x * place.x * (0.5 * ops.pi), phi)
@@ -139,5 +139,3 @@ def _per_solid_angle(x: Scalar, m: Direction, wi: Direction) -> Scalar:
     4 (wi.m) for the mirroring."""
     sin = ops.safe_sqrt(m.x * m.x + m.y * m.y)
     return ops.safe_div(1.0, (2.0 * ops.pi**2) * x * sin * (4.0 * ops.abs(dot(wi, m))))
-
-

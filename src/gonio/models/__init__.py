@@ -10,7 +10,21 @@ from .._callable import make_callable
 from ..errors import InputError, did_you_mean
 from .calling import method
 from .material import BSDF, Breach, Microsurface, Preset, never
-from .parameters import Angle, Colour, Number, Parameter, Width, angle, bsdf, choice, file, flag, number, spectrum, width
+from .parameters import (
+    Angle,
+    Colour,
+    Number,
+    Parameter,
+    Width,
+    angle,
+    bsdf,
+    choice,
+    file,
+    flag,
+    number,
+    spectrum,
+    width,
+)
 from .sample import Sample
 
 __all__ = [

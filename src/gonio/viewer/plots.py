@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, notation
+from ..models import BSDF, notation, outside
 from ..owner import alone
 from . import curves, energy_figures, figures, lobes
 from .curves import Curve
@@ -57,6 +57,8 @@ def plot(
 
 def is_tables(text: str | Path) -> bool:
     """Whether this names baked tables, and no material."""
+    if outside.reader_of(str(text)):
+        return False
     return os.sep in str(text) or str(text).endswith(".npz") or Path(text).is_dir()
 
 

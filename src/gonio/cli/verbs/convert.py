@@ -15,22 +15,38 @@ from .base import PICTURES, verb
 
 @verb(PICTURES, place=5)
 def convert(
-    source: Annotated[Path, Argument(metavar="IN", help="A picture: .exr, .hdr, .png or .npz.")],
-    output: Annotated[Path, Argument(metavar="OUT", help="The picture to write, in the format of its suffix.")],
+    source: Annotated[str, Argument(metavar="IN", help="A picture (.exr, .hdr, .png, .npz), or measured values.")],
+    output: Annotated[Path, Argument(metavar="OUT", help="The file to write, in the format of its suffix.")],
     exposure: Exposure = "0",
     as_json: Json = False,
 ) -> None:
-    """Write a picture in another format, and bring it to the screen without rendering it again.
+    """Write a picture, or a measured material, in another format.
+
+    A picture is brought to the screen without rendering it again. Measured values are written as they are where both
+    formats have the same kind of table; else they are resampled, and the error is measured and said.
 
     \b
     Examples:
       gonio convert ball.exr ball.png --exposure -3
       gonio convert ball.exr ball.png --exposure auto
       gonio convert ball.exr ball.hdr
+      gonio convert gold.binary gold.bsdf
     """
+    from ... import measure
+
+    if measure.names_table(source):
+        from ...measure import compare
+
+        made = compare.convert(source, output)
+        if as_json:
+            print(json.dumps(made.as_dict()))
+            return
+        how = "resampled" if made.resampled else "the same values"
+        print(f"{made.path}  {made.size / 1e6:.2f} MB, {made.kind}, {how}: {100.0 * made.error:.2g} % off on average")
+        return
     from ...render import exposures, images
 
-    shown = images.convert(source, output, exposures.parse(exposure))
+    shown = images.convert(Path(source), output, exposures.parse(exposure))
     if as_json:
         print(json.dumps({"output": str(output), "exposure": shown.exposure, "notice": shown.notice}))
         return

@@ -28,6 +28,11 @@ class Format:
     name: ClassVar[str] = ""
     suffixes: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[str] = ""
+    several: ClassVar[bool] = False  # whether a file holds several materials
+
+    def fits(self, data: bytes) -> bool:
+        """Whether a file of its suffix is its own, where formats share one."""
+        return True
 
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:
         """The table in a file's bytes. InputError where they are not one.
@@ -52,10 +57,11 @@ class Format:
 Format.family = Family("format", "gonio.formats", ["gonio.measure.formats"], instances_of(Format), where="FILE")
 
 
-def by_suffix(path: str | Path) -> Format | None:
-    """The format of a file's suffix; None where no format has it."""
+def by_suffix(path: str | Path) -> list[Format]:
+    """The formats of a file's suffix, the one whose own it is first."""
     suffix = Path(path).suffix.lower()
-    return next((f for f in Format.family.all().values() if suffix and suffix in f.suffixes), None)
+    found = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
+    return sorted(found, key=lambda one: one.suffixes.index(suffix))
 
 
 def contents(path: Path, where: str = "") -> bytes:

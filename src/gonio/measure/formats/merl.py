@@ -19,8 +19,8 @@ CELLS = (90, 90)
 class Merl(Format):
     """MERL BRDF: three int32, then red, green and blue planes of float64 over (theta_h, theta_d, phi_d).
 
-    90 x 90 x 180 cells over half a turn of phi_d, or 90 x 90 x 360 over a whole one. Values are f times 1500, 1500 / 1.15
-    and 1500 / 1.66; a negative one marks an invalid cell.
+    90 x 90 x 180 cells over half a turn of phi_d, or 90 x 90 x 360 over a whole one. Values are f times 1500,
+    1500 / 1.15 and 1500 / 1.66; a negative one marks an invalid cell.
     """
 
     name: ClassVar[str] = "merl"

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..tables.adapted import adapted
 from ..tables.adaptive import Adaptive
 from ..tables.base import Measurement
-from ..tables.adapted import adapted
 from .base import Format
 
 MAGIC = b"tensor_file\0"
@@ -33,6 +33,9 @@ class Rgl(Format):
     suffixes: ClassVar[tuple[str, ...]] = (".bsdf",)
     writes: ClassVar[str] = "adaptive"
 
+    def fits(self, data: bytes) -> bool:
+        return data.startswith(b"tensor_file")
+
     def read(self, data: bytes, where: str, item: str = "") -> Adaptive:
         if not data.startswith(MAGIC):
             hint = "Zemax's .bsdf is text, and starts with Source or a comment"
@@ -51,10 +54,8 @@ class Rgl(Format):
         jacobian = bool(fields["jacobian"].ravel()[0]) if fields.get("jacobian", np.ones(1)).size else True
         text = fields.get("description", np.zeros(0, np.uint8))
         title = text.tobytes().decode("utf-8", "replace").strip("\0 \n") if text.dtype == np.uint8 else ""
-        parts = (fields[name] for name in names)
-        return Adaptive(
-            *parts, jacobian, where=where, title=title, source={"format": self.name}, wavelengths=wavelengths
-        )
+        parts = {**{name: fields[name] for name in names[:-1]}, "values": fields[names[-1]]}
+        return Adaptive(parts, jacobian, where, title, {"format": self.name}, wavelengths)
 
     def write(self, table: Measurement) -> bytes:
         assert isinstance(table, Adaptive), "`resampled` made it so"

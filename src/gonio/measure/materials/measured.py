@@ -23,9 +23,29 @@ class Measured(BSDF):
 
     file: str = file("file of measured values; behind a colon which one, of files that hold several")
     breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach("measured values are shown as they are", 10.0, certain=False),
-        "reciprocity": Breach("measured values are shown as they are", 100.0, certain=False),
-        "positivity": Breach("measured values are shown as they are, noise below 0 too", 1e6, certain=False),
+        "energy": Breach(
+            "the measured albedo is over 1, and shown as it is",
+            lambda model: max(1.05 * float(model.table.albedos().max()) - 1.0, 0.0),
+            certain=False,
+        ),
+        "reciprocity": Breach(
+            "measured values are shown as they are", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
+        ),
+        "positivity": Breach(
+            "values below 0 were measured, and are shown; as a share of the largest",
+            lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
+            certain=False,
+        ),
+        "isotropy": Breach(
+            "the table is not its own mirror image, or its place is found by sums that lose digits where a lobe ends",
+            lambda model: 0.0 if model.table.mirrored else 2.0,
+            certain=False,
+        ),
+        "precision": Breach(
+            "the place in a table is found by sums that lose digits where a lobe ends",
+            lambda model: 0.1 if model.table.sums else 0.0,
+            certain=False,
+        ),
     }
 
     def __post_init__(self) -> None:

@@ -45,14 +45,14 @@ def adapted(source: Measurement) -> Adaptive:
     ndf = ndf / float(area(np.zeros(1))[0])  # seen from above, facets are as large as the surface
     sigma = area(theta_m)
     vndf = cosines(theta) * (ndf * weight) / np.maximum(area(theta), 1e-9)[:, None, None]
-    return _filled(source, theta, np.repeat(ndf[None], 2, 0), np.repeat(sigma[None], 2, 0), vndf[None])
+    warp = {"phi_i": np.zeros(1), "theta_i": theta, "vndf": vndf[None]}
+    return _filled(source, {**warp, "ndf": np.repeat(ndf[None], 2, 0), "sigma": np.repeat(sigma[None], 2, 0)})
 
 
-def _filled(source: Measurement, theta: Floats, ndf: Floats, sigma: Floats, vndf: Floats) -> Adaptive:
+def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
     """The table whose values are those of `source` where each node of it stands."""
-    blank = np.ones((1, len(theta), PLACES, PLACES))
-    about = {"title": source.title, "source": source.source}
-    empty = Adaptive(np.zeros(1), theta, ndf, sigma, vndf, blank, np.repeat(blank[:, :, None], 3, axis=2))
+    blank = np.ones((1, len(warp["theta_i"]), PLACES, PLACES))
+    empty = Adaptive({**warp, "luminance": blank, "values": np.repeat(blank[:, :, None], 3, axis=2)})
     wo, wi, factor = empty.nodes()
     lit = (wi[..., 2] > 1e-6) & (wo[..., 2] > 0.0) & (factor > 0.0)
     values = np.zeros((*lit.shape, 3))
@@ -62,5 +62,5 @@ def _filled(source: Measurement, theta: Floats, ndf: Floats, sigma: Floats, vndf
             one[:] = one[tuple(distance_transform_edt(~seen, return_distances=False, return_indices=True))]
     luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
     least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # what is black at a node need not be beside it
-    values, luminance = np.moveaxis(values, -1, 1)[None], (luminance + least)[None]
-    return Adaptive(np.zeros(1), theta, ndf, sigma, vndf, luminance, values, **about)  # type: ignore[arg-type]
+    found = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
+    return Adaptive({**warp, **found}, title=source.title, source=source.source)

@@ -34,17 +34,12 @@ class Adaptive(Measurement):
     """
 
     name = "adaptive"
+    sums = True
     axes: ClassVar[Mapping[str, str]] = {"phi_i": "azimuth of view, rad", "theta_i": "angle of view, rad"}
 
     def __init__(
         self,
-        phi: NDArray[np.generic],
-        theta: NDArray[np.generic],
-        ndf: NDArray[np.generic],
-        sigma: NDArray[np.generic],
-        vndf: NDArray[np.generic],
-        luminance: NDArray[np.generic],
-        values: NDArray[np.generic],
+        arrays: Mapping[str, NDArray[np.generic]],
         jacobian: bool = True,
         where: str = "",
         title: str = "",
@@ -52,11 +47,11 @@ class Adaptive(Measurement):
         wavelengths: Floats | None = None,
     ) -> None:
         super().__init__(title, source, wavelengths)
-        self.phi = axis(phi, "phi_i", where, -np.pi, 2.0 * np.pi)
-        self.theta = axis(theta, "theta_i", where, 0.0, 0.5 * np.pi)
-        parts = {"ndf": ndf, "sigma": sigma, "vndf": vndf, "luminance": luminance, "values": values}
+        self.phi = axis(arrays["phi_i"], "phi_i", where, -np.pi, 2.0 * np.pi)
+        self.theta = axis(arrays["theta_i"], "theta_i", where, 0.0, 0.5 * np.pi)
+        parts = ("ndf", "sigma", "vndf", "luminance", "values")
         self.ndf, self.sigma, self.vndf, self.luminance, self.values = (
-            finite(part, name, where) for name, part in parts.items()
+            finite(arrays[name], name, where) for name in parts
         )
         self.jacobian = bool(jacobian)
         views = (len(self.phi), len(self.theta))
@@ -70,7 +65,11 @@ class Adaptive(Measurement):
             raise InputError(f"the values have shape {self.values.shape}, which does not fit the luminance", where)
         for name, part in (("vndf", self.vndf), ("luminance", self.luminance)):
             if part.min() < -ROUNDING * part.max() or part.max() <= 0.0:
-                raise InputError(f"{name} is a density, and has values from {part.min():.3g} to {part.max():.3g}", where, "the file is damaged")
+                raise InputError(
+                    f"{name} is a density, and has values from {part.min():.3g} to {part.max():.3g}",
+                    where,
+                    "the file is damaged",
+                )
         if self.sigma.min() <= 0.0 or self.ndf.min() < 0.0:
             raise InputError("sigma is not positive, or ndf negative, somewhere", where, "the file is damaged")
 
@@ -210,8 +209,7 @@ class Adaptive(Measurement):
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Adaptive:
-        names = ("phi_i", "theta_i", "ndf", "sigma", "vndf", "luminance", "values")
-        return cls(*(arrays[name] for name in names), bool(arrays["jacobian"].ravel()[0]), **about)
+        return cls(arrays, bool(arrays["jacobian"].ravel()[0]), **about)
 
     @property
     def flaws(self) -> dict[str, float]:
@@ -248,7 +246,8 @@ def bilinear(table: ops.Table, x: Scalar, y: Scalar, slices: Slices | None = Non
     column, row = ops.minimum(floor(at_x), columns - 2.0), ops.minimum(floor(at_y), rows - 2.0)
     tx, ty = at_x - column, at_y - row
     total: list[ops.Value] = [0.0] * table.channels
-    for one, weight in slices or [(None, 1.0)]:
+    whole: list[tuple[Scalar | None, ops.Value]] = [(None, 1.0)]
+    for one, weight in slices or whole:
         for dy, wy in ((0.0, 1.0 - ty), (1.0, ty)):
             for dx, wx in ((0.0, 1.0 - tx), (1.0, tx)):
                 place = (row + dy, column + dx) if one is None else (one, row + dy, column + dx)

@@ -29,6 +29,7 @@ class Angles(Guided, Measurement):
     """
 
     name = "angles"
+    mirrored = True
     axes: ClassVar[Mapping[str, str]] = {
         "theta_i": "angle of the light, rad",
         "theta_r": "angle of view, rad",
@@ -157,5 +158,3 @@ def sampled(value: ops.Value, thetas: int = 46, phis: int = 73, **about: ops.Val
     wo, wi = pairs(theta, theta, phi)
     f = value(wo, wi) / wi[:, 2:]
     return Angles(theta, theta, phi, f.reshape(thetas, thetas, phis, 3), **about)
-
-

@@ -53,7 +53,9 @@ class HalfDifference(Guided, Measurement):
         self.values = finite(values, "the table", where)
         self.turn = float(turn)
         if self.values.ndim != 4 or min(self.values.shape) < 1 or max(self.values.shape[:2]) < 2:
-            raise InputError(f"a table of shape {self.values.shape}, (theta_h, theta_d, phi_d, channel) expected", where)
+            raise InputError(
+                f"a table of shape {self.values.shape}, (theta_h, theta_d, phi_d, channel) expected", where
+            )
         if not min(abs(self.turn - np.pi), abs(self.turn - 2.0 * np.pi)) < 1e-6:
             raise InputError(f"phi_d spans {self.turn:g}, pi or 2 pi expected", where)
         if not np.any(self.valid):
@@ -63,6 +65,16 @@ class HalfDifference(Guided, Measurement):
     def valid(self) -> NDArray[np.bool_]:
         """Which cells are not negative."""
         return np.asarray(self.values.min(axis=-1) >= 0.0)
+
+    @cached_property
+    def mirrored(self) -> bool:
+        """Whether phi_d and its opposite have the same values."""
+        return bool(np.allclose(self.values, self.values[:, :, ::-1], rtol=1e-9, atol=0.0))
+
+    @property
+    def reciprocal(self) -> bool:
+        """By its coordinates, over half a turn of phi_d."""
+        return self.turn < 4.0
 
     # ------------------------------------------------------------------ as formulas
 
@@ -150,12 +162,15 @@ def sampled(
 ) -> HalfDifference:
     """A table of any f cos theta_i (wo, wi) -> (N, 3), found at the middles of the cells.
 
-    A cell whose middle lies below the surface is invalid: -1.
+    A cell whose middle lies below the surface is invalid: -1. Half a turn of phi_d holds one value for a pair and its
+    exchange: the mean of both.
     """
     wo, wi = centres(shape, turn)
     lowest = np.minimum(wo[:, 2], wi[:, 2])
     values = np.full((len(wo), 3), -1.0)
     lit = lowest > 1e-9
-    found = value(wo[lit], wi[lit])
-    values[lit] = np.maximum(found, 0.0) / wi[lit, 2:]
+    found = value(wo[lit], wi[lit]) / wi[lit, 2:]
+    if turn < 4.0:
+        found = 0.5 * (found + value(wi[lit], wo[lit]) / wo[lit, 2:])
+    values[lit] = np.maximum(found, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)

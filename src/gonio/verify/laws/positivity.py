@@ -44,6 +44,7 @@ class Positivity(Law):
             reason="a single one is one too many",
             notes=[f"{len(variants)} settings: the given one and the ends of each range"],
         )
+        declared = "positivity" in subject.breaches  # measured noise about 0: its size is a share of the largest value
         checked = 0
         for changes, together in _batches(subject, variants, len(wo)):
             many_o, many_i, many_u = (np.tile(part, (len(changes), 1)) for part in (wo, wi, u))
@@ -52,6 +53,10 @@ class Positivity(Law):
                     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
                     wrong = ~np.isfinite(values) | (values < (-NEGATIVE * largest if what != "wi" else -np.inf))
                     checked += values.size
+                    if declared and what in ("eval", "weight") and np.isfinite(values).all():
+                        finding.figure += int(wrong.sum())
+                        finding.breach = max(finding.breach or 0.0, float(-values.min(initial=0.0) / (largest or 1.0)))
+                        continue
                     if not wrong.any():
                         continue
                     finding.figure += int(wrong.sum())

@@ -1,0 +1,106 @@
+"""How far two tables lie apart, and a table in another format."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import files
+from ..errors import InputError
+from ..ops import backend
+from . import format_of, read
+from .tables.base import Floats, Measurement
+
+PAIRS = 1 << 16
+GRAZING = 0.03  # least cosine of view: within 1.7 degrees of the horizon every format extrapolates
+
+
+def difference(table: Measurement, other: Measurement, pairs: int = PAIRS, seed: int = 1) -> float:
+    """E |other - table| / E |table| of f cos theta_i, over views of even cosine and all light, mean of the channels.
+
+    The pairs are drawn by both tables' densities and by the cosine, a third each, so that narrow lobes count for what
+    they carry; each is weighed by the inverse of the mixture's density. By 65,536 pairs the figure is known to a few %.
+    """
+    rng = np.random.default_rng([seed, 83])
+    types = backend.types("float64")
+    mu, phi = rng.uniform(GRAZING, 1.0, pairs), rng.uniform(0.0, 2.0 * np.pi, pairs)
+    sin = np.sqrt(1.0 - mu * mu)
+    wo = np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], -1)
+    u = rng.random((pairs, 3))
+    radius, turn = np.sqrt(u[:, 1]), 2.0 * np.pi * u[:, 2]
+    wi = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1.0 - u[:, 1])], -1)
+    third = np.arange(pairs) % 3
+    for index, one in enumerate((table, other), 1):
+        drawn, _ = one.draw(*(backend.vector_of(v[third == index], 3, types) for v in (wo, u)))
+        wi[third == index] = backend.to_numpy(drawn, int((third == index).sum()))
+    kept = wi[:, 2] > 1e-6
+    wo, wi = wo[kept], wi[kept]
+    density = wi[:, 2] / np.pi
+    for one in (table, other):
+        density = density + backend.to_numpy(
+            one.pdf(backend.vector_of(wo, 3, types), backend.vector_of(wi, 3, types)), len(wo)
+        )
+    a, b = table.rgb(wo, wi), other.rgb(wo, wi)
+    whole = float((np.abs(a).mean(axis=1) / density).sum())
+    return float((np.abs(a - b).mean(axis=1) / density).sum()) / whole if whole > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A table in another format.
+
+    path       the file
+    kind       of table in it
+    resampled  whether its values were found by evaluating the other; else they are the same numbers
+    error      how far it lies from the source, see `difference`
+    size       bytes
+    """
+
+    path: Path
+    kind: str
+    resampled: bool
+    error: float
+    size: int
+
+    def as_dict(self) -> dict[str, object]:
+        return {**vars(self), "path": str(self.path), "output": str(self.path)}
+
+
+def convert(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> Converted:
+    """Write a table in the format of another suffix; its error is measured on the file as it was written.
+
+    Raises InputError where the source cannot be read, or the format cannot be written.
+    """
+    table, path = read(source), Path(output)
+    target = files.check_file(path)
+    kind = format_of(path)
+    if not kind.writes:
+        raise InputError(f"{kind.name} files cannot be written", str(path), "choose another suffix, such as .gonio")
+    if not table.isotropic and kind.writes not in (table.name, "any"):
+        hint = ".bsdf and .gonio keep what it is"
+        raise InputError(f"{kind.name} files hold isotropic materials, this one is not", str(path), hint)
+    resampled = kind.resampled(table)
+    data = kind.write(resampled)
+    error = difference(table, kind.read(data, str(path)))
+    files.write_whole(target, data)
+    return Converted(path, resampled.name, resampled is not table, error, len(data))
+
+
+def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
+    """f of pairs, and of the same pairs exchanged."""
+    return table.rgb(wo, wi) / wi[:, 2:], table.rgb(wi, wo) / wo[:, 2:]
+
+
+def asymmetry(table: Measurement, pairs: int = 1 << 14) -> float:
+    """E |f(wo, wi) - f(wi, wo)| / E f over pairs by the cosine: 0 where reciprocity holds."""
+    rng = np.random.default_rng([1, 84])
+    u, v = rng.random((2, pairs)), rng.random((2, pairs)) * 2.0 * np.pi
+    wo, wi = (
+        np.stack([np.sqrt(a) * np.cos(b), np.sqrt(a) * np.sin(b), np.sqrt(1.0 - a)], -1)
+        for a, b in zip(u, v, strict=True)
+    )
+    there, back = _swapped(table, wo, wi)
+    return float(np.abs(there - back).mean() / max(float(np.abs(there).mean()), 1e-300))

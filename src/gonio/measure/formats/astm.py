@@ -1,0 +1,125 @@
+"""ASTM E1392 text files: a list of angles and values, the common ground of scatterometers."""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from ..tables.angles import Angles
+from ..tables.base import Floats, Measurement
+from ..tables.samples import Samples, sampled
+from .base import Format
+from .text import lines, table, written
+
+ANGLES = ["theta_i", "phi_i", "theta_s", "phi_s"]
+
+
+class Astm(Format):
+    """ASTM E1392: a head of keywords, ended by VARS, then rows of numbers with commas between them.
+
+    Read as published: NUM_POINTS, where it stands, counts the rows; VARS names the columns, four angles in radians
+    (theta_i, phi_i, theta_s, phi_s) and a value each for red, green and blue (R, G, B), one channel, or wavelengths
+    ("550nm"). Where the rows are a whole grid over (theta_i, theta_s, |phi|), they are read as one.
+    """
+
+    name: ClassVar[str] = "astm"
+    suffixes: ClassVar[tuple[str, ...]] = (".astm",)
+    writes: ClassVar[str] = "samples"
+
+    def read(self, data: bytes, where: str, item: str = "") -> Measurement:
+        rows: list[tuple[int, list[str]]] = []
+        head: dict[str, str] = {}
+        columns: list[str] = []
+        for number, line in enumerate(lines(data, where), 1):
+            text = line.strip()
+            if not text or text.startswith("#"):
+                continue
+            if columns:
+                rows.append((number, [word.strip() for word in text.rstrip(",").split(",")]))
+                continue
+            word, _, rest = (part.strip() for part in re.sub(r"[=\s]", " ", text, count=1).partition(" "))
+            if word.upper() == "VARS":
+                columns = [name.strip() for name in rest.lstrip("= ").split(",")]
+                if len(columns) < 5 or [_plain(name) for name in columns[:4]] != [_plain(name) for name in ANGLES]:
+                    what = f"VARS names {', '.join(columns[:6])}; four angles and a value expected"
+                    raise InputError(what, f"{where}:{number}", f"such as VARS={','.join(ANGLES)},R,G,B")
+            elif len(head) < 64:
+                head[word[:80]] = rest.lstrip("= ")[:400]
+        if not columns:
+            raise InputError("no line of VARS", where, "this is no ASTM E1392 file")
+        values = table(rows, len(columns), where)
+        claimed = next((text for key, text in head.items() if key.upper() == "NUM_POINTS"), "")
+        if claimed and (not claimed.isdigit() or int(claimed) != len(values)):
+            raise InputError(f"NUM_POINTS says {claimed[:20]}, {len(values)} rows follow", where, "the file is damaged")
+        nm = _wavelengths(columns[4:], where)
+        if nm is None and len(columns) not in (5, 7):
+            what = f"{len(columns) - 4} values a row without wavelengths, 1 or 3 expected"
+            raise InputError(what, where, "name the columns 550nm and so on")
+        source = {"format": self.name, **head}
+        values[:, [0, 2]] = np.abs(values[:, [0, 2]])
+        grid = _grid(values, where, head.get("TITLE", ""), source, nm)
+        return grid or Samples(values[:, :4], values[:, 4:], where, head.get("TITLE", ""), source, nm)
+
+    def write(self, table: Measurement) -> bytes:
+        if isinstance(table, Angles):
+            i, r, p = (a.ravel() for a in np.meshgrid(table.theta_i, table.theta_r, table.phi, indexing="ij"))
+            directions, values = np.stack([i, 0.0 * i, r, p], -1), table.values.reshape(len(i), -1)
+        else:
+            assert isinstance(table, Samples), "`resampled` made it so"
+            directions, values = table.directions, table.values
+        if table.wavelengths is not None:
+            names = [f"{nm:.17g}nm" for nm in table.wavelengths]
+        else:
+            names = ["R", "G", "B"] if values.shape[1] == 3 else ["BRDF"]
+        title = table.title.replace("\n", " ")
+        head = f"TITLE {title or '-'}\nNUM_POINTS {len(values)}\nVARS={','.join([*ANGLES, *names])}\n"
+        return (head + written(np.concatenate([directions, values], axis=1), ",")).encode()
+
+    def resampled(self, source: Measurement) -> Measurement:
+        """Samples and grids themselves; else values at the directions of a goniometer's plan."""
+        if isinstance(source, Samples | Angles):
+            return source
+        return sampled(source.rgb, title=source.title, source=source.source)
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace(" ", "").replace("_", "").replace("thetar", "thetas").replace("phir", "phis")
+
+
+def _wavelengths(names: list[str], where: str) -> Floats | None:
+    """What columns named "550nm" stand for; None where none is named so."""
+    found = [re.fullmatch(r"([0-9.eE+]+) *nm", name.strip()) for name in names]
+    if not any(found):
+        return None
+    try:
+        nm = np.array([float(one[1]) if one else np.nan for one in found])
+    except ValueError:
+        nm = np.full(1, np.nan)
+    if not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0.0):
+        raise InputError("the columns' wavelengths do not increase", where)
+    return nm
+
+
+def _grid(rows: Floats, where: str, title: str, source: dict[str, str], nm: Floats | None) -> Angles | None:
+    """The rows as a table, where they are a whole grid with |phi| from 0 to pi."""
+    between = np.abs((rows[:, 3] - rows[:, 1] + np.pi) % (2.0 * np.pi) - np.pi)
+    found = [np.unique(column) for column in (rows[:, 0], rows[:, 2], between)]
+    count = np.prod([len(nodes) for nodes in found])
+    if count != len(rows) or min(map(len, found)) < 2:
+        return None
+    place = np.ravel_multi_index(
+        [
+            np.searchsorted(nodes, column)
+            for nodes, column in zip(found, (rows[:, 0], rows[:, 2], between), strict=True)
+        ],
+        tuple(map(len, found)),
+    )
+    if len(np.unique(place)) != count:
+        return None
+    theta_i, theta_r, phi = found
+    values = np.empty((int(count), rows.shape[1] - 4))
+    values[place] = rows[:, 4:]
+    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, found), -1), where, title, source, nm)

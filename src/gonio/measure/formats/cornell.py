@@ -1,0 +1,79 @@
+"""Cornell's text files of gonioreflectometer measurements, as pbrt-v2 ships them."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from .. import colours
+from ..tables.base import Measurement
+from ..tables.samples import Samples, sampled
+from .base import Format
+from .text import lines, numbers, written
+
+WAVELENGTHS = np.arange(400.0, 701.0, 10.0)  # nm, of the Cornell paints; what colours are written at
+
+
+class Cornell(Format):
+    """Cornell text: the number of wavelengths, the wavelengths [nm], then a sample a row.
+
+    A sample is theta_i, phi_i, theta_r, phi_r in radians and a value for each wavelength. Lines that start with # are
+    comments, the first of them the title.
+    """
+
+    name: ClassVar[str] = "cornell"
+    suffixes: ClassVar[tuple[str, ...]] = (".brdf",)
+    writes: ClassVar[str] = "samples"
+
+    def read(self, data: bytes, where: str, item: str = "") -> Samples:
+        comments, words = [], []
+        for number, line in enumerate(lines(data, where), 1):
+            if line.lstrip().startswith("#"):
+                comments.append(line.strip("# \t"))
+            else:
+                words += [(number, word) for word in line.split()]
+        if not words:
+            raise InputError("no numbers in it", where)
+        count = numbers([words[0][1]], where, words[0][0])[0]
+        if count != int(count) or not 1 <= count <= len(words):
+            raise InputError(f"{count:g} wavelengths, in a file of {len(words)} numbers", f"{where}:{words[0][0]}")
+        channels = int(count)
+        width = 4 + channels
+        rest = len(words) - 1 - channels
+        if rest <= 0 or rest % width:
+            what = f"{max(rest, 0)} numbers follow {channels} wavelengths, a multiple of {width} expected"
+            raise InputError(what, where, "the file is truncated, or its count of wavelengths is wrong")
+        try:
+            values = np.array([word for _, word in words[1:]], np.float64)
+        except ValueError:
+            values = np.full(1, np.nan)
+        if not np.all(np.isfinite(values)):
+            for number, word in words:
+                numbers([word], where, number)
+        nm = values[:channels]
+        if np.any(np.diff(nm) <= 0.0) or nm[0] <= 0.0:
+            raise InputError("the wavelengths do not increase", where)
+        rows = values[channels:].reshape(-1, width)
+        about = {"format": self.name, "comments": "\n".join(filter(None, comments))[:2000]}
+        title = " ".join(filter(None, comments[1:3])) or (comments[0] if comments else "")
+        return Samples(rows[:, :4], rows[:, 4:], where, title, about, nm)
+
+    def write(self, table: Measurement) -> bytes:
+        assert isinstance(table, Samples), "`resampled` made it so"
+        nm, values = table.wavelengths, table.values
+        if nm is None:  # three channels, or one: the smoothest spectra that look so
+            nm = WAVELENGTHS
+            values = np.repeat(values, 3, 1) if values.shape[1] == 1 else values
+            values = values @ colours.to_spectrum(nm)
+        title = table.title.replace("\n", " ")
+        head = f"# written by Gonio\n# {title}\n# num wls\n{len(nm)}\n\n# wls\n{' '.join(f'{x:.17g}' for x in nm)}\n\n"
+        head += "# theta i, phi i, theta s, phi_s, spectral sample values\n\n"
+        return (head + written(np.concatenate([table.directions, values], axis=1))).encode()
+
+    def resampled(self, source: Measurement) -> Measurement:
+        """The samples themselves; else values at the directions of a goniometer's plan."""
+        if isinstance(source, Samples):
+            return source
+        return sampled(source.rgb, title=source.title, source=source.source)

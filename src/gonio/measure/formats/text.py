@@ -1,0 +1,60 @@
+"""Reading numbers from text, strictly."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+
+LONGEST = 1 << 20  # letters of a line
+
+
+def lines(data: bytes, where: str) -> list[str]:
+    """The lines of a text file, without ends of lines; InputError where it is no text."""
+    if b"\0" in data:
+        raise InputError("no text: it has bytes of 0 in it", where)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")  # comments of an older age; numbers are the same
+    found = text.splitlines()
+    if any(len(line) > LONGEST for line in found):
+        raise InputError(f"a line of more than {LONGEST} letters", where)
+    return found
+
+
+def numbers(words: list[str], where: str, line: int) -> list[float]:
+    """Words as finite numbers."""
+    found = []
+    for word in words:
+        try:
+            number = float(word)
+        except ValueError:
+            raise InputError(f"'{word[:40]}' given, a number expected", f"{where}:{line}") from None
+        if not math.isfinite(number):
+            raise InputError(f"'{word[:40]}' given, a finite number expected", f"{where}:{line}")
+        found.append(number)
+    return found
+
+
+def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[np.float64]:
+    """Rows of `width` numbers each, (N, width); rows come with their lines."""
+    for line, row in rows:
+        if len(row) != width:
+            raise InputError(f"{len(row)} numbers in a row, {width} expected", f"{where}:{line}")
+    try:
+        values = np.array([row for _, row in rows], dtype=np.float64)
+    except ValueError:
+        values = np.full((1, 1), np.nan)
+    if not np.all(np.isfinite(values)):
+        for line, row in rows:
+            numbers(row, where, line)
+    return values.reshape(-1, width)
+
+
+def written(values: NDArray[np.float64], separator: str = " ") -> str:
+    """Rows of numbers with as many digits as float64 has."""
+    return "\n".join(separator.join(f"{x:.17g}" for x in row) for row in values) + "\n"

@@ -1,0 +1,142 @@
+"""Zemax's tabular BSDF, the data interchange format of Radiant Imaging: text."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from .. import colours
+from ..tables.base import Floats, Measurement, in_rgb
+from ..tables.specular import Specular, sampled
+from .base import Format
+from .text import lines, numbers, table, written
+
+AXES = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+BLOCKS = {"monochrome": ("Monochrome",), "xyz": ("TristimulusX", "TristimulusY", "TristimulusZ")}
+MOST = 100_000  # nodes of an axis that are believed before they are counted
+
+
+class Zemax(Format):
+    """Zemax BSDF: a head of keywords with the axes in degrees, then a block of values for each channel.
+
+    The view's angles are about the mirror direction: ScatterRadial from it, ScatterAzimuth around it, 0 toward the
+    normal. A block is, for each AngleOfIncidence, a line "TIS x" and a row of radial values for each azimuth, 1/sr.
+    BRDF of one SampleRotation, Monochrome or XYZ; anisotropic samples (several rotations) and BTDF are refused.
+    """
+
+    name: ClassVar[str] = "zemax"
+    suffixes: ClassVar[tuple[str, ...]] = (".zbsdf", ".bsdf")
+    writes: ClassVar[str] = "specular"
+
+    def fits(self, data: bytes) -> bool:
+        return not data.startswith(b"tensor_file")
+
+    def read(self, data: bytes, where: str, item: str = "") -> Specular:
+        rows = [(n, line.strip()) for n, line in enumerate(lines(data, where), 1)]
+        comments = [line.strip("# ") for _, line in rows if line.startswith("#")]
+        rest = iter([(n, line) for n, line in rows if line and not line.startswith("#")])
+
+        def following(what: str) -> tuple[int, str]:
+            found = next(rest, None)
+            if found is None:
+                raise InputError(f"the file ends where {what} is expected", where, "the file is truncated")
+            return found
+
+        head: dict[str, str] = {}
+        axes: dict[str, Floats] = {}
+        while len(axes) < len(AXES):
+            number, line = following(f"'{AXES[len(axes)]}'")
+            word, _, value = line.partition(" " if " " in line else "\t")
+            if word in AXES:
+                claimed = numbers([value], where, number)[0]
+                if claimed != int(claimed) or not 1 <= claimed <= MOST:
+                    raise InputError(f"{word} {value.strip()[:20]}, a count from 1 expected", f"{where}:{number}")
+                angles: list[float] = []
+                while len(angles) < claimed:
+                    number, line = following(f"{claimed:g} angles of {word}")
+                    angles += numbers(line.split(), where, number)
+                if len(angles) != claimed:
+                    what = f"{len(angles)} angles of {word}, {claimed:g} expected"
+                    raise InputError(what, f"{where}:{number}")
+                axes[word] = np.radians(angles)
+            elif len(head) < 32 and word:
+                head[word[:80]] = value.strip()[:400]
+            else:
+                raise InputError("no list of angles where one is expected", f"{where}:{number}")
+        for word in AXES:
+            if word not in axes:
+                raise InputError(f"no axis {word}", where)
+        if head.get("ScatterType", "BRDF").upper() != "BRDF":
+            raise InputError(f"ScatterType {head['ScatterType'][:20]}, BRDF expected", where, "reflection only")
+        if len(axes["SampleRotation"]) != 1:
+            raise InputError(f"{len(axes['SampleRotation'])} sample rotations, one expected", where, "isotropic only")
+        blocks = BLOCKS.get(head.get("SpectralContent", "Monochrome").lower())
+        if blocks is None:
+            raise InputError(f"SpectralContent {head['SpectralContent'][:20]}, Monochrome or XYZ expected", where)
+        i, a, r = (len(axes[word]) for word in AXES[1:])
+        channels = []
+        for block in blocks:
+            for word in (block, "DataBegin"):
+                number, line = following(f"'{word}'")
+                if line.split()[0].lower() != word.lower():
+                    raise InputError(f"'{line[:40]}' where '{word}' is expected", f"{where}:{number}")
+            values = []
+            for _ in range(i):
+                number, line = following("'TIS'")
+                if line.split()[0].upper() != "TIS":
+                    raise InputError(f"'{line[:40]}' where 'TIS' is expected", f"{where}:{number}")
+                numbers(line.split()[1:2], where, number)
+                found = [following(f"{a} rows of azimuth") for _ in range(a)]
+                values.append(table([(n, line.split()) for n, line in found], r, where))
+            number, line = following("'DataEnd'")
+            if line.lower() != "dataend":
+                raise InputError(f"'{line[:40]}' where 'DataEnd' is expected", f"{where}:{number}", "too many rows?")
+            channels.append(np.stack(values))
+        if (left := next(rest, None)) is not None:
+            raise InputError(f"'{left[1][:40]}' after the end of the data", f"{where}:{left[0]}")
+        whole = np.stack(channels, -1)
+        if len(channels) == 3:
+            whole = whole @ colours.XYZ_TO_RGB.T
+        title = next((text.partition(":")[2].strip() for text in comments if text.lower().startswith("model")), "")
+        return Specular(
+            axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"], whole, where,
+            title or (comments[0] if comments else ""), {"format": self.name, **head},
+        )  # fmt: skip
+
+    def write(self, table: Measurement) -> bytes:
+        assert isinstance(table, Specular), "`resampled` made it so"
+        values = in_rgb(table.values, table.wavelengths)
+        grey = table.values.shape[-1] == 1
+        content, blocks = ("Monochrome", BLOCKS["monochrome"]) if grey else ("XYZ", BLOCKS["xyz"])
+        values = values[..., :1] if grey else values @ np.linalg.inv(colours.XYZ_TO_RGB).T
+        symmetry = "ASymmetrical" if table.azimuth[-1] > 1.5 * np.pi else "PlaneSymmetrical"
+        axes = (np.zeros(1), table.theta_i, table.azimuth, table.radial)
+        parts = [f"#Written by Gonio\n#Model: {table.title.replace(chr(10), ' ')}\nSource  Measured\n"]
+        parts.append(f"Symmetry  {symmetry}\nSpectralContent  {content}\nScatterType  BRDF\n")
+        for word, nodes in zip(AXES, axes, strict=True):
+            parts.append(f"{word} {len(nodes)}\n" + written(np.degrees(nodes)[None]))
+        shares = scattered(table)
+        for channel, block in enumerate(blocks):
+            parts.append(f"\n{block}\nDataBegin\n")
+            for view, share in zip(values[..., channel], shares, strict=True):
+                parts.append(f"TIS {share:.6g}\n" + written(view))
+            parts.append("DataEnd\n")
+        return "".join(parts).encode()
+
+    def resampled(self, source: Measurement) -> Measurement:
+        """The table itself where it is about the mirror direction; else its nodes filled."""
+        return source if isinstance(source, Specular) else sampled(source.rgb, title=source.title, source=source.source)
+
+
+def scattered(table: Specular) -> list[float]:
+    """The total integrated scatter of each angle of light, int f cos theta_r d omega_r, in luminance."""
+    rng = np.random.default_rng(1)
+    u, v = (np.arange(4096) + 0.5) / 4096, rng.random(4096)
+    wo = np.stack([np.sqrt(u) * np.cos(2 * np.pi * v), np.sqrt(u) * np.sin(2 * np.pi * v), np.sqrt(1.0 - u)], -1)
+    found = []
+    for angle in np.minimum(table.theta_i, np.radians(89.9)):
+        wi = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], wo.shape)
+        found.append(float(np.mean(table.rgb(wo, wi) @ colours.LUMINANCE) * np.pi / np.cos(angle)))
+    return found

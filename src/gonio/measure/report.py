@@ -1,0 +1,75 @@
+"""What is known of a file of measurements: `gonio info`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from . import format_of, parted, read
+from .compare import asymmetry
+from .formats.base import contents
+from .tables.base import ANGLES
+
+
+def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
+    """What a file holds: format, kind, dimensions, ranges, flaws, albedo over the angle of view, reciprocity.
+
+    Of a file with several materials, none of which is named, their names alone ("items").
+    Raises InputError as `read` does.
+    """
+    text, item = parted(os.fspath(file))
+    path = Path(text).expanduser()
+    if not item:
+        data = contents(path)
+        items = format_of(path, data).items(data, str(path))
+        if len(items) > 1:
+            return {"path": str(path), "format": format_of(path, data).name, "items": items}
+    table = read(file)
+    albedo = table.albedos()
+    low, high = table.range
+    return {
+        "path": os.fspath(file),
+        "format": table.source.get("format", ""),
+        "kind": table.name,
+        "title": table.title,
+        "dimensions": table.shape,
+        "isotropic": table.isotropic,
+        "wavelengths": None if table.wavelengths is None else [float(nm) for nm in table.wavelengths],
+        "range": [low, high],
+        "flaws": table.flaws,
+        "albedo": {
+            "angles": [float(angle) for angle in ANGLES],
+            "rgb": [[float(x) for x in row] for row in albedo],
+            "highest": float(albedo.max()),
+        },
+        "reciprocity": asymmetry(table),
+        "source": {key: value for key, value in table.source.items() if key != "format"},
+    }
+
+
+def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
+    """The same in words, (what, value) each."""
+    if "items" in about:
+        return [("format", about["format"]), ("holds", ", ".join(about["items"]))]
+    nm = about["wavelengths"]
+    channels = "red, green, blue" if nm is None else f"{len(nm)} wavelengths, {nm[0]:g} to {nm[-1]:g} nm"
+    low, high = about["range"]
+    found = [
+        ("format", f"{about['format']}, a table of kind {about['kind']}"),
+        ("title", about["title"]),
+        ("dimensions", " x ".join(f"{count} {axis}" for axis, count in about["dimensions"].items())),
+        ("channels", channels),
+        ("directions", "isotropic" if about["isotropic"] else "anisotropic"),
+        ("values", f"{low:.5g} to {high:.5g}"),
+    ]
+    for flaw, share in about["flaws"].items():
+        found.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
+    for angle, row in zip(about["albedo"]["angles"], about["albedo"]["rgb"], strict=True):
+        found.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
+    highest = about["albedo"]["highest"]
+    found.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
+    found.append(
+        ("reciprocity", f"exchanging both directions changes f by {100.0 * about['reciprocity']:.3g} % on average")
+    )
+    return [(what, text) for what, text in found if text]

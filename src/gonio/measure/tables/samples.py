@@ -1,0 +1,159 @@
+"""Values at scattered pairs of directions, as a gonioreflectometer visits them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RBFInterpolator
+
+from ... import ops
+from ...errors import InputError
+from ...ops import Direction, Spectrum
+from .base import Floats, Measurement, finite, in_rgb
+from .guided import Guided
+from .half_difference import HalfDifference, centres
+
+CELLS = (45, 30, 30)  # of the table that stands for the samples
+NEIGHBOURS = 24  # samples that a cell is found from
+DARK = 1e-3  # of the median value: below it differences are differences, above it ratios
+SAME = 1e-6  # samples nearer to each other than this, in the features, are one measured twice
+
+
+class Samples(Guided, Measurement):
+    """f at pairs of directions (theta_i, phi_i, theta_r, phi_r), in no order.
+
+    Between them f is interpolated linearly over the distance in theta_h by its square root, theta_d and phi_d, among
+    the 24 nearest samples, of the logarithm of the values: once, at the middles of a half-difference table, which is
+    evaluated from then on. The mirror image of a pair has its value, and so has its exchange: material without a
+    direction, and reciprocity.
+    """
+
+    name = "samples"
+    reciprocal, mirrored = True, True  # as they are interpolated
+    axes: ClassVar[Mapping[str, str]] = {"directions": "theta_i, phi_i, theta_r, phi_r of a sample, rad"}
+
+    def __init__(
+        self,
+        directions: NDArray[np.generic],
+        values: NDArray[np.generic],
+        where: str = "",
+        title: str = "",
+        source: Mapping[str, str] | None = None,
+        wavelengths: Floats | None = None,
+    ) -> None:
+        """directions  (N, 4), as above, i the light's; values: (N, channel)"""
+        super().__init__(title, source, wavelengths)
+        self.directions, self.values = finite(directions, "the directions", where), finite(values, "the values", where)
+        if self.directions.ndim != 2 or self.directions.shape[1] != 4 or self.values.ndim != 2:
+            what = f"directions {self.directions.shape} and values {self.values.shape}"
+            raise InputError(f"{what}, (N, 4) and (N, channel) expected", where)
+        if len(self.directions) != len(self.values) or len(self.values) < 8:
+            what = f"{len(self.directions)} directions for {len(self.values)} values, 8 or more of both expected"
+            raise InputError(what, where)
+        theta = self.directions[:, [0, 2]]
+        if theta.min() < -1e-6 or theta.max() > 0.5 * np.pi + 1e-4:
+            row = int(np.argmax(np.abs(theta - 0.5).max(axis=1)))
+            what = f"sample {row + 1} has angles {np.degrees(theta[row])} degrees, 0 to 90 expected"
+            raise InputError(what, where, "reflection is above the surface; are the angles in radians?")
+        if wavelengths is not None and len(wavelengths) != self.values.shape[1]:
+            raise InputError(f"{self.values.shape[1]} values a sample for {len(wavelengths)} wavelengths", where)
+
+    def pairs(self) -> tuple[Floats, Floats]:
+        """wo and wi of every sample, (N, 3) each."""
+        theta_i, phi_i, theta_r, phi_r = self.directions.T
+
+        def at(theta: Floats, phi: Floats) -> Floats:
+            return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+        return at(theta_r, phi_r), at(theta_i, phi_i)
+
+    # ------------------------------------------------------------------ as formulas
+
+    @cached_property
+    def table(self) -> HalfDifference:
+        """What stands for the samples between them."""
+        features = _features(*self.pairs())
+        rgb = np.maximum(in_rgb(self.values, self.wavelengths), 0.0)
+        _, first = np.unique(np.round(features / SAME), axis=0, return_index=True)
+        features, rgb = features[first], rgb[first]
+        dark = DARK * max(float(np.median(rgb)), 1e-12)
+        wo, wi = centres(CELLS)
+        lit = np.minimum(wo[:, 2], wi[:, 2]) > 1e-9
+        at = _features(wo[lit], wi[lit])
+        count = min(NEIGHBOURS, len(rgb))
+        found = RBFInterpolator(features, np.log(rgb + dark), kernel="linear", degree=0, neighbors=count)(at)
+        low, high = np.log(rgb.min(axis=0) + dark), np.log(rgb.max(axis=0) + dark)
+        values = np.full((len(wo), 3), -1.0)
+        values[lit] = np.maximum(np.exp(np.clip(found, low, high)) - dark, 0.0)
+        return HalfDifference(values.reshape(*CELLS, 3), title=self.title, source=self.source)
+
+    def prepare(self) -> None:
+        self.table.prepare()
+        super().prepare()
+
+    def value(self, wo: Direction, wi: Direction) -> Spectrum:
+        return self.table.value(wo, wi)
+
+    # ------------------------------------------------------------------ as numbers
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        return {"directions": self.directions, "values": self.values}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Samples:
+        return cls(arrays["directions"], arrays["values"], **about)
+
+    @property
+    def flaws(self) -> dict[str, float]:
+        return {"negative": float(np.mean(self.values < 0.0))}
+
+    @property
+    def shape(self) -> dict[str, int]:
+        return {"sample": len(self.values), "channel": self.values.shape[1]}
+
+    @property
+    def range(self) -> tuple[float, float]:
+        return float(self.values.min()), float(self.values.max())
+
+
+def _features(wo: Floats, wi: Floats) -> Floats:
+    """Where a pair stands, (N, 4): theta_h by its square root, theta_d, and phi_d as far as theta_d makes it matter.
+
+    cos 2 phi_d and |sin 2 phi_d| do not tell a pair from its mirror image or from its exchange.
+    """
+    h, d = wo + wi, wi - wo
+    flat, length = np.hypot(h[:, 0], h[:, 1]), np.linalg.norm(h, axis=1)
+    theta_h, theta_d = np.arctan2(flat, h[:, 2]), np.arctan2(np.linalg.norm(d, axis=1), length)
+    safe = np.where(flat > 0.0, flat, 1.0)
+    c, s = np.where(flat > 0.0, h[:, 0] / safe, 1.0), np.where(flat > 0.0, h[:, 1] / safe, 0.0)
+    along = (h[:, 2] * (c * d[:, 0] + s * d[:, 1]) - flat * d[:, 2]) / np.where(length > 0.0, length, 1.0)
+    twice = 2.0 * np.arctan2(c * d[:, 1] - s * d[:, 0], along)
+    reach = 0.25 * np.sin(theta_d)
+    root = np.sqrt(theta_h * (2.0 / np.pi))
+    return np.stack([2.0 * root, theta_d * (2.0 / np.pi), reach * np.cos(twice), reach * np.abs(np.sin(twice))], -1)
+
+
+def plan() -> Floats:
+    """Directions of a goniometer for isotropic materials, (N, 4): light from 10 to 80 degrees, views all round."""
+    theta_i = np.radians(np.arange(10.0, 81.0, 10.0))
+    theta_r = np.radians(np.concatenate([np.arange(0.0, 76.0, 5.0), [79.0]]))
+    phi = np.radians(np.arange(-170.0, 181.0, 10.0))
+    i, r, p = (a.ravel() for a in np.meshgrid(theta_i, theta_r, phi, indexing="ij"))
+    # and the mirror direction of each, finely: there lobes are
+    steps = np.radians(np.arange(-8.0, 9.0, 1.0))
+    near_i, step = (a.ravel() for a in np.meshgrid(theta_i, steps, indexing="ij"))
+    around = np.stack([near_i, 0.0 * near_i, np.abs(near_i + step), np.full(near_i.shape, np.pi)], -1)
+    whole = np.concatenate([np.stack([i, 0.0 * i, r, p], -1), around])
+    return whole[whole[:, 2] <= np.radians(85.0)]
+
+
+def sampled(value: ops.Value, directions: Floats | None = None, **about: ops.Value) -> Samples:
+    """Samples of any f cos theta_i (wo, wi) -> (N, 3) at some directions, those of `plan` if not given."""
+    directions = plan() if directions is None else directions
+    blank = Samples(directions, np.zeros((len(directions), 3)))
+    wo, wi = blank.pairs()
+    return Samples(directions, value(wo, wi) / wi[:, 2:], **about)

@@ -1,0 +1,146 @@
+"""Tables about the mirror direction, as instruments for optical design store them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...errors import InputError
+from ...ops import Direction, Scalar, Spectrum, Table, where
+from ..angles import elevation
+from ..warp import Nodes, named
+from .base import Floats, Measurement, axis, finite, in_rgb, of_channels, padded
+from .guided import Guided
+
+
+class Specular(Guided, Measurement):
+    """f at nodes of (theta_i, azimuth, radial), the view's polar angles about the mirror direction of the light.
+
+    Radial 0 is the mirror direction; azimuth 0 leads from there to the normal (Zemax's tabular BSDF). Linear between
+    nodes, held beyond the first and the last; an azimuth that ends at pi is mirrored, one that ends at 2 pi goes round.
+    """
+
+    name = "specular"
+    axes: ClassVar[Mapping[str, str]] = {
+        "theta_i": "angle of the light, rad",
+        "azimuth": "about the mirror direction, from the normal's side, rad",
+        "radial": "angle to the mirror direction, rad",
+    }
+
+    def __init__(
+        self,
+        theta_i: NDArray[np.generic],
+        azimuth: NDArray[np.generic],
+        radial: NDArray[np.generic],
+        values: NDArray[np.generic],
+        where: str = "",
+        title: str = "",
+        source: Mapping[str, str] | None = None,
+        wavelengths: Floats | None = None,
+    ) -> None:
+        """values  (theta_i, azimuth, radial, channel)"""
+        super().__init__(title, source, wavelengths)
+        self.theta_i = axis(theta_i, "theta_i", where, 0.0, 0.5 * np.pi)
+        self.azimuth = axis(azimuth, "azimuth", where, 0.0, 2.0 * np.pi)
+        self.radial = axis(radial, "radial", where, 0.0, np.pi)
+        self.values = finite(values, "the table", where)
+        nodes = (len(self.theta_i), len(self.azimuth), len(self.radial))
+        if self.values.ndim != 4 or self.values.shape[:3] != nodes:
+            raise InputError(f"a table of shape {self.values.shape} for {nodes} nodes", where)
+
+    @property
+    def mirrored(self) -> bool:
+        """By its azimuth, which ends at pi."""
+        return bool(self.azimuth[-1] < 1.5 * np.pi)
+
+    # ------------------------------------------------------------------ as formulas
+
+    @cached_property
+    def _table(self) -> Table:
+        rgb = padded(in_rgb(self.values, self.wavelengths))
+        return named("specular", rgb.reshape(-1, *rgb.shape[2:]))
+
+    @cached_property
+    def _axes(self) -> tuple[Nodes, Nodes, Nodes]:
+        return Nodes("theta_i", self.theta_i), Nodes("azimuth", self.azimuth), Nodes("radial", self.radial)
+
+    @ops.function
+    def value(self, wo: Direction, wi: Direction) -> Spectrum:
+        """f cos theta_i, linear in the three angles."""
+        of_i, of_azimuth, of_radial = self._axes
+        azimuth, radial = about_mirror(wo, wi, self.azimuth[-1] > 1.5 * np.pi)
+        i, ti = of_i.find(elevation(wi))
+        a, ta = of_azimuth.find(azimuth)
+        r, tr = of_radial.find(radial)
+        total: ops.Value = 0.0
+        last, count = len(self.theta_i) - 1.0, float(len(self.azimuth))
+        for di, wx in ((0.0, 1.0 - ti), (1.0, ti)):
+            for da, wy in ((0.0, 1.0 - ta), (1.0, ta)):
+                row = ops.minimum(i + di, last) * count + ops.minimum(a + da, count - 1.0)
+                for dr, wz in ((0.0, 1.0 - tr), (1.0, tr)):
+                    total = total + of_channels(ops.fetch(self._table, row, r + dr)) * (wx * wy * wz)
+        return total * wi.z
+
+    # ------------------------------------------------------------------ as numbers
+
+    def arrays(self) -> dict[str, NDArray[np.generic]]:
+        return {"theta_i": self.theta_i, "azimuth": self.azimuth, "radial": self.radial, "values": self.values}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Specular:
+        return cls(arrays["theta_i"], arrays["azimuth"], arrays["radial"], arrays["values"], **about)
+
+    @property
+    def flaws(self) -> dict[str, float]:
+        return {"negative": float(np.mean(self.values < 0.0))}
+
+    @property
+    def shape(self) -> dict[str, int]:
+        return dict(zip(("theta_i", "azimuth", "radial", "channel"), self.values.shape, strict=True))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        return float(self.values.min()), float(self.values.max())
+
+
+@ops.function
+def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Scalar]:
+    """Azimuth and radial angle of wo about the mirror direction of wi; the azimuth in [0, pi], or [0, 2 pi) if `whole`.
+
+    With the light above x, the mirror direction is s = (-sin, 0, cos), the way to the normal (cos, 0, sin), and y
+    completes them.
+    """
+    sin = ops.safe_sqrt(wi.x * wi.x + wi.y * wi.y)
+    pole = sin == 0.0
+    some = where(pole, 1.0, sin)
+    c, s = where(pole, 1.0, wi.x / some), where(pole, 0.0, wi.y / some)
+    x, y = c * wo.x + s * wo.y, c * wo.y - s * wo.x
+    up = wi.z * x + sin * wo.z
+    along = wi.z * wo.z - sin * x
+    none = (up == 0.0) & (y == 0.0)
+    turn = where(none, 0.0, ops.atan2(y if whole else ops.abs(y), where(none, 1.0, up)))
+    if whole:
+        turn = where(turn < 0.0, turn + 2.0 * ops.pi, turn)
+    return turn, ops.atan2(ops.safe_sqrt(up * up + y * y), along)
+
+
+def sampled(value: ops.Value, **about: ops.Value) -> Specular:
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes, or straight above where those lie too low."""
+    theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
+    azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
+    radial = np.radians(
+        np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(10.0, 30.0, 1.0), np.arange(30.0, 180.1, 3.0)])
+    )
+    i, a, r = (v.ravel() for v in np.meshgrid(theta_i, azimuth, radial, indexing="ij"))
+    along, up, y = np.cos(r), np.sin(r) * np.cos(a), np.sin(r) * np.sin(a)
+    wi = np.stack([np.sin(i), 0.0 * i, np.cos(i)], -1)
+    wo = np.stack([-np.sin(i) * along + np.cos(i) * up, y, np.cos(i) * along + np.sin(i) * up], -1)
+    wo[:, 2] = np.maximum(wo[:, 2], 1e-3)
+    wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+    f = value(wo, wi) / wi[:, 2:]
+    return Specular(theta_i, azimuth, radial, f.reshape(len(theta_i), len(azimuth), len(radial), 3), **about)
