@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Pair, Scalar, Spectrum, dot, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
+from ..ops import Direction, Pair, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
 from ..optics import frame, fresnel
 from ..optics.special import exprel, power_of_cosine
 from . import microfacet
-from .glossy import _Glossy, sum_breach
+from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Angle, Colour, Width, choice, flag, spectrum, width
 
@@ -26,7 +27,7 @@ class AshikhminShirley(_Glossy):
     """
 
     specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
-    exponent: Width = width(default=100.0, doc="falloff of the lobe; two for anisotropy", low=0.0, high=1e7)
+    exponent: Width = width(default=100.0, doc="falloff of the lobe; two for anisotropy", low=0.0, high=math.inf)
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = choice("schlick", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
@@ -51,6 +52,12 @@ class AshikhminShirley(_Glossy):
         return self._lambert * kept * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
 
     @function
+    def _focus(self) -> Scalar:
+        """(n / (n + 9))^2: 0 for the flat lobe n = 0; the density of light at the peak is (n + 1) / 8 of the cosine's."""
+        n = sqrt((self.exponent.x + 1.0) * (self.exponent.y + 1.0))
+        return sqr((n - 1.0) / (n + 8.0))
+
+    @function
     def _density(self, h: Direction) -> Scalar:
         """p(h), 1/sr."""
         n = self.exponent
@@ -63,16 +70,15 @@ class AshikhminShirley(_Glossy):
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F p cos theta_i / (4 (o.h) max((n.o), (n.i)))."""
-        h = frame.half_vector(wo, wi)
-        cos = dot(wo, h)
+        h, cos = facet(wo, wi)
         spread = self._density(h) * wi.z / (4.0 * cos * maximum(wo.z, wi.z))
         return self.specular * self.reflectance(cos) * spread
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """p(h) / (4 (o.h))."""
-        h = frame.half_vector(wo, wi)
-        return self._density(h) / (4.0 * dot(wo, h))
+        h, cos = facet(wo, wi)
+        return self._density(h) / (4.0 * cos)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

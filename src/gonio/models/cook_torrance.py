@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..ops import Direction, Scalar, Spectrum, abs, dot, function
+from ..ops import Direction, Scalar, Spectrum, function
 from ..optics import frame, fresnel
 from ..optics.masking.v_groove import v_groove
 from ..optics.ndf import distribution
 from . import microfacet
-from .glossy import _Glossy, sum_breach
+from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Angle, Colour, Width, spectrum, width
 
@@ -27,7 +27,9 @@ class CookTorrance(_Glossy):
     """
 
     specular: Colour = spectrum(default=0.25, doc="factor of the lobe; 1/4 is that of a real surface", low=0.0)
-    alpha: Width = width(default=0.15, doc="width of the distribution; two for anisotropy", low=microfacet.SMOOTH, high=4.0)
+    alpha: Width = width(
+        default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0
+    )
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()
@@ -47,15 +49,16 @@ class CookTorrance(_Glossy):
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F D G / cos theta_o with D's 1 / pi."""
-        h = frame.half_vector(wo, wi)
+        h, cos = facet(wo, wi)
         d = distribution("beckmann").D(frame.rotate(h, self.rotation), self.alpha)
-        return self.specular * self.reflectance(abs(dot(wo, h))) * (d * v_groove(wo, wi, h) / wo.z)
+        return self.specular * self.reflectance(cos) * (d * v_groove(wo, wi, h) / wo.z)
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of Beckmann's visible normals over 4 (o.h) (Walter2007, eq. 14)."""
-        h = frame.rotate(frame.half_vector(wo, wi), self.rotation)
-        return 0.25 * distribution("beckmann").visible_per_cosine(frame.rotate(wo, self.rotation), h, self.alpha)
+        h, _ = facet(wo, wi)
+        turned, normal = frame.rotate(wo, self.rotation), frame.rotate(h, self.rotation)
+        return 0.25 * distribution("beckmann").visible_per_cosine(turned, normal, self.alpha)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

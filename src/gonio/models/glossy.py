@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, function, inv_pi, maximum, mean, where
-from ..optics.frame import upright
+from ..ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, dot, function, inv_pi, maximum, mean, sqrt, where
+from ..optics.frame import TINY, upright
 from ..optics.warp import square_to_cosine_hemisphere
 from . import library
 from .calling import method
@@ -57,6 +57,10 @@ class _Glossy(BSDF):
         """The lobe's albedo, about: it decides how many samples follow it."""
         raise NotImplementedError
 
+    def _focus(self) -> Scalar | float:
+        """How much narrower than the cosine the lobe is, 0 to 1: what it does not need, the cosine samples better."""
+        return 1.0
+
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
         """f |cos theta_i| of the diffuse part."""
         return self._lambert * (wi.z * inv_pi)
@@ -67,10 +71,10 @@ class _Glossy(BSDF):
 
     @function
     def _share(self, wo: Direction) -> Scalar:
-        """Probability of the lobe: its albedo against that of the diffuse part."""
+        """Probability of the lobe: its albedo against that of the diffuse part, less where it is as wide as that."""
         lobe = maximum(mean(self._lobe_albedo(wo)), 0.0)
         both = lobe + mean(self._lambert)
-        return clamp(ops.safe_div(lobe, both), 0.0, MOST)
+        return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MOST)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -97,6 +101,10 @@ class _Glossy(BSDF):
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
 
+    def white(self) -> Self:
+        """Itself: the two parts are simply added, so no values of theirs return all light without any loss."""
+        return self
+
     def tint(self, wo: Direction) -> Spectrum:
         """The two albedos."""
         return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, upright(wo))), 0.0)
@@ -109,6 +117,14 @@ def sum_breach(more: str = "") -> Breach:
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be met
     )
+
+
+@function
+def facet(wo: Direction, wi: Direction) -> tuple[Direction, Scalar]:
+    """(half vector h, o.h): the cosine as half the length of o + i, which rounding makes neither 0 nor negative."""
+    total = wo + wi
+    length = sqrt(maximum(dot(total, total), TINY))
+    return total * (1.0 / length), 0.5 * length
 
 
 class _Lit(NamedTuple):

@@ -12,7 +12,6 @@ from ..ops import (
     Scalar,
     Spectrum,
     clamp,
-    dot,
     erf,
     exp,
     function,
@@ -29,7 +28,7 @@ from ..ops import (
 from ..optics import frame, fresnel
 from ..optics.ndf import distribution
 from . import microfacet
-from .glossy import _Glossy, sum_breach
+from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Colour, Number, number, spectrum
 
@@ -57,9 +56,7 @@ class HeTorrance(_Glossy):
     sigma: Number = number(default=180.0, doc="standard deviation of the surface's heights", low=1.0, unit="nm")
     tau: Number = number(default=3000.0, doc="correlation length of the heights", low=100.0, unit="nm")
     eta: Number = number(default=1.5, doc="refractive index, over the outside's", low=1.0)
-    wavelength: Colour = spectrum(
-        default=(645.0, 526.0, 444.0), doc="wavelength of each channel", low=100.0, unit="nm"
-    )
+    wavelength: Colour = spectrum(default=(645.0, 526.0, 444.0), doc="wavelength of each channel", low=100.0, unit="nm")
     fresnel: str = microfacet.fresnel_choice()
 
     breaks: ClassVar[Mapping[str, Breach]] = {
@@ -115,8 +112,7 @@ class HeTorrance(_Glossy):
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F S G D / (pi cos theta_o)."""
-        h = frame.half_vector(wo, wi)
-        cos = dot(wo, h)
+        h, cos = facet(wo, wi)
         s2 = self._roughness2(self._shadowed(wo) + self._shadowed(wi))
         waves = 1.0 / self.wavelength  # per nm
         g = waves * waves * (sqr(2.0 * ops.pi * (wo.z + wi.z)) * s2)
@@ -142,7 +138,8 @@ class HeTorrance(_Glossy):
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of visible normals over 4 (o.h) (Walter2007, eq. 14)."""
         alpha, _ = self._peak(wo)
-        return 0.25 * distribution("ggx").visible_per_cosine(wo, frame.half_vector(wo, wi), alpha)
+        h, _ = facet(wo, wi)
+        return 0.25 * distribution("ggx").visible_per_cosine(wo, h, alpha)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

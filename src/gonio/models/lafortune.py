@@ -8,27 +8,31 @@ from typing import ClassVar
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Scalar, Spectrum, abs, dot, exp, function, inv_pi, maximum, minimum, sqr, vec3
+from ..ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
+from ..optics.frame import upright
 from ..optics.special import logrel, power_of_cosine
 from ..optics.warp import around, square_to_power_lobe
 from .glossy import _Glossy, sum_breach
 from .material import Breach
 from .parameters import Colour, Number, number, spectrum
 
+SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which there is no lobe to speak of
+
 
 class Lafortune(_Glossy):
     """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
-    The three C are cx, cy, cz over the largest of their sizes, n is `exponent`, the base is cut at 0 (Lafortune1997,
-    eq. 4, with the normalization of Ngan2005). C = (-1, -1, 1) is Phong's lobe about the mirror direction, normalized
-    (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans it toward the horizon, a negative cz throws
-    light back. Reciprocal. Sampled by a power lobe about (C o_x, C o_y, C o_z).
+    The three C are cx, cy, cz, n is `exponent`, the base is cut at 0 (Lafortune1997, eq. 4). C = (-1, -1, 1) is Phong's
+    lobe about the mirror direction, normalized (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans it
+    toward the horizon, and where cx and cy are positive, light is thrown back. The largest C should have size 1, as in
+    Ngan2005's normalization: what is less goes into the lobe's strength, to the n-th power. Reciprocal. Sampled by a power
+    lobe about (C o_x, C o_y, C o_z).
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at C = (-1, -1, 1), seen from the normal", low=0.0)
-    cx: Number = number(default=-1.0, doc="factor of o_x i_x: negative mirrors")
-    cy: Number = number(default=-1.0, doc="factor of o_y i_y: negative mirrors")
-    cz: Number = number(default=1.0, doc="factor of o_z i_z")
+    cx: Number = number(default=-1.0, doc="factor of o_x i_x: negative mirrors", low=-1.0, high=1.0)
+    cy: Number = number(default=-1.0, doc="factor of o_y i_y: negative mirrors", low=-1.0, high=1.0)
+    cz: Number = number(default=1.0, doc="factor of o_z i_z", low=-1.0, high=1.0)
     exponent: Number = number(default=50.0, doc="falloff of the lobe", low=0.0)
 
     breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
@@ -47,13 +51,11 @@ class Lafortune(_Glossy):
     def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
         """(unit axis of the lobe, its length to the n-th power): the length from what is missing to 1, as a length so
         near 1 has no digits left for a large n."""
-        over = 1.0 / maximum(maximum(abs(self.cx), abs(self.cy)), maximum(abs(self.cz), 1e-30))
-        c = vec3(self.cx * over, self.cy * over, self.cz * over)
-        axis = vec3(c.x * wo.x, c.y * wo.y, c.z * wo.z)
-        missing = (1.0 - sqr(c.x)) * sqr(wo.x) + (1.0 - sqr(c.y)) * sqr(wo.y) + (1.0 - sqr(c.z)) * sqr(wo.z)
-        missing = minimum(missing, 1.0 - 1e-7)
-        log_length = -0.5 * missing * logrel(-missing)
-        return axis * exp(-log_length), exp(self.exponent * log_length)
+        axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
+        short = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
+        short = minimum(short, 1.0 - SHORTEST)
+        axis = where(dot(axis, axis) > SHORTEST, axis, upright(wo))
+        return normalize(axis), exp(self.exponent * (-0.5 * short * logrel(-short)))
 
     @function
     def _power(self, axis: Direction, wi: Direction) -> Scalar:
@@ -86,3 +88,9 @@ class Lafortune(_Glossy):
         """specular |C o|^n times the axis's cosine: of a narrow lobe."""
         axis, length = self._axis(wo)
         return self.specular * (length * ops.clamp(axis.z, 0.1, 1.0))
+
+
+@function
+def _less(c: Scalar) -> Scalar:
+    """1 - c^2."""
+    return (1.0 - c) * (1.0 + c)

@@ -160,7 +160,10 @@ def _phong(p: Figures) -> Figures:
 
 
 def _lafortune(p: Figures) -> Figures:
-    return {"specular": p["albedo"], "cx": p["Cxy"], "cy": p["Cxy"], "cz": p["Cz"], "exponent": p["sharpness"]}
+    """Divided by max(|Cz|, |Cxy|)^n."""
+    largest = max(abs(p["Cz"]), abs(p["Cxy"]))
+    cxy, cz = p["Cxy"] / largest, p["Cz"] / largest
+    return {"specular": p["albedo"], "cx": cxy, "cy": cxy, "cz": cz, "exponent": p["sharpness"]}
 
 
 def _ngan_cook_torrance(p: Figures) -> Figures:

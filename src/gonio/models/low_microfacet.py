@@ -8,12 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Scalar, Spectrum, abs, dot, exp, function, inv_pi, log, safe_sqrt, sincos, vec3
+from ..ops import Direction, Scalar, Spectrum, exp, function, inv_pi, log, safe_sqrt, sincos, sqr, vec3
 from ..optics import frame, fresnel
 from ..optics.masking.v_groove import v_groove
 from ..optics.special import exprel, power_integral, power_quantile
 from . import microfacet
-from .glossy import _Glossy, sum_breach
+from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Colour, Number, number, spectrum
 
@@ -54,17 +54,23 @@ class LowMicrofacet(_Glossy):
         return power_integral(log(1.0 + self.b), 1.0 - self.c) / self.b
 
     @function
+    def _focus(self) -> Scalar:
+        """((1 - int D) / (1 + 8 int D))^2: 0 for the flat lobe; the density of light at the peak is 1 / (8 int D) of the cosine's."""
+        mass = self._mass()
+        return sqr((1.0 - mass) / (1.0 + 8.0 * mass))
+
+    @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F D G / (pi cos theta_o)."""
-        h = frame.half_vector(wo, wi)
+        h, cos = facet(wo, wi)
         facets = self._fall(h) * v_groove(wo, wi, h) * inv_pi / wo.z
-        return self.specular * self.reflectance(abs(dot(wo, h))) * facets
+        return self.specular * self.reflectance(cos) * facets
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """D over its integral over the hemisphere, over 4 (o.h)."""
-        h = frame.half_vector(wo, wi)
-        return self._fall(h) * (0.5 * inv_pi) / (self._mass() * 4.0 * dot(wo, h))
+        h, cos = facet(wo, wi)
+        return self._fall(h) * (0.5 * inv_pi) / (self._mass() * 4.0 * cos)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

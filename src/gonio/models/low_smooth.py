@@ -8,13 +8,31 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt, vec3, where
+from ..ops import (
+    Direction,
+    Scalar,
+    Spectrum,
+    exp,
+    function,
+    inv_pi,
+    maximum,
+    safe_sqrt,
+    sincos,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
 from ..optics import fresnel
-from ..optics.special import exprel, power_integral, power_quantile
+from ..optics.special import exprel, logrel, power_integral, power_quantile
 from . import microfacet
 from .glossy import _Glossy, sum_breach
 from .material import Breach
 from .parameters import Colour, Number, number, spectrum
+
+# How far a step may always go: seen flat, half of the azimuths have their rim so close that all steps in them would end
+# in a sliver along the horizon, whose density no float32 direction resolves.
+RIM = 0.25
 
 
 class LowSmooth(_Glossy):
@@ -23,7 +41,7 @@ class LowSmooth(_Glossy):
     Dp = o + i along the surface, how far the pair is from a mirror's, after the power spectrum of polished surfaces
     (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the surface, the facet's own angle for a
     mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, not an albedo. Sampled by its own power law,
-    cut where the surface's directions end, without a failed sample.
+    cut near the rim of the disk of directions.
     """
 
     specular: Colour = spectrum(default=10.0, doc="height of the peak over F, 1/sr", low=0.0)
@@ -46,31 +64,44 @@ class LowSmooth(_Glossy):
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular (1 + b |Dp|^2)^-c F cos theta_i."""
         across2 = sqr(wo.x - wi.x) + sqr(wo.y - wi.y)
-        spread = exp(-self.c * log(1.0 + self.b * _deviation2(wo, wi)))
+        spread = exp(-self.c * self._log_fall(_deviation2(wo, wi)))
         return self.specular * self.reflectance(safe_sqrt(1.0 - 0.25 * across2)) * (spread * wi.z)
 
     @function
     def _mass(self, radius: Scalar) -> Scalar:
         """int_0^radius (1 + b r^2)^-c r dr."""
-        x = self.b * sqr(radius)
-        return power_integral(log(1.0 + x), 1.0 - self.c) * (0.5 / self.b)
+        return power_integral(self._log_fall(sqr(radius)), 1.0 - self.c) * (0.5 / self.b)
+
+    @function
+    def _log_fall(self, r2: Scalar) -> Scalar:
+        """log(1 + b r^2), which keeps its digits for a small b r^2."""
+        x = self.b * r2
+        return x * logrel(x)
+
+    @function
+    def _focus(self) -> Scalar:
+        """(1 - 1 / r)^2, r = 1 / (2 mass) the lobe's density at its peak against the cosine's, which is flat on the disk."""
+        mass = self._mass(1.0 + 0.0 * self.b)
+        return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """(1 + b r^2)^-c / (2 pi mass up to the rim) over the disk of directions, times d(disk)/dw = cos theta_i."""
+        """(1 + b r^2)^-c / (2 pi mass up to the end) over the disk of directions, times d(disk)/dw = cos theta_i."""
         r2 = _deviation2(wo, wi)
         r = sqrt(maximum(r2, 1e-30))
         rim = _rim(wo, (wo.x + wi.x) / r, (wo.y + wi.y) / r)
-        spread = exp(-self.c * log(1.0 + self.b * r2))
-        return spread * wi.z * (0.5 * inv_pi) / self._mass(rim.ahead)
+        spread = exp(-self.c * self._log_fall(r2))
+        return spread * wi.z * (0.5 * inv_pi) / self._mass(maximum(rim.ahead, RIM))
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A step of the power law, in any azimuth, from the mirrored wo on the disk of directions, ending at its rim."""
+        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, ending at its rim or at
+        `RIM`; beyond the rim it has failed."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c
-        log_t = power_quantile(u.y * power_integral(log(1.0 + self.b * sqr(rim.ahead)), q), q)
+        end = maximum(rim.ahead, RIM)
+        log_t = power_quantile(u.y * power_integral(self._log_fall(sqr(end)), q), q)
         r = sqrt(log_t * exprel(log_t) / self.b)
         # 1 - x^2 - y^2 as a product: near the rim the difference has no digits left
         z = safe_sqrt((rim.ahead - r) * (rim.behind + r))
@@ -90,14 +121,13 @@ class _Rim(NamedTuple):
 def _rim(wo: Direction, c: Scalar, s: Scalar) -> _Rim:
     """How far the rim of the unit disk is from the mirrored wo, ahead in the azimuth (c, s) and behind.
 
-    The roots of |p + r d|^2 = 1, of which one would cancel; their product is -(n.o)^2. At grazing light a rim ahead of
-    less than a millionth counts as one: directions there have no digits left.
+    The roots of |p + r d|^2 = 1, of which one would cancel; their product is -(n.o)^2.
     """
     along = wo.x * c + wo.y * s
     root = sqrt(sqr(along) + sqr(wo.z))
-    longer = root + ops.abs(along)
+    longer = maximum(root + ops.abs(along), 1e-6)
     shorter = sqr(wo.z) / longer
-    return _Rim(maximum(where(along > 0.0, longer, shorter), 1e-6), where(along > 0.0, shorter, longer))
+    return _Rim(where(along > 0.0, longer, shorter), where(along > 0.0, shorter, longer))
 
 
 @function

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-import numpy as np
-
 from .. import ops
 from ..ops import (
     Direction,
     Scalar,
     Spectrum,
-    abs,
     atan2,
-    dot,
     exp,
     function,
     inv_pi,
@@ -31,9 +27,14 @@ from ..ops import (
 from ..optics import frame
 from ..optics.fresnel.schlick import schlick
 from ..optics.special import exprel, power_integral, power_quantile
-from .glossy import _Glossy, sum_breach
+from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Colour, spectrum
+
+
+# G1 ends here. Those of the paper reach -0.002 at 90 degrees, which is kept; further down, where only parameters of
+# one's own lead, two negative G1 would multiply to a positive light without bound.
+LEAST = -0.01
 
 
 class ShiftedGamma(_Glossy):
@@ -55,7 +56,7 @@ class ShiftedGamma(_Glossy):
     f1: Colour = spectrum(default=0.0, doc="what F loses with the cosine")
     normalization: Colour = spectrum(default=17.5, doc="factor of D (K in the paper)", low=0.0)
     Lambda: Colour = spectrum(default=3.0, doc="depth of the masking", low=0.0)
-    reach: Colour = spectrum(default=1.5, doc="angle past theta0 at which masking is deep", low=0.05, unit="rad")
+    reach: Colour = spectrum(default=1.64, doc="angle past theta0 at which masking is deep", low=0.05, unit="rad")
     k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)
     theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
 
@@ -78,9 +79,8 @@ class ShiftedGamma(_Glossy):
         """G1 = 1 + Lambda (1 - exp(t^k)) (Bagher2012, eq. 11)."""
         theta = atan2(sqrt(maximum(frame.sin2(v), 1e-20)), v.z)
         t = maximum(theta - self.theta0, 1e-6) / self.reach
-        # beyond e^40 nothing fitted goes; another material's parameters must not leave float32
-        power = exp(ops.minimum(self.k * log(t), 3.7))
-        return 1.0 - self.Lambda * (power * exprel(power))
+        power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 stays in float32, and is far below the least G1
+        return maximum(1.0 - self.Lambda * (power * exprel(power)), LEAST)
 
     @function
     def _density(self, h: Direction) -> Spectrum:
@@ -92,9 +92,9 @@ class ShiftedGamma(_Glossy):
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F D G / (pi cos theta_o)."""
-        h = frame.half_vector(wo, wi)
+        h, cos = facet(wo, wi)
         facets = self._density(h) * self._seen(wo) * self._seen(wi) * (inv_pi / wo.z)
-        return self.specular * self.reflectance(abs(dot(wo, h))) * facets
+        return self.specular * self.reflectance(cos) * facets
 
     @function
     def _widths(self) -> tuple[Scalar, Scalar, Scalar]:
@@ -104,9 +104,9 @@ class ShiftedGamma(_Glossy):
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Mixture of the two widths, over 4 (o.h)."""
-        h = frame.half_vector(wo, wi)
+        h, cos = facet(wo, wi)
         narrow, wide, p = self._widths()
-        return (_gamma_pdf(h, narrow, p) + _gamma_pdf(h, wide, p)) * 0.125 / dot(wo, h)
+        return (_gamma_pdf(h, narrow, p) + _gamma_pdf(h, wide, p)) * 0.125 / cos
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ..ops import Direction, Pair, Scalar, Spectrum, dot, function, sqr, sqrt
+from ..ops import Direction, Scalar, Spectrum, function, sqr, sqrt
 from ..optics import frame
 from ..optics.ndf import distribution
 from . import microfacet
-from .glossy import _Glossy, sum_breach
+from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Angle, Colour, Width, spectrum, width
 
@@ -24,7 +24,7 @@ class Ward(_Glossy):
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe, seen from the normal", low=0.0)
-    alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=microfacet.SMOOTH, high=4.0)
+    alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=1e-3, high=4.0)
     rotation: Angle = microfacet.rotation_angle()
 
     breaks: ClassVar[Mapping[str, Breach]] = {
@@ -34,27 +34,28 @@ class Ward(_Glossy):
     def _most(self) -> float:
         return math.inf
 
-    def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Pair]:
-        """(half vector, the same along the axes of the anisotropy, widths)."""
-        h = frame.half_vector(wo, wi)
-        return h, frame.rotate(h, self.rotation), self.alpha
+    @function
+    def _shape(self, wo: Direction, wi: Direction) -> Scalar:
+        """f of the lobe over D specular: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
+        h, _ = facet(wo, wi)
+        return 0.25 * sqr(sqr(h.z)) / sqrt(wo.z * wi.z)
 
     @function
-    def _shape(self, wo: Direction, wi: Direction, h: Direction) -> Scalar:
-        """f of the lobe over D specular: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
-        return 0.25 * sqr(sqr(h.z)) / sqrt(wo.z * wi.z)
+    def _density(self, h: Direction) -> Scalar:
+        """Beckmann's D."""
+        return distribution("beckmann").D(frame.rotate(h, self.rotation), self.alpha)
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) cos theta_i."""
-        h, turned, alpha = self._facet(wo, wi)
-        return self.specular * (distribution("beckmann").D(turned, alpha) * self._shape(wo, wi, h) * wi.z)
+        h, _ = facet(wo, wi)
+        return self.specular * (self._density(h) * self._shape(wo, wi) * wi.z)
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """D (n.h) / (4 (o.h)) (Walter2005)."""
-        h, turned, alpha = self._facet(wo, wi)
-        return distribution("beckmann").pdf(turned, alpha) / (4.0 * dot(wo, h))
+        h, cos = facet(wo, wi)
+        return self._density(h) * h.z / (4.0 * cos)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from ..ops import Direction, Scalar, Spectrum, dot, function, sqr
+from ..ops import Direction, Scalar, Spectrum, function, sqr
+from .glossy import facet
 from .parameters import flag
 from .ward import Ward
 
@@ -26,13 +27,13 @@ class WardDuer(Ward):
         return 2.0 * float(np.max(self.specular)) if self.bounded else math.inf
 
     @function
-    def _shape(self, wo: Direction, wi: Direction, h: Direction) -> Scalar:
+    def _shape(self, wo: Direction, wi: Direction) -> Scalar:
         """(n.h)^4 / (4 (n.o)(n.i)), or bounded 1 / (4 (o.h)^2)."""
+        h, cos = facet(wo, wi)
         if self.bounded:
-            return 0.25 / sqr(dot(wo, h))
+            return 0.25 / sqr(cos)
         return 0.25 * sqr(sqr(h.z)) / (wo.z * wi.z)
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """specular: of a narrow lobe."""
         return self.specular
-

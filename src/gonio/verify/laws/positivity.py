@@ -46,6 +46,7 @@ class Positivity(Law):
         )
         declared = "positivity" in subject.breaches  # measured noise about 0: its size is a share of the largest value
         checked = 0
+        declared = "positivity" in subject.breaches
         for changes, together in _batches(subject, variants, len(wo)):
             many_o, many_i, many_u = (np.tile(part, (len(changes), 1)) for part in (wo, wi, u))
             for precision in together.precisions:
@@ -60,11 +61,15 @@ class Positivity(Law):
                     if not wrong.any():
                         continue
                     finding.figure += int(wrong.sum())
+                    deep = float(np.min(values, initial=0.0, where=np.isfinite(values)) / -largest) if largest else 0.0
+                    finding.breach = max(finding.breach or 0.0, deep)
                     row = int(np.flatnonzero(wrong.any(1))[0])
                     changed = changes[rows[row] // len(wo)]
                     text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}{_words(changed)}"
                     place = pair_in_words(a[row], b[row])
-                    finding.problems.append(f"{text}: {int(wrong.sum())} values, first at {place}")
+                    kept = declared and what in ("eval", "weight") and bool(np.isfinite(values).all())
+                    texts = finding.notes if kept else finding.problems
+                    texts.append(f"{text}: {int(wrong.sum())} values, first at {place}")
                     if finding.at is None:
                         finding.at, finding.settings, finding.worst = (
                             (a[row], b[row]),
@@ -80,7 +85,7 @@ class Positivity(Law):
                     if finding.at is None:
                         finding.at, finding.settings, finding.worst = ((many_o[row], many_i[row]), changed, place)
         finding.shown = f"{finding.figure:g} of {checked:.3g}"
-        del finding.problems[6:]
+        del finding.problems[6:], finding.notes[7:]
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias | None:
