@@ -36,6 +36,7 @@ _PLACES = {
         *("angle", "bsdf", "choice", "flag", "method", "model", "never", "number", "spectrum", "width"),
     ),
     "models.library": ("fits", "material", "materials"),
+    "measure.fitting.fit": ("fit",),
     "energy": ("Albedo", "albedo"),
     "render": ("resume",),
     "render.integrators": ("Integrator",),
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from .energy.materials.random_walk import RandomWalk
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
+    from .measure.fitting.fit import fit
     from .members import register
     from .models import BSDF, Breach, Parameter, Preset, Sample, method, model, models, never
     from .models.blinn_phong import BlinnPhong
@@ -119,7 +121,7 @@ __all__ = [
     "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
     "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
     "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
-    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "fits", "flag", "get_precision", "material",
+    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "fit", "fits", "flag", "get_precision", "material",
     "materials", "method", "mix", "model", "models", "never", "number", "ops", "plot", "register", "render", "resume",
     "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

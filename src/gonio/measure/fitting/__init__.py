@@ -1,0 +1,1 @@
+"""Materials fitted to measurements: `data` (what is fitted to), `parameters` (what moves), `solver`, `fit`."""

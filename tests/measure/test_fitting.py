@@ -1,0 +1,174 @@
+"""Materials fitted to tables that were made from known ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import InputError
+from gonio.measure import format_of
+from gonio.measure.fitting import batch, data, solver
+from gonio.measure.fitting.fit import fit, modelled
+from gonio.measure.fitting.parameters import free_of, start_of
+from gonio.measure.tables.half_difference import HalfDifference, sampled
+from gonio.models.sum import Sum
+
+SHAPE = (24, 24, 36)
+METAL = go.Conductor.preset("Au", alpha=0.2)
+PLASTIC = Sum(go.Lambert((0.3, 0.2, 0.1)), go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick"))
+
+
+def table(material: go.BSDF, noise: float = 0.02, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> HalfDifference:
+    """The material at the middles of the cells, each value off by some noise of its own."""
+    exact = sampled(lambda wo, wi: material.eval(wo, wi, precision="float64"), shape)
+    values = exact.values.copy()
+    drawn = np.random.default_rng(seed).normal(size=(int(exact.valid.sum()), 3))
+    values[exact.valid] *= 1.0 + noise * drawn
+    return HalfDifference(np.where(exact.valid[..., None], np.maximum(values, 0.0), -1.0), exact.turn)
+
+
+def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
+    """The numbers of those names."""
+    found = []
+    for name in names:
+        path, _, channel = name.rpartition(".")
+        whole = path if channel in ("r", "g", "b") else name
+        value = go.models.tree.value_at(material, whole)
+        found.append(np.broadcast_to(value, 3)["rgb".index(channel)] if whole != name else value)
+    return np.array(found, float)
+
+
+def test_a_metal_is_found_again_with_its_indices() -> None:
+    found = fit(table(METAL), "conductor")
+    known = truth(METAL, found.names)
+    np.testing.assert_allclose(found.values[-1], known[-1], rtol=0.01)
+    np.testing.assert_allclose(found.values, known, rtol=0.1)  # eta and k of red are tied: 2 % at a full table
+    assert np.all(np.abs(found.values - known) < 4.0 * found.errors)
+    assert any("tied" in note for note in found.notes)
+
+
+def test_a_sum_of_lobes_is_found_again() -> None:
+    found = fit(table(PLASTIC), "lambert+ggx")
+    np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=0.01)
+    assert found.relative == pytest.approx(0.016, abs=0.002)  # mean of |2 % of a normal number|
+    assert isinstance(found.material, Sum)
+    np.testing.assert_allclose(
+        go.models.notation.named(found.text)[0].eval([0.6, 0, 0.8], [0, 0, 1.0]),
+        found.material.eval([0.6, 0, 0.8], [0, 0, 1.0]),
+        rtol=1e-4,
+    )
+
+
+@pytest.mark.parametrize("metric", ["log", "cuberoot", "linear"])
+def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
+    found = fit(table(PLASTIC, noise=0.0), "lambert+ggx", metric=metric)
+    np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=2e-3)
+
+
+def test_derivatives_are_those_of_finite_differences() -> None:
+    cells = data.data_of(table(PLASTIC, shape=(8, 8, 8)))
+    moving = free_of(PLASTIC, {"b.k": None})
+    problem = solver.Problem(PLASTIC, moving, cells, "log")
+    numbers = start_of(PLASTIC, moving)
+    for channel, (_, jacobian, which) in enumerate(problem.linearized(numbers)):
+        for column, number in enumerate(which):
+            step = np.zeros(len(numbers))
+            step[number] = 2e-3 * numbers[number]
+            high, low = (problem.residuals(numbers + sign * step)[channel] for sign in (1.0, -1.0))
+            np.testing.assert_allclose(jacobian[:, column], (high - low) / (2.0 * step[number]), rtol=0.02, atol=2e-3)
+
+
+class Grey(go.BSDF):
+    """A colour that acts by its mean alone."""
+
+    albedo: go.Colour = go.spectrum((0.5, 0.5, 0.5), "colour", high=1.0)
+
+    def eval(self, wo, wi, mode="radiance"):
+        level = go.ops.mean(self.albedo)
+        return go.ops.vec3(1.0, 1.0, 1.0) * go.ops.where((wo.z > 0.0) & (wi.z > 0.0), level * wi.z, 0.0)
+
+
+def test_a_colour_whose_channels_mix_has_a_derivative_for_each() -> None:
+    cells = data.data_of(table(go.Lambert(0.3), shape=(8, 8, 8)))
+    jacobian = solver.Problem(Grey(), free_of(Grey(), {}), cells, "linear").linearized(np.full(3, 0.5))[0][1]
+    assert jacobian.shape[1] == 3
+    np.testing.assert_allclose(jacobian, np.repeat(cells.wi[:, 2:] / 3.0, 3, axis=1), rtol=1e-5)
+
+
+def test_what_the_data_do_not_tell_is_said() -> None:
+    found = fit(table(go.Lambert(0.3)), Sum(go.Lambert(0.3), go.Lambert(0.1)))
+    assert any("a.albedo.r and b.albedo.r are tied" in note for note in found.notes)
+
+
+def test_parameters_that_are_held_stay() -> None:
+    found = fit(table(METAL), "conductor(alpha=.25)", fixed={"k": METAL.k})
+    assert found.material.alpha == 0.25 and found.names == ("eta.r", "eta.g", "eta.b")
+
+
+def test_a_parameter_more_must_earn_its_place() -> None:
+    cells = data.data_of(table(go.Lambert((0.3, 0.2, 0.1))))
+    plain, more = fit(cells, "lambert"), fit(cells, "lambert+ggx")
+    assert plain.criterion < more.criterion
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("material", "model"), [(METAL, "conductor"), (PLASTIC, "lambert+ggx")])
+def test_intervals_hold_the_truth_as_often_as_they_say(material: go.BSDF, model: str) -> None:
+    inside = []
+    for seed in range(100):
+        found = fit(table(material, seed=seed, shape=(16, 16, 24)), model)
+        known = truth(material, found.names)
+        inside.append((found.interval[:, 0] <= known) & (known <= found.interval[:, 1]))
+    share = np.mean(inside, axis=0)
+    assert np.all((share >= 0.88) & (share <= 0.995)), share
+
+
+def test_several_files_are_rows_and_a_bad_one_costs_only_its_own(tmp_path: Path) -> None:
+    merl = format_of(tmp_path / "x.gonio")
+    for name, material in (("a", PLASTIC), ("b", METAL)):
+        (tmp_path / f"{name}.gonio").write_bytes(merl.write(table(material, shape=(12, 12, 16))))
+    (tmp_path / "c.gonio").write_bytes(b"no table")
+    rows = batch.run(batch.files_of([str(tmp_path)]), ["lambert+ggx"])
+    assert [bool(row.failed) for row in rows] == [False, False, True]
+    batch.write(tmp_path / "all.json", rows)
+    assert len(json.loads((tmp_path / "all.json").read_text())) == 3
+
+
+def test_a_batch_goes_on_where_it_was_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GONIO_CACHE", str(tmp_path / "cache"))
+    for name in ("a", "b"):
+        written = format_of(tmp_path / "x.gonio").write(table(PLASTIC, shape=(12, 12, 16)))
+        (tmp_path / f"{name}.gonio").write_bytes(written)
+    files = batch.files_of([str(tmp_path / "a.gonio"), str(tmp_path / "b.gonio")])
+
+    def ends(done: int, total: int, text: str) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        batch.run(files, ["lambert"], report=ends)
+    told: list[str] = []
+    rows = batch.run(files, ["lambert"], notice=told.append)
+    assert told == ["1 of 2 files were fitted before"] and len(rows) == 2
+    assert rows[0].best is None and rows[0].fits[0]["material"].startswith("lambert")
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda t: fit(t, "lambert", metric="other"), "unknown metric"),
+        (lambda t: fit(t, "lambert+"), "no sum of materials"),
+        (lambda t: fit(t, "lambert", lobes=0), "0 lobes"),
+        (lambda t: fit(t, "lambert", fixed={"rough": 1.0}), "rough"),
+        (lambda t: fit(t, "lambert", fixed={"albedo": 0.3}), "nothing is left"),
+        (lambda t: fit(t, "lambert", grazing=0.0), "0 degrees"),
+        (lambda t: modelled("mirror+lambert"), "delta lobe"),
+        (lambda t: batch.files_of([str(Path(__file__).parent / "nothing-there")]) and fit("nothing.binary"), "no file"),
+    ],
+)
+def test_bad_input_is_one_clear_error(call, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        call(table(go.Lambert(0.3), shape=(8, 8, 8)))
