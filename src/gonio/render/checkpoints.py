@@ -307,6 +307,9 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
         kept.remove(path)
         return f"{path} is not used, and removed: {error.what}", temporary
     text = f"goes on from {path}: {done} of {prepared.spp} samples per pixel are done"
+    if "lanes" in found.arrays:
+        share = float(np.mean(found.arrays["lanes"] >= prepared.spp))
+        text = f"goes on from {path}: {share:.0%} of the pixels are done"
     return text, temporary or bool(found.facts.get("temporary"))
 
 

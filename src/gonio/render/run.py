@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..errors import InputError, did_you_mean
-from ..work import facts
+from ..work import crew, facts
 from . import checkpoints, denoise, engine, images, mitsuba_scene
 from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
@@ -232,6 +232,8 @@ def work(
     long       seconds that such a job must take; a minute where None
     tell       called at the start with what was found
     """
+    from . import integrators, tiles
+
     request, (width, height) = prepared.request, prepared.size
     path = request.checkpoint or temporary
     unasked = request.checkpoint is None
@@ -239,21 +241,30 @@ def work(
         found, unasked = checkpoints.earlier(path, prepared, unasked)
         if found:
             tell(found)
-    keeper = Keeper(path, prepared, unasked, long)
+    gathered = None
+    if crew.current().size > 1 and prepared.render.done < prepared.spp:
+        tiles.travelling(prepared)  # what cannot travel is said before anything is written
+        assert isinstance(prepared.render, integrators.Render)
+        gathered = tiles.Gathered(prepared.render, prepared.spp)
+    keeper = Keeper(path, prepared if gathered is None else replace(prepared, render=gathered), unasked, long)
 
     def after(progress: Progress) -> None:
         keeper.after_pass(progress)
         report(progress)
 
     try:
-        stopped = run(
-            prepared.render,
-            prepared.spp,
-            width * height,
-            timeout=request.timeout,
-            report=after,
-            interrupted=interrupted,
-        )
+        if gathered is not None:
+            stopped = tiles.advance(prepared, gathered, report=after, interrupted=interrupted, clock=time.perf_counter)
+            gathered.give()
+        else:
+            stopped = run(
+                prepared.render,
+                prepared.spp,
+                width * height,
+                timeout=request.timeout,
+                report=after,
+                interrupted=interrupted,
+            )
         keeper.end(bool(stopped))
     finally:
         keeper.close()
