@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..errors import InputError, did_you_mean
-from ..work import crew, facts
+from ..work import crew, facts, garbage
 from . import checkpoints, denoise, engine, images, mitsuba_scene
 from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
@@ -73,9 +73,10 @@ def prepare(request: Request) -> Prepared:
     if request.material is None and not request.scene.exists():
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, threads=request.threads)
-    if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
-        return _prepare_mitsuba(request, mi)
-    return _prepare_lab(request, mi)
+    with garbage.kept():
+        if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
+            return _prepare_mitsuba(request, mi)
+        return _prepare_lab(request, mi)
 
 
 def _nearby(path: Path) -> str:
@@ -254,7 +255,9 @@ def work(
 
     try:
         if gathered is not None:
-            stopped = tiles.advance(prepared, gathered, report=after, interrupted=interrupted, clock=time.perf_counter)
+            stopped = tiles.advance(
+                [(prepared, gathered)], report=after, interrupted=interrupted, timeout=request.timeout
+            )
             gathered.give()
         else:
             stopped = run(
@@ -269,6 +272,28 @@ def work(
     finally:
         keeper.close()
     return stopped, keeper
+
+
+def by_crew(
+    prepared: Sequence[Prepared],
+    *,
+    interrupted: Callable[[], object] = lambda: False,
+    finished: Callable[[int], None] = lambda index: None,
+) -> str:
+    """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
+    from . import integrators, tiles
+
+    jobs = []
+    for one in prepared:
+        tiles.travelling(one)
+        assert isinstance(one.render, integrators.Render)
+        jobs.append((one, tiles.Gathered(one.render, one.spp)))
+
+    def give(number: int) -> None:
+        jobs[number][1].give()
+        finished(number)
+
+    return tiles.advance(jobs, report=lambda progress: None, interrupted=interrupted, finished=give)
 
 
 def render(

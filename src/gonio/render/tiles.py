@@ -13,7 +13,8 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,6 +59,14 @@ class Gathered:
         """Of all lanes together."""
         return int(self.arrays[LANES].sum(dtype=np.int64))
 
+    @property
+    def pixels(self) -> int:
+        return len(self.arrays[LANES])
+
+    def taken(self, lanes: slice) -> int:
+        """Samples of these lanes so far."""
+        return int(self.arrays[LANES][lanes].sum(dtype=np.int64))
+
     def put(self, lanes: slice, arrays: Arrays) -> None:
         """Take the sums of a part that is done."""
         for name, values in arrays.items():
@@ -87,33 +96,48 @@ class Gathered:
 
 
 def advance(
-    prepared: Prepared,
-    gathered: Gathered,
+    jobs: Sequence[tuple[Prepared, Gathered]],
     *,
     report: Callable[[Progress], None],
     interrupted: Callable[[], object],
-    clock: Callable[[], float],
+    timeout: float | None = None,
+    finished: Callable[[int], None] = lambda index: None,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> str:
-    """Have a crew bring every lane to the wanted samples; why it ended, as `passes.run` has it."""
-    begin, before = clock(), gathered.samples
-    timeout, pixels = prepared.request.timeout, len(gathered.arrays[LANES])
-    total = prepared.spp * pixels
-    cuts = _cut(gathered.arrays[LANES], prepared.spp, crew.current().size)
-    spec, files = travelling(prepared)
-    arguments = []
-    for lanes in cuts:
-        first = int(gathered.arrays[LANES][lanes.start])
-        start = {name: a[lanes] for name, a in gathered.arrays.items() if name != LANES} if first else None
-        arguments.append((spec, lanes.start, lanes.stop, first, prepared.spp, start))
-    done = crew.each(part, arguments, files=files)
-    with contextlib.closing(done):
-        for index, arrays in done:
+    """Have a crew bring every lane of some renders to their samples; why it ended, as `passes.run` has it.
+
+    report    called after each part, with the progress of all renders together
+    finished  called with the number of a render whose last part is there
+    """
+    begin, parts, arguments = clock(), [], []
+    files: dict[str, Path] = {}
+    total = sum(prepared.spp * gathered.pixels for prepared, gathered in jobs)
+    pixels = sum(gathered.pixels for _, gathered in jobs)
+    left = []
+    for number, (prepared, gathered) in enumerate(jobs):
+        spec, named = travelling(prepared)
+        files |= named
+        done = gathered.arrays[LANES]
+        cuts = _cut(done, prepared.spp, total // (PARTS * crew.current().size))
+        left.append(len(cuts))
+        for lanes in cuts:
+            first = int(done[lanes.start])
+            start = {name: a[lanes] for name, a in gathered.arrays.items() if name != LANES} if first else None
+            arguments.append((spec, lanes.start, lanes.stop, first, prepared.spp, start))
+            parts.append((number, lanes))
+    before = now = sum(gathered.samples for _, gathered in jobs)
+    with contextlib.closing(crew.each(part, arguments, files=files)) as results:
+        for index, arrays in results:
             if index >= 0:
-                gathered.put(cuts[index], arrays)
-                rate = max(gathered.samples - before, 1) / max(clock() - begin, 1e-9)
-                remaining = (total - gathered.samples) / rate
-                report(Progress(gathered.samples // pixels, prepared.spp, rate, remaining))
-            if gathered.samples == total:
+                number, lanes = parts[index]
+                now += arguments[index][4] * (lanes.stop - lanes.start) - jobs[number][1].taken(lanes)
+                jobs[number][1].put(lanes, arrays)
+                rate = max(now - before, 1) / max(clock() - begin, 1e-9)
+                report(Progress(now // pixels, total // pixels, rate, (total - now) / rate))
+                left[number] -= 1
+                if left[number] == 0:
+                    finished(number)
+            if not any(left):
                 return ""
             if interrupted():
                 return "interrupt"
@@ -122,10 +146,10 @@ def advance(
     return ""
 
 
-def _cut(done: NDArray[np.uint32], wanted: int, workers: int) -> list[slice]:
-    """Ranges of lanes that still need samples, each of lanes that have as many."""
+def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
+    """Ranges of lanes that still need samples, each of lanes that have as many; of about so many samples."""
     pixels = len(done)
-    samples = min(max(pixels * wanted // (PARTS * workers), LEAST_SAMPLES), MOST_SAMPLES)
+    samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
     step = max(samples // wanted // ALIGNED, 1) * ALIGNED
     edges = sorted({*range(0, pixels, step), *(np.flatnonzero(np.diff(done)) + 1).tolist(), pixels})
     ranges = [slice(a, b) for a, b in itertools.pairwise(edges)]

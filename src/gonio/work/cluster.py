@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import GonioError, InputError, MachineError
-from . import crew
+from . import crew, garbage
 from .kept import Arrays
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ SILENT = 8.0  # seconds without a sign of life after which a worker is given not
 FROZEN = 30.0  # and after which one of this machine is ended, and another started
 MOST_COPIES = 5
 DEATHS = 3  # of workers while they did a part, after which it is the part's fault
+ANSWER = 10.0  # seconds for a scheduler to answer
 NOBODY = 60.0  # seconds to wait for the first worker
 
 
@@ -88,8 +89,8 @@ class Cluster:
         # A worker that computes does not answer for a while; one that is frozen has its parts done by others anyway.
         quiet |= {"distributed.scheduler.worker-ttl": "300s"}
         self._stack.enter_context(dask.config.set(quiet))
-        self._collects = gc.isenabled()
-        gc.disable()  # Dask has threads, and a scene that is collected in one of them crashes what is traced here
+        garbage.pause()  # Dask has threads
+        self._stack.callback(garbage.resume)
         try:
             if self._wanted is not None:
                 with warnings.catch_warnings():
@@ -102,7 +103,7 @@ class Cluster:
                     )  # fmt: skip
                 self._address = self._local.scheduler_address
                 self._processes = [self._start() for _ in range(self._wanted)]
-            self._client = Client(self._address, security=self._security, timeout=10, set_as_default=False)
+            self._client = Client(self._address, security=self._security, timeout=ANSWER, set_as_default=False)
         except (OSError, TimeoutError, ValueError, RuntimeError, ImportError) as error:
             self.close()
             text = " ".join(str(error).split())[:200]
@@ -127,10 +128,6 @@ class Cluster:
             process.wait()
         self._client = self._local = None
         self._processes = []
-        if self._collects:
-            gc.enable()
-
-    _collects = False
 
     def _start(self) -> subprocess.Popen[bytes]:
         """A worker of this machine."""

@@ -33,7 +33,7 @@ class Crew(Protocol):
     def run(
         self, function: Function, arguments: Sequence[tuple[Argument, ...]], files: Mapping[str, Path]
     ) -> Generator[tuple[int, Arrays], None, None]:
-        """Number and result of each part as it is done.
+        """Number and result of each part as it is done; (-1, {}) where none was done for a while.
 
         files  what parts ask for by `file`, by content hash
         """
@@ -86,7 +86,8 @@ def each(
     keys: Sequence[str] | None = None,
     files: Mapping[str, Path] | None = None,
 ) -> Generator[tuple[int, Arrays], None, None]:
-    """Number and result of each part, in the order in which they are found and done.
+    """Number and result of each part, in the order in which they are found and done; (-1, {}) where none was done for a
+    while, so that whoever asks can look whether somebody wants to stop.
 
     keys   a hash of all that each part depends on: then it is kept until the job is done (`parts.job`)
     files  files that the parts read, by content hash
@@ -100,6 +101,9 @@ def each(
         else:
             yield index, found.arrays
     for number, arrays in current().run(function, [arguments[index] for index in left], files or {}):
+        if number < 0:
+            yield number, arrays
+            continue
         index = left[number]
         if kept and keys:
             kept.put(keys[index], arrays)

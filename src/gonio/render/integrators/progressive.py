@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...work import garbage
 from .. import engine, sampler
 from ..types import Float, Scene, Sensor, UInt
 from .base import Integrator, Settings
@@ -75,7 +76,7 @@ class Render:
         if count < 1:
             raise InputError(f"{count} samples asked for", "advance", "1 or more")
         mi = self.mi
-        with dr.suspend_grad():
+        with dr.suspend_grad(), garbage.kept():
             first = dr.opaque(mi.UInt32, self.done)
             last = first + dr.opaque(mi.UInt32, count)
             if self._lanes is not None:  # some lanes are ahead, and go on or wait
