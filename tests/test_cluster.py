@@ -1,4 +1,4 @@
-"""A crew of processes gives the bits of one, whoever dies or freezes; what cannot travel and other versions are refused."""
+"""A crew of processes gives the bits of one, whoever dies or freezes; what cannot travel is refused."""
 
 from __future__ import annotations
 
@@ -99,7 +99,9 @@ def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
         path, seen = tmp_path / type(other).__name__, list[int]()
         prepared = run.prepare(run.Request(scene, checkpoint=path, spp=6))
         with crew.working(two):
-            stopped, _ = run.work(prepared, report=lambda p, seen=seen: seen.append(p.done), interrupted=lambda: seen)
+            stopped, _ = run.work(
+                prepared, report=lambda p, seen=seen: seen.append(p.done), interrupted=lambda seen=seen: seen
+            )
         assert stopped == "interrupt" and path.is_file()
         lanes = checkpoints.load(path).arrays["lanes"]
         assert 0 < np.count_nonzero(lanes) < len(lanes)
