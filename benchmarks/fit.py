@@ -2,8 +2,6 @@
 
     python benchmarks/fit.py [--only speed,coverage] [--trials 100]
 
-speed     1.46 million cells of gold with 2 % noise. `go.fit`, warm, beside scipy.optimize.least_squares with the same
-          start, cells and metric, its model in NumPy float64 and its derivatives by finite differences, in one process
 speed     1.46 million cells of gold with 2 % noise: `go.fit`, warm, beside scipy.optimize.least_squares on the same
           cells and metric, its model in NumPy float64, its derivatives by finite differences, in one process
 """

@@ -47,10 +47,11 @@ _PLACES = {
     "viewer.plots": ("plot",),
     "viewer.contact_sheet": ("study",),
     "viewer.widget": ("view",),
+    "work.cluster": ("Cluster",),
 }
 _FLAT = {name: place for place, names in _PLACES.items() for name in names}
 _CALLABLE = ("emit", "models", "render", "verify")  # packages that can be called: go.models(), go.render(scene)
-_ALIASES = {"mix": "Mix", "two_sided": "TwoSided"}
+_ALIASES = {"cluster": "Cluster", "mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
     from . import ops
@@ -91,6 +92,8 @@ if TYPE_CHECKING:
     from .viewer.panels import Panel
     from .viewer.plots import plot
     from .viewer.widget import view
+    from .work.cluster import Cluster
+    from .work.cluster import Cluster as cluster
 
 
 if not TYPE_CHECKING:  # or every misspelt name would be one that a checker believes in
@@ -103,6 +106,8 @@ if not TYPE_CHECKING:  # or every misspelt name would be one that a checker beli
         if name in _FLAT:
             return getattr(import_module("." + _FLAT[name], __name__), name)
         wanted = _ALIASES.get(name, name)
+        if wanted in _FLAT:
+            return __getattr__(wanted)
         if wanted.islower():  # a submodule on its way in, no material
             raise AttributeError(f"module 'gonio' has no attribute '{name}'")
         for cls in import_module(".models", __name__).models().values():
@@ -117,11 +122,12 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
-    "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Colour", "Conductor", "Dielectric", "Direction",
-    "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
-    "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
-    "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
-    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "fit", "fits", "flag", "get_precision", "material",
-    "materials", "method", "mix", "model", "models", "never", "number", "ops", "plot", "register", "render", "resume",
-    "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
+    "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
+    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty",
+    "Lambert", "Law", "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair",
+    "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin",
+    "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "emit", "fit", "fits",
+    "flag", "get_precision", "material", "materials", "method", "mix", "model", "models", "never", "number", "ops",
+    "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view",
+    "width",
 ]  # fmt: skip

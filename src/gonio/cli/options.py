@@ -4,6 +4,7 @@ together, whose fields a verb gets as one parameter."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -79,6 +80,22 @@ class Material:
 def _text(model: str, settings: Mapping[str, str], own: str = "") -> str:
     given = ",".join(filter(None, [own, *map("=".join, settings.items())]))
     return model.partition("(")[0] + (f"({given})" if given else "")
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who does the work: this process, more of them, or a cluster."""
+
+    workers: Annotated[int | None, Option(metavar="N", help="Work with N processes of this machine.")] = None
+    cluster: Annotated[str | None, Option(metavar="ADDRESS", help="Work on a Dask cluster: tcp://host:8786.")] = None
+
+    def working(self) -> AbstractContextManager[object]:
+        """Inside, they do it."""
+        if self.workers is None and self.cluster is None:
+            return nullcontext()
+        from ..work.cluster import Cluster
+
+        return Cluster(self.cluster, workers=self.workers)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ file that it names, of the settings, of Gonio's own code, and of what computes, 
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import json
 import os
@@ -23,7 +22,7 @@ import numpy as np
 
 from ..errors import GonioError, InputError
 from ..models import BSDF, notation
-from ..work import facts, kept
+from ..work import facts, garbage, kept
 from ..work.kept import Arrays, Facts
 from .passes import Progress, Renders
 from .request import Request
@@ -197,7 +196,6 @@ class Keeper:
         self._held: Arrays | None = None  # what the thread reads stays alive until this one lets it go
         self._identity: dict[str, str] = {}
         self._cost = 0.0  # seconds that the last one took away from the render
-        self._collects = False  # whether garbage is to be collected again once the thread has ended
         self._request = None if path is None else self._describe()
 
     def _describe(self) -> Facts | None:
@@ -242,10 +240,8 @@ class Keeper:
         """Wait for what is being written."""
         if self._thread is not None:
             self._thread.join()
+            garbage.resume()
         self._thread = self._held = None
-        if self._collects:
-            gc.enable()
-            self._collects = False
 
     def _begin(self) -> None:
         started = self._clock()
@@ -258,10 +254,7 @@ class Keeper:
             "request": self._request,
             "temporary": self._temporary,
         }
-        # Garbage that Python collects in the other thread may be a scene, and Dr.Jit and Mitsuba crash when one goes
-        # there while a kernel is traced here. So none is collected while that thread runs.
-        self._collects = self._collects or gc.isenabled()
-        gc.disable()
+        garbage.pause()  # until it has ended: see there
         self._thread = threading.Thread(target=self._write, args=(about, self._held, self._clock() - started))
         self._thread.start()
 
@@ -307,6 +300,9 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
         kept.remove(path)
         return f"{path} is not used, and removed: {error.what}", temporary
     text = f"goes on from {path}: {done} of {prepared.spp} samples per pixel are done"
+    if "lanes" in found.arrays:
+        share = float(np.mean(found.arrays["lanes"] >= prepared.spp))
+        text = f"goes on from {path}: {share:.0%} of the pixels are done"
     return text, temporary or bool(found.facts.get("temporary"))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..work import garbage
 from . import engine, formats
 from .passes import power_of_two
 from .request import Request
@@ -63,8 +64,9 @@ class MitsubaRender:
         self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
-        tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
-        return np.array(tensor, dtype=np.float32)
+        with garbage.kept():
+            tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
+            return np.array(tensor, dtype=np.float32)
 
     def image(self) -> NDArray[np.float32]:
         assert self._sum is not None, "advance() comes first"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..errors import InputError, did_you_mean
-from ..work import facts
+from ..work import crew, facts, garbage
 from . import checkpoints, denoise, engine, images, mitsuba_scene
 from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
@@ -73,9 +73,10 @@ def prepare(request: Request) -> Prepared:
     if request.material is None and not request.scene.exists():
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, threads=request.threads)
-    if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
-        return _prepare_mitsuba(request, mi)
-    return _prepare_lab(request, mi)
+    with garbage.kept():
+        if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
+            return _prepare_mitsuba(request, mi)
+        return _prepare_lab(request, mi)
 
 
 def _nearby(path: Path) -> str:
@@ -232,6 +233,8 @@ def work(
     long       seconds that such a job must take; a minute where None
     tell       called at the start with what was found
     """
+    from . import integrators, tiles
+
     request, (width, height) = prepared.request, prepared.size
     path = request.checkpoint or temporary
     unasked = request.checkpoint is None
@@ -239,25 +242,58 @@ def work(
         found, unasked = checkpoints.earlier(path, prepared, unasked)
         if found:
             tell(found)
-    keeper = Keeper(path, prepared, unasked, long)
+    gathered = None
+    if crew.current().size > 1 and prepared.render.done < prepared.spp:
+        tiles.travelling(prepared)  # what cannot travel is said before anything is written
+        assert isinstance(prepared.render, integrators.Render)
+        gathered = tiles.Gathered(prepared.render, prepared.spp)
+    keeper = Keeper(path, prepared if gathered is None else replace(prepared, render=gathered), unasked, long)
 
     def after(progress: Progress) -> None:
         keeper.after_pass(progress)
         report(progress)
 
     try:
-        stopped = run(
-            prepared.render,
-            prepared.spp,
-            width * height,
-            timeout=request.timeout,
-            report=after,
-            interrupted=interrupted,
-        )
+        if gathered is not None:
+            stopped = tiles.advance(
+                [(prepared, gathered)], report=after, interrupted=interrupted, timeout=request.timeout
+            )
+            gathered.give()
+        else:
+            stopped = run(
+                prepared.render,
+                prepared.spp,
+                width * height,
+                timeout=request.timeout,
+                report=after,
+                interrupted=interrupted,
+            )
         keeper.end(bool(stopped))
     finally:
         keeper.close()
     return stopped, keeper
+
+
+def by_crew(
+    prepared: Sequence[Prepared],
+    *,
+    interrupted: Callable[[], object] = lambda: False,
+    finished: Callable[[int], None] = lambda index: None,
+) -> str:
+    """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
+    from . import integrators, tiles
+
+    jobs = []
+    for one in prepared:
+        tiles.travelling(one)
+        assert isinstance(one.render, integrators.Render)
+        jobs.append((one, tiles.Gathered(one.render, one.spp)))
+
+    def give(number: int) -> None:
+        jobs[number][1].give()
+        finished(number)
+
+    return tiles.advance(jobs, report=lambda progress: None, interrupted=interrupted, finished=give)
 
 
 def render(

@@ -24,7 +24,7 @@ from ..errors import GonioWarning, InputError
 from ..models import notation
 from ..owner import alone
 from ..render import checkpoints, exposures, images, passes, run
-from ..work import parts
+from ..work import crew, parts
 from . import figures
 from .figures import Drawing
 
@@ -173,41 +173,56 @@ def render_sheet(
     with passes.Interrupts() as interrupts, parts.job("study", *whole) as job:
         if job.found:
             tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
-        for index, cell in enumerate(cells):
-            state = f"{index + 1}/{len(cells)}  " + ", ".join(map(figures.show_value, cell.values()))
-            report(index, len(cells), state)
+        together = 1 if crew.current().size == 1 else 2 * crew.current().size  # of a crew each needs enough to do
+        for start in range(0, len(cells), together):
+            some = cells[start : start + together]
+            state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
+            report(start, len(cells), state)
             # Each picture has the same seed, so that what differs is the parameter, not the noise.
-            prepared = run.prepare(replace(request, overrides={**request.overrides, **cell}))
-            notices |= dict.fromkeys(prepared.warnings)
-            width, height = prepared.size
-            pictures.append(_picture(prepared, job, interrupts))
+            prepared = [run.prepare(replace(request, overrides={**request.overrides, **cell})) for cell in some]
+            notices |= dict.fromkeys(text for one in prepared for text in one.warnings)
+            pictures += _pictures(prepared, job, interrupts)
+        last = prepared[-1]
+        width, height = last.size
         report(len(cells), len(cells), "drawing")
     exposure = exposures.stops(request.exposure, *pictures)
     clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
     notices |= dict.fromkeys(filter(None, [clipped]))
     heading = title or _scene_name(request.scene)
-    subtitle = f"{width}×{height}, {prepared.spp} samples per pixel, {prepared.settings['integrator']}"  # noqa: RUF001
+    subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
     drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
     if output is not None:
         drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
-    return Sheet(cells, prepared.spp, prepared.size, exposure, seconds, tuple(notices), drawing)
+    return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
 
 
-def _picture(prepared: run.Prepared, job: parts.Parts, interrupts: passes.Interrupts) -> exposures.RGB:
-    """One picture of a study: as an earlier run has left it, or from where that one was stopped."""
-    key = parts.key_of(sorted(prepared.sources.identity().items()), prepared.spp, prepared.request.denoise)
-    if (found := job.get(key)) is not None:
-        return found.arrays["picture"]
-    begun = job.path(key, ".checkpoint")
+def _pictures(prepared: Sequence[run.Prepared], job: parts.Parts, interrupts: passes.Interrupts) -> list[exposures.RGB]:
+    """Some pictures of a study: as an earlier run has left them, or from where that one was stopped."""
+    keys = [
+        parts.key_of(sorted(one.sources.identity().items()), one.spp, one.request.denoise, one.size) for one in prepared
+    ]
     with contextlib.suppress(OSError):
         job.open()
-    _, keeper = run.work(prepared, temporary=begun, long=0.0, interrupted=lambda: interrupts.asked)
-    interrupts.check()
-    picture = run.finished(prepared.render, prepared.request.denoise)
-    job.put(key, {"picture": picture})
-    keeper.remove()
-    return picture
+    found = {key: kept.arrays["picture"] for key in keys if (kept := job.get(key)) is not None}
+    missing = [(key, one) for key, one in zip(keys, prepared, strict=True) if key not in found]
+
+    def keep(number: int) -> None:
+        key, one = missing[number]
+        found[key] = run.finished(one.render, one.request.denoise)
+        job.put(key, {"picture": found[key]})
+
+    if crew.current().size > 1 and missing:
+        run.by_crew([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
+        interrupts.check()
+    else:
+        for number, (key, one) in enumerate(missing):
+            begun = job.path(key, ".checkpoint")
+            _, keeper = run.work(one, temporary=begun, long=0.0, interrupted=lambda: interrupts.asked)
+            interrupts.check()
+            keep(number)
+            keeper.remove()
+    return [found[key] for key in keys]
 
 
 def _scene_name(scene: Path) -> str:

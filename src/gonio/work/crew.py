@@ -10,7 +10,7 @@ must depend on nothing else, so that it gives the same bits wherever it is done,
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
@@ -32,8 +32,8 @@ class Crew(Protocol):
 
     def run(
         self, function: Function, arguments: Sequence[tuple[Argument, ...]], files: Mapping[str, Path]
-    ) -> Iterator[tuple[int, Arrays]]:
-        """Number and result of each part as it is done.
+    ) -> Generator[tuple[int, Arrays], None, None]:
+        """Number and result of each part as it is done; (-1, {}) where none was done for a while.
 
         files  what parts ask for by `file`, by content hash
         """
@@ -47,7 +47,7 @@ class Here:
 
     def run(
         self, function: Function, arguments: Sequence[tuple[Argument, ...]], files: Mapping[str, Path]
-    ) -> Iterator[tuple[int, Arrays]]:
+    ) -> Generator[tuple[int, Arrays], None, None]:
         token = _files.set(files)
         try:
             for index, given in enumerate(arguments):
@@ -85,8 +85,9 @@ def each(
     arguments: Sequence[tuple[Argument, ...]],
     keys: Sequence[str] | None = None,
     files: Mapping[str, Path] | None = None,
-) -> Iterator[tuple[int, Arrays]]:
-    """Number and result of each part, in the order in which they are found and done.
+) -> Generator[tuple[int, Arrays], None, None]:
+    """Number and result of each part, in the order in which they are found and done; (-1, {}) where none was done for a
+    while, so that whoever asks can look whether somebody wants to stop.
 
     keys   a hash of all that each part depends on: then it is kept until the job is done (`parts.job`)
     files  files that the parts read, by content hash
@@ -100,6 +101,9 @@ def each(
         else:
             yield index, found.arrays
     for number, arrays in current().run(function, [arguments[index] for index in left], files or {}):
+        if number < 0:
+            yield number, arrays
+            continue
         index = left[number]
         if kept and keys:
             kept.put(keys[index], arrays)

@@ -9,7 +9,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from .. import completion
-from ..options import Json, Material
+from ..options import Crew, Json, Material
 from ..output import print_tables
 from .base import MATERIALS, verb
 
@@ -52,6 +52,7 @@ def bake(
     output: Annotated[Path, Option("-o", "--output", metavar="DIR", help="Folder to write.")] = Path("tables"),
     made: Material,
     how: Baking,
+    crew: Crew,
     as_json: Json = False,
 ) -> None:
     """Write tables of directional albedo, its average, the split sum and rough glass, with their measured error.
@@ -71,5 +72,6 @@ def bake(
     from ...render import tables
 
     options = {**vars(how), "lut": how.lut.split(",") if how.lut else None}
-    baked = tables.bake(made.text(target), output, **options)
+    with crew.working():
+        baked = tables.bake(made.text(target), output, **options)
     print_tables(baked.manifest, output, as_json)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from ..options import Checkpoint, Json, Material, Rendering, SceneFile
+from ..options import Checkpoint, Crew, Json, Material, Rendering, SceneFile
 from ..output import Bar, print_warnings
 from ..signals import exit_code, words
 from .base import PICTURES, verb
@@ -32,6 +32,7 @@ def render(
         float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
     ] = None,
     checkpoint: Checkpoint = None,
+    crew: Crew,
     as_json: Json = False,
 ) -> None:
     """Render a scene, or a material on a ball, to a picture.
@@ -51,14 +52,14 @@ def render(
     """
 
     request = how.request(scene, output, timeout, made.instead_of(scene), checkpoint)
-    carry_out(request, scene.name, as_json)
+    carry_out(request, scene.name, as_json, crew)
 
 
-def carry_out(request: Request, title: str, as_json: bool) -> None:
+def carry_out(request: Request, title: str, as_json: bool, crew: Crew) -> None:
     """Render with a bar, and say what came of it."""
     from ...render import run
 
-    with Bar(title) as bar:
+    with Bar(title) as bar, crew.working():
         result = run.render(request, report=bar.update, notice=bar.stopping, tell=bar.tell)
     try:
         if as_json:

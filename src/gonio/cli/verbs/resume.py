@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from ..options import Code, Json
+from ..options import Code, Crew, Json
 from .base import PICTURES, verb
 from .render import carry_out
 
@@ -25,6 +25,7 @@ def resume(
     ] = None,
     threads: Annotated[int | None, Option(metavar="N", help="CPU cores to use; all if not given.")] = None,
     allow_code: Code = False,
+    crew: Crew,
     as_json: Json = False,
 ) -> None:
     """Go on with a render that was stopped, or that shall have more samples, from its checkpoint.
@@ -41,4 +42,4 @@ def resume(
 
     change = run.Request(checkpoint, output=output, spp=spp, timeout=timeout, threads=threads)
     change.check()
-    carry_out(checkpoints.asked_again(checkpoint, change, allow_code), checkpoint.name, as_json)
+    carry_out(checkpoints.asked_again(checkpoint, change, allow_code), checkpoint.name, as_json, crew)

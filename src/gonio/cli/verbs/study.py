@@ -8,7 +8,7 @@ from typing import Annotated
 
 from typer import Option
 
-from ..options import Json, Rendering, SceneFile
+from ..options import Crew, Json, Rendering, SceneFile
 from ..output import Bar, print_warnings
 from .base import PICTURES, verb
 
@@ -24,6 +24,7 @@ def study(
         "study.png"
     ),
     how: Rendering,
+    crew: Crew,
     title: Annotated[str, Option(metavar="TEXT", help="Heading of the sheet.")] = "",
     as_json: Json = False,
 ) -> None:
@@ -42,7 +43,7 @@ def study(
     from ...viewer import contact_sheet
 
     variations = [contact_sheet.parse_variation(text) for text in vary]
-    with Bar(scene.name) as bar:
+    with Bar(scene.name) as bar, crew.working():
         sheet = contact_sheet.render_sheet(request, variations, output, title, report=bar.step, tell=bar.tell)
     if as_json:
         print(json.dumps(sheet.as_dict()))

@@ -128,7 +128,7 @@ def _power(
 def _together(function: crew.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
     """The results of parts, one behind the other."""
     keys = [parts.key_of(function.__name__, *map(_content, given), cache.formulas()) for given in arguments]
-    done = dict(crew.each(function, arguments, keys))
+    done = {index: found for index, found in crew.each(function, arguments, keys) if index >= 0}
     return {name: np.concatenate([done[i][name] for i in range(len(arguments))]) for name in done[0]}
 
 

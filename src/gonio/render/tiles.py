@@ -1,0 +1,228 @@
+"""A picture by a crew: each part is a few lanes of it, with all their samples.
+
+Lanes know nothing of each other, and a part begins where a vector of the processor does, so that the same rays are
+traced together: the sums are those of one process, to the bit. Whoever does a part has the scene from its files, which
+travel by their content.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..work import crew, facts
+from ..work.kept import Arrays, Facts
+from . import checkpoints, passes
+from .integrators import Render
+from .integrators.progressive import LANES
+from .passes import Progress
+from .request import Request
+
+if TYPE_CHECKING:
+    from .run import Prepared
+
+ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the camera's rays
+MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
+LEAST_SAMPLES = 1 << 21  # less is soon lost to sending it
+PARTS = 16  # for each worker at least, so that none waits long for the last
+
+
+class Gathered:
+    """What a crew has sent so far, as `checkpoints.Keeper` and `run` see a render."""
+
+    def __init__(self, render: Render, wanted: int) -> None:
+        self._render, self._wanted = render, wanted
+        state = render.state()
+        lanes = len(state["invalid"])
+        self.arrays = {name: np.array(values) for name, values in state.items()}
+        self.arrays.setdefault(LANES, np.full(lanes, render.done, np.uint32))
+
+    @property
+    def done(self) -> int:
+        return int(self.arrays[LANES].min())
+
+    @property
+    def samples(self) -> int:
+        """Of all lanes together."""
+        return int(self.arrays[LANES].sum(dtype=np.int64))
+
+    @property
+    def pixels(self) -> int:
+        return len(self.arrays[LANES])
+
+    def taken(self, lanes: slice) -> int:
+        """Samples of these lanes so far."""
+        return int(self.arrays[LANES][lanes].sum(dtype=np.int64))
+
+    def put(self, lanes: slice, arrays: Arrays) -> None:
+        """Take the sums of a part that is done."""
+        for name, values in arrays.items():
+            self.arrays[name][lanes] = values
+        self.arrays[LANES][lanes] = self._wanted
+
+    def state(self) -> Arrays:
+        return {name: values.copy() for name, values in self.arrays.items()}
+
+    def give(self) -> None:
+        """Make it what the render has."""
+        self._render.restore(self.done, self.arrays)
+
+    def advance(self, count: int) -> None:
+        raise NotImplementedError("a crew does that")
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
+        raise NotImplementedError("the render does that")
+
+    def image(self) -> NDArray[np.float32]:
+        self.give()
+        return self._render.image()
+
+    def aov(self) -> dict[str, NDArray[np.float32]]:
+        self.give()
+        return self._render.aov()
+
+
+def advance(
+    jobs: Sequence[tuple[Prepared, Gathered]],
+    *,
+    report: Callable[[Progress], None],
+    interrupted: Callable[[], object],
+    timeout: float | None = None,
+    finished: Callable[[int], None] = lambda index: None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> str:
+    """Have a crew bring every lane of some renders to their samples; why it ended, as `passes.run` has it.
+
+    report    called after each part, with the progress of all renders together
+    finished  called with the number of a render whose last part is there
+    """
+    begin, parts, arguments = clock(), [], []
+    files: dict[str, Path] = {}
+    total = sum(prepared.spp * gathered.pixels for prepared, gathered in jobs)
+    pixels = sum(gathered.pixels for _, gathered in jobs)
+    left = []
+    for number, (prepared, gathered) in enumerate(jobs):
+        spec, named = travelling(prepared)
+        files |= named
+        done = gathered.arrays[LANES]
+        cuts = _cut(done, prepared.spp, total // (PARTS * crew.current().size))
+        left.append(len(cuts))
+        for lanes in cuts:
+            first = int(done[lanes.start])
+            start = {name: a[lanes] for name, a in gathered.arrays.items() if name != LANES} if first else None
+            arguments.append((spec, lanes.start, lanes.stop, first, prepared.spp, start))
+            parts.append((number, lanes))
+    before = now = sum(gathered.samples for _, gathered in jobs)
+    with contextlib.closing(crew.each(part, arguments, files=files)) as results:
+        for index, arrays in results:
+            if index >= 0:
+                number, lanes = parts[index]
+                now += arguments[index][4] * (lanes.stop - lanes.start) - jobs[number][1].taken(lanes)
+                jobs[number][1].put(lanes, arrays)
+                rate = max(now - before, 1) / max(clock() - begin, 1e-9)
+                report(Progress(now // pixels, total // pixels, rate, (total - now) / rate))
+                left[number] -= 1
+                if left[number] == 0:
+                    finished(number)
+            if not any(left):
+                return ""
+            if interrupted():
+                return "interrupt"
+            if timeout is not None and clock() - begin > timeout:
+                return "timeout"
+    return ""
+
+
+def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
+    """Ranges of lanes that still need samples, each of lanes that have as many; of about so many samples."""
+    pixels = len(done)
+    samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
+    step = max(samples // wanted // ALIGNED, 1) * ALIGNED
+    edges = sorted({*range(0, pixels, step), *(np.flatnonzero(np.diff(done)) + 1).tolist(), pixels})
+    ranges = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    return [lanes for lanes in ranges if done[lanes.start] < wanted]
+
+
+def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
+    """A prepared render as text that a worker can make again, and the files that go with it, by content hash.
+
+    Raises InputError for what cannot travel.
+    """
+    request, where = prepared.request, "cluster"
+    if not isinstance(prepared.render, Render):
+        what = "Mitsuba's own integrator renders on one machine"
+        raise InputError(what, where, "add --integrator path (or direct), or leave the cluster out")
+    named = dict(prepared.sources.files)
+    folder = ""
+    if request.material is None:
+        root = request.scene.resolve()
+        file = root / "scene.json" if root.is_dir() else root
+        folder = str(file.parent)
+        named[file.name] = file
+        for name, path in named.items():
+            if not path.resolve().is_relative_to(folder):
+                raise InputError(f"'{name}' lies outside the scene's folder", where, "copy it there: it has to travel")
+    places = {str(path.resolve()): facts.file_hash(path) for path in named.values()}
+    found = {"request": checkpoints.described(replace(request, output=None, threads=None)), "folder": folder}
+    text = json.dumps({**found, "files": places}, sort_keys=True)
+    return text, {content: Path(path) for path, content in places.items()}
+
+
+# ---------------------------------------------------------------------- where a part is done
+
+_last: dict[
+    str, tuple[Prepared, tempfile.TemporaryDirectory[str]]
+] = {}  # the scene that is loaded; parts follow each other
+
+
+def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
+    """The sums of lanes [begin, end) with samples [first, last), added to those that were there."""
+    render = _prepared(spec).render
+    assert isinstance(render, Render)
+    render.select(slice(begin, end))
+    if start is not None:
+        render.restore(first, start)
+    passes.run(render, last, end - begin)
+    return {name: np.array(values) for name, values in render.state().items()}
+
+
+def _prepared(spec: str) -> Prepared:
+    from . import run
+
+    if spec not in _last:
+        _last.clear()
+        folder = tempfile.TemporaryDirectory(prefix="gonio-scene-")
+        known: Facts = json.loads(spec)
+        _last[spec] = (
+            run.prepare(replace(_unpacked(known, Path(folder.name)), output=Path(folder.name, "a.exr"))),
+            folder,
+        )
+    return _last[spec][0]
+
+
+def _unpacked(known: Facts, folder: Path) -> Request:
+    """The request, with its files in a folder of this machine."""
+    text = json.dumps(known["request"])
+    for path, content in known["files"].items():
+        inside = os.path.relpath(path, known["folder"]) if known["folder"] else Path(content, Path(path).name)
+        target = folder / inside
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(crew.file(content), target)
+        text = text.replace(json.dumps(path)[1:-1] + ":", json.dumps(str(target))[1:-1] + ":")  # FILE.py:CLASS
+    described = json.loads(text)
+    if known["folder"]:
+        described["scene"] = str(folder / os.path.relpath(described["scene"], known["folder"]))
+    return checkpoints.request_of(described, "cluster", allow_code=True)  # whoever asked for the job has allowed it

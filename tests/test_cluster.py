@@ -1,0 +1,188 @@
+"""A crew of processes gives the bits of one, whoever dies or freezes; what cannot travel is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import GonioWarning, InputError, MachineError
+from gonio.render import checkpoints, run, tiles
+from gonio.work import crew, facts, parts
+from gonio.work.cluster import Cluster
+
+pytest.importorskip("distributed")
+
+
+def square(x: float, seconds: float = 0.0) -> dict[str, np.ndarray]:
+    """A part."""
+    time.sleep(seconds)
+    return {"x": np.array([x * x]), "pid": np.array([os.getpid()])}
+
+
+def refuse(x: float) -> dict[str, np.ndarray]:
+    raise InputError(f"{x} given", "x", "give another")
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """Two workers; each test works with them by `crew.working`."""
+    os.environ["GONIO_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    with Cluster(workers=2) as cluster, crew.working(crew.Here()):
+        yield cluster
+    del os.environ["GONIO_CACHE"]
+
+
+def done(function: crew.Function, arguments: list[tuple[object, ...]]) -> dict[int, dict[str, np.ndarray]]:
+    return {index: found for index, found in crew.each(function, arguments) if index >= 0}
+
+
+def test_parts_are_done_by_all_and_each_is_done(two: Cluster) -> None:
+    with crew.working(two):
+        found = done(square, [(x, 0.05) for x in range(20)])
+    assert [float(found[i]["x"][0]) for i in range(20)] == [x * x for x in range(20)]
+    assert len({int(one["pid"][0]) for one in found.values()} - {os.getpid()}) == 2
+
+
+def test_a_part_that_fails_by_its_input_is_tried_once(two: Cluster) -> None:
+    with crew.working(two), pytest.raises(InputError, match="3 given") as caught:
+        done(refuse, [(3,)])
+    assert caught.value.hint == "give another"
+
+
+def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
+    with crew.working(two):
+        count = 0
+        for index, _ in crew.each(square, [(x, 0.3) for x in range(10)]):
+            count += index >= 0
+            if count == 2:
+                two._processes[0].kill()
+    assert count == 10 and two.restarts >= 1
+
+
+@pytest.mark.parametrize("options", [{}, {"integrator": "direct", "denoise": True}])
+def test_a_picture_has_the_same_bits(
+    two: Cluster, scene: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, object]
+) -> None:
+    monkeypatch.setattr(tiles, "LEAST_SAMPLES", 1)  # six parts of 64 lanes
+    alone = go.render(scene, spp=5, **options)  # type: ignore[arg-type]
+    with crew.working(two):
+        assert np.array_equal(go.render(scene, spp=5, **options), alone)  # type: ignore[arg-type]
+
+
+def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_path: Path) -> None:
+    vary = {"shapes.0.material.p": [4, 16]}
+    alone = go.study(scene, vary, spp=3)
+    table = go.bake("ggx", size=12, seed=1)
+    parts.Parts("none").clear()
+    os.environ["GONIO_CACHE"] += "-anew"
+    with crew.working(two):
+        together = go.study(scene, vary, spp=3)
+        other = go.bake("ggx", size=12, seed=1)
+    assert together._repr_png_() == alone._repr_png_()
+    assert all(np.array_equal(table.arrays[name], other.arrays[name]) for name in table.arrays)
+
+
+def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
+    two: Cluster, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tiles, "LEAST_SAMPLES", 1)
+    alone = go.render(scene, spp=6)
+    for other in (two, crew.Here()):
+        path, seen = tmp_path / type(other).__name__, list[int]()
+        prepared = run.prepare(run.Request(scene, checkpoint=path, spp=6))
+        with crew.working(two):
+            stopped, _ = run.work(
+                prepared, report=lambda p, seen=seen: seen.append(p.done), interrupted=lambda seen=seen: seen
+            )
+        assert stopped == "interrupt" and path.is_file()
+        lanes = checkpoints.load(path).arrays["lanes"]
+        assert 0 < np.count_nonzero(lanes) < len(lanes)
+        with crew.working(other), pytest.warns(GonioWarning, match="% of the pixels are done"):
+            assert np.array_equal(go.resume(path), alone)
+
+
+def test_a_picture_goes_on_to_more_samples_by_a_crew(two: Cluster, scene: Path, tmp_path: Path) -> None:
+    go.render(scene, spp=3, checkpoint=tmp_path / "c")
+    with crew.working(two), pytest.warns(GonioWarning, match="3 of 7"):
+        assert np.array_equal(go.resume(tmp_path / "c", spp=7), go.render(scene, spp=7))
+
+
+def test_files_travel_and_so_does_code_that_the_user_named(two: Cluster, scene: Path, tmp_path: Path) -> None:
+    source = "import gonio as go\n\nclass Flat(go.Lambert):\n    'Flat.'\n    name = 'flat-for-cluster'\n"
+    (tmp_path / "flat.py").write_text(source)
+    material = go.models.notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]  # type: ignore[attr-defined]
+    alone = go.render(material, spp=2, size=(24, 16))
+    with crew.working(two):
+        assert np.array_equal(go.render(material, spp=2, size=(24, 16)), alone)
+
+
+def test_what_cannot_travel_is_refused(two: Cluster, tmp_path: Path) -> None:
+    from test_run import XML
+
+    (tmp_path / "ball.xml").write_text(XML)
+    with crew.working(two), pytest.raises(InputError, match="one machine") as caught:
+        go.render(tmp_path / "ball.xml", spp=2)
+    assert "--integrator path" in caught.value.hint
+
+
+sys.path.insert(0, str(Path(__file__).parent / "render"))
+
+
+def test_another_version_is_refused_by_name(two: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as other, crew.working(two), pytest.raises(MachineError, match=r"worker .* gonio 9\.9"):
+        other.setattr(facts, "__version__", "9.9")
+        done(square, [(1,)])
+
+
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [({}, "an address or a number"), ({"workers": 0}, "0 workers"), ({"address": "tcp://127.0.0.1:1"}, "no scheduler")],
+)
+def test_a_cluster_that_cannot_be_is_one_clear_error(
+    given: dict[str, object], what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gonio.work import cluster
+
+    monkeypatch.setattr(cluster, "ANSWER", 0.5)
+    with pytest.raises(go.GonioError, match=what), Cluster(**given):  # type: ignore[arg-type]
+        pass
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_pictures_survive_workers_that_die_at_random(scene: Path, seed: int) -> None:
+    alone = go.render(scene, spp=20000, seed=seed)
+    chance = np.random.default_rng(seed)
+    with Cluster(workers=2) as cluster:
+        at = time.monotonic() + chance.uniform(1.0, 4.0)
+
+        def look(progress: object) -> None:
+            nonlocal at
+            if time.monotonic() > at:
+                at = time.monotonic() + chance.uniform(1.0, 4.0)
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(cluster._processes[int(chance.integers(2))].pid, signal.SIGKILL)
+
+        prepared = run.prepare(run.Request(scene, spp=20000, seed=seed))
+        run.work(prepared, report=look)
+    assert np.array_equal(prepared.render.image(), alone)
+
+
+@pytest.mark.slow
+def test_a_frozen_worker_loses_nothing() -> None:
+    with Cluster(workers=2) as cluster:
+        count, frozen = 0, False
+        for index, _ in crew.each(square, [(x, 0.5) for x in range(12)]):
+            count += index >= 0
+            if count == 3 and not frozen:
+                frozen = True
+                os.kill(cluster._processes[0].pid, signal.SIGSTOP)
+        assert count == 12
