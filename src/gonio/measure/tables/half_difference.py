@@ -12,7 +12,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ... import ops
 from ...errors import InputError
-from ...ops import Direction, Spectrum, Table, clamp, floor, maximum, minimum, sqrt, where
+from ...ops import Direction, Scalar, Spectrum, Table, clamp, floor, maximum, minimum, sqrt, where
 from ..angles import half_difference
 from ..warp import named
 from .base import Floats, Measurement, finite, in_rgb, of_channels, padded
@@ -83,7 +83,14 @@ class HalfDifference(Guided, Measurement):
         values = in_rgb(self.values, self.wavelengths)
         if not self.valid.all():
             values = self._held(values)
+        if self._folded:
+            values = values[:, :, : values.shape[2] // 2]
         return named("half_difference", padded(values))
+
+    @property
+    def _folded(self) -> bool:
+        """Whether half of it, up to phi_d of a quarter turn, says all: fewer bytes are faster to fetch from."""
+        return self.mirrored and self.reciprocal and self.values.shape[2] % 2 == 0
 
     def _held(self, values: Floats) -> Floats:
         """Invalid cells with the numbers of the last valid one at a smaller theta_d, as both directions rise with it;
@@ -104,17 +111,27 @@ class HalfDifference(Guided, Measurement):
         n, m, count = map(float, self.values.shape[:3])
         x = clamp(sqrt(maximum(theta_h * (2.0 / ops.pi), 0.0)) * n - 0.5, 0.0, n - 1.0)
         y = clamp(theta_d * (2.0 / ops.pi) * m - 0.5, 0.0, m - 1.0)
-        z = phi_d * (count / self.turn) - 0.5
-        i, j, k = minimum(floor(x), max(n - 2.0, 0.0)), minimum(floor(y), max(m - 2.0, 0.0)), floor(z)
-        tx, ty, tz = x - i, y - j, z - k
-        first = k - floor(k * (1.0 / count) + 0.25 / count) * count  # the remainder, in [0, count)
-        second = where(first + 1.5 > count, 0.0, first + 1.0)
+        i, j = minimum(floor(x), max(n - 2.0, 0.0)), minimum(floor(y), max(m - 2.0, 0.0))
+        (first, second), tz = self._around(phi_d * (count / self.turn), count)
+        tx, ty = x - i, y - j
         total: ops.Value = 0.0
         for di, wx in ((0.0, 1.0 - tx), (1.0, tx)):
             for dj, wy in ((0.0, 1.0 - ty), (1.0, ty)):
                 for cell, wz in ((first, 1.0 - tz), (second, tz)):
                     total = total + of_channels(ops.fetch(self._table, i + di, j + dj, cell)) * (wx * wy * wz)
         return total * wi.z
+
+    def _around(self, at: Scalar, count: float) -> tuple[tuple[Scalar, Scalar], Scalar]:
+        """The cells on both sides of a phi_d counted in cells, and the way from one middle to the other."""
+        if self._folded:
+            at = at - floor(at * (1.0 / count)) * count
+            z = clamp(minimum(at, count - at) - 0.5, 0.0, 0.5 * count - 1.0)
+            k = minimum(floor(z), max(0.5 * count - 2.0, 0.0))
+            return (k, k + 1.0), z - k
+        z = at - 0.5
+        k = floor(z)
+        first = k - floor(k * (1.0 / count) + 0.25 / count) * count  # the remainder, in [0, count)
+        return (first, where(first + 1.5 > count, 0.0, first + 1.0)), z - k
 
     # ------------------------------------------------------------------ as numbers
 

@@ -130,7 +130,7 @@ def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Sca
 
 
 def sampled(value: ops.Value, **about: ops.Value) -> Specular:
-    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes, or straight above where those lie too low."""
+    """A table of any f cos theta_i (wo, wi) -> (N, 3), found at its nodes, or above where those lie too low."""
     theta_i = np.radians(np.concatenate([np.arange(0.0, 86.0, 5.0), [88.0]]))
     azimuth = np.radians(np.arange(0.0, 181.0, 7.5))
     radial = np.radians(
