@@ -27,9 +27,7 @@ class CookTorrance(_Glossy):
     """
 
     specular: Colour = spectrum(default=0.25, doc="factor of the lobe; 1/4 is that of a real surface", low=0.0)
-    alpha: Width = width(
-        default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0
-    )
+    alpha: Width = width(default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0)
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()

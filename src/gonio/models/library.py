@@ -9,6 +9,7 @@ As text, for the command line and scenes, the second is alum-bronze:low2012/lows
 
 from __future__ import annotations
 
+import difflib
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -19,7 +20,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import model
+from . import model, models
 from .material import BSDF, Preset
 from .parameters import Value
 
@@ -71,6 +72,12 @@ def fits(name: str) -> list[str]:
 def knows(text: str) -> bool:
     """Whether a text names a material of the library, were it with a fit that there is none of."""
     return text.partition(":")[0] in published()[DEFAULT].materials
+
+
+def resembles(text: str) -> bool:
+    """Whether a text is the name of a material, with or without a fit, or nearer to one than to a model's name."""
+    near = difflib.get_close_matches(text.partition(":")[0].lower(), [*materials(), *models()], n=1, cutoff=0.75)
+    return bool(near) and near[0] in materials()
 
 
 def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
