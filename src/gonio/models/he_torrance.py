@@ -73,6 +73,11 @@ class HeTorrance(_Glossy):
         return 2.0 * self.sigma / self.tau
 
     @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^2 of r = 1 / (4 width^2), the density of light at a rough surface's peak against the cosine's."""
+        return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
+
+    @function
     def _seen(self, v: Direction) -> Scalar:
         """S of one direction (He1991, eq. 24 and 25, with the exponential)."""
         width = self._width()

@@ -65,6 +65,11 @@ class Lafortune(_Glossy):
         return power_of_cosine(dot(axis, wi), versine * (2.0 - versine), self.exponent)
 
     @function
+    def _focus(self) -> Scalar:
+        """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the density of light at the peak against the cosine's."""
+        return sqr(self.exponent / (self.exponent + 2.0))
+
+    @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular (n + 2) / (2 pi) |C o|^n (axis.wi)^n cos theta_i."""
         axis, length = self._axis(wo)

@@ -46,6 +46,11 @@ class Ward(_Glossy):
         return distribution("beckmann").D(frame.rotate(h, self.rotation), self.alpha)
 
     @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^2 of r = 1 / (4 alpha_x alpha_y), the density of light at the peak against the cosine's."""
+        return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
+
+    @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) cos theta_i."""
         h, _ = facet(wo, wi)
