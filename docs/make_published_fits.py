@@ -1,10 +1,10 @@
-"""Write docs/published-fits.md, its pictures and cards.json: what the 1,302 published fits of the MERL materials are worth.
+"""Write docs/published-fits.md, its pictures and cards.json: what the published fits of the MERL materials are worth.
 
     python docs/make_published_fits.py [--networks merl.npz] [--only FILE/FIT,...]
 
-merl.npz holds networks of 675 weights for 13 of the materials (Sztrajman2021): `NAME/kernel0..2`, `NAME/bias0..2`. Without
-it, or with --only, nothing is written but the table on the terminal. Nothing here judges by chance: all points are the
-same for every fit.
+merl.npz holds networks of 675 weights for 13 of the materials (Sztrajman2021): `NAME/kernel0..2`, `NAME/bias0..2`.
+Without it, or with --only, nothing is written but the table on the terminal. Nothing here judges by chance: all points
+are the same for every fit.
 """
 
 from __future__ import annotations
@@ -222,7 +222,15 @@ def summary(cards: list[Card]) -> str:
                 f"{short(float(cosine.min()))} / {short(float(np.median(cosine)))}",
             )
         )
-    header = "fit", "model", "fits", "gain at some view", "gain on average", "largest albedo, at degrees", "negative light"
+    header = (
+        "fit",
+        "model",
+        "fits",
+        "gain at some view",
+        "gain on average",
+        "largest albedo, at degrees",
+        "negative light",
+    )
     return table((*header, "sampling x cosine, least / median"), rows)
 
 
@@ -261,9 +269,7 @@ def side_by_side(name: str, weights: dict[str, Array]) -> Material:
     brdfs = {fit: of(go.material(name, fit)) for fit in library.fits(name)}
     if f"{name}/kernel0" in weights:
         brdfs["network"] = network(weights, name)
-    return Material(
-        name, {fit: mapped(f) for fit, f in brdfs.items()}, {fit: picture(f) for fit, f in brdfs.items()}
-    )
+    return Material(name, {fit: mapped(f) for fit, f in brdfs.items()}, {fit: picture(f) for fit, f in brdfs.items()})
 
 
 def figure_energy(cards: list[Card]) -> None:
@@ -316,7 +322,9 @@ def generations(materials: list[Material]) -> str:
             both = [m.distance(a, b) for m in materials if a in m.values and b in m.values]
             row.append("-" if a == b else f"{float(np.median(both)):.2f}")
         rows.append(row)
-    return table(("", *(str(i + 1) for i in range(len(fits)))), [(f"{i + 1} {r[0]}", *r[1:]) for i, r in enumerate(rows)])
+    return table(
+        ("", *(str(i + 1) for i in range(len(fits)))), [(f"{i + 1} {r[0]}", *r[1:]) for i, r in enumerate(rows)]
+    )
 
 
 def networks(materials: list[Material]) -> str:

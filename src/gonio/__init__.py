@@ -118,7 +118,7 @@ __all__ = [
     "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
     "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
     "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
-    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model",
-    "models", "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided",
-    "verify", "view", "width",
+    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "fits", "flag", "get_precision", "material",
+    "materials", "method", "mix", "model", "models", "never", "number", "ops", "plot", "register", "render",
+    "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 """A hundred named materials: what three papers fitted to the measured BRDFs of the MERL database, as parameters.
 
     go.material("alum-bronze")                                  Bagher2012's fit, by `shifted-gamma`
-    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as `go.fits("alum-bronze")` lists them
+    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
 
 As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The figures stand in
 `published/`, as the papers print them; here is what they mean. Every fit is a preset of its model too.
@@ -93,7 +93,7 @@ def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
 
 
 def presets(model_name: str) -> dict[str, Preset]:
-    """The fits of a model as its presets: "alum-bronze", or "alum-bronze:low2012/lowsmooth_E2" of fits but the default."""
+    """The fits of a model as its presets: "alum-bronze" of the default, else "alum-bronze:low2012/lowsmooth_E2"."""
     return {
         key: Preset(key, values, fit.source)
         for fit in published().values()

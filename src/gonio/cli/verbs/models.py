@@ -60,10 +60,10 @@ def _library(as_json: bool) -> None:
     for name, fit in published.items():
         table.add_row(name, fit.model, fit.source, str(len(fit.materials)))
     print_rich(table)
-    table = listing("material", "fits besides the first, which is meant where none is named")
-    for name, fits in rows.items():
-        left = [fit for fit in published if fit not in fits]
-        table.add_row(name, f"all but {', '.join(left)}" if left and len(left) < 8 else "all" if not left else "")
+    table = listing("material", "fits, the first of which is meant where none is named")
+    for name, found in rows.items():
+        left = sorted({fit.split("/")[0] for fit in published if fit not in found})
+        table.add_row(name, f"all but those of {', '.join(left)}" if left else "all")
     print_rich(table)
 
 
