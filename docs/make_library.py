@@ -2,9 +2,9 @@
 
     python docs/make_library.py FOLDER      # with bagher2012.json, low2012.json and ngan2005.json
 
-The files in FOLDER hold what three papers print, as the collection of the BSDF benchmark bsdfbenchmark/bbm transcribed it:
-{fit: {"model": ..., "materials": {name: {parameter: number or list}}}}. Nothing is converted here, only written shorter:
-a list of numbers a material, in the order of `parameters`.
+The files in FOLDER hold what three papers print, as the collection of the BSDF benchmark bsdfbenchmark/bbm transcribed
+it: {fit: {"model": ..., "materials": {name: {parameter: number or list}}}}. Nothing is converted here, only written
+shorter: a list of numbers a material, in the order of `parameters`.
 """
 
 from __future__ import annotations

@@ -63,13 +63,11 @@ class Material:
         """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
         is no material's name. Raises InputError for parameters without a material."""
         from ..errors import InputError
-        from ..models import models, notation, outside
+        from ..models import notation, outside
 
         text = str(scene)
         head = text.partition("(")[0]
-        if outside.reader_of(head) or (
-            not scene.exists() and (outside.names_code(head) or head.replace("_", "-") in models())
-        ):
+        if outside.reader_of(head) or (not scene.exists() and notation.names_material(head)):
             return notation.named(self.text(text))[0]
         if self.param or self.preset:
             what = "parameters of a material given, and a scene"

@@ -38,15 +38,28 @@ def models() -> dict[str, type[BSDF]]:
     return BSDF.family.all()
 
 
+def is_model(name: str) -> bool:
+    """Whether `model` finds a class of that name."""
+    return bool(_key(name))
+
+
 def model(name: str) -> type[BSDF]:
     """The class of that name; underscores, hyphens and case do not matter. InputError where there is none."""
-    known = models()
-    wanted = name.lower().replace("_", "-")
-    by_class = {cls.__name__.lower(): key for key, cls in known.items()}
-    key = wanted if wanted in known else by_class.get(name.lower(), "")
+    key = _key(name)
     if not key:
-        raise InputError(f"unknown material '{name}'", "model", did_you_mean(wanted, list(known)))
-    return known[key]
+        raise InputError(f"unknown material '{name}'", "model", did_you_mean(_plain(name), list(models())))
+    return models()[key]
+
+
+def _key(name: str) -> str:
+    """The name under which a class is known; "" where there is none."""
+    known = models()
+    by_class = {cls.__name__.lower(): key for key, cls in known.items()}
+    return _plain(name) if _plain(name) in known else by_class.get(name.lower(), "")
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "-")
 
 
 make_callable(__name__, models)

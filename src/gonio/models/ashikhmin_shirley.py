@@ -21,9 +21,10 @@ from .parameters import Angle, Colour, Width, choice, flag, spectrum, width
 class AshikhminShirley(_Glossy):
     """Anisotropic Phong: f = diffuse part + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
 
-    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h. F
-    is Schlick's in the paper, of an index eta: F0 = ((eta - 1) / (eta + 1))^2. The diffuse part is Lambert's, or coupled
-    to the lobe as in the paper: what F0 reflects is missing from it, and it fades toward grazing light. Reciprocal.
+    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
+    F is Schlick's in the paper, of an index eta: F0 = ((eta - 1) / (eta + 1))^2. The diffuse part is Lambert's, or
+    coupled to the lobe as in the paper: what F0 reflects is missing from it, and it fades toward grazing light.
+    Reciprocal.
     """
 
     specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
@@ -53,7 +54,7 @@ class AshikhminShirley(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(n / (n + 9))^2: 0 for the flat lobe n = 0; the density of light at the peak is (n + 1) / 8 of the cosine's."""
+        """(n / (n + 9))^2: 0 for the flat lobe n = 0; the density at the peak is (n + 1) / 8 of the cosine's."""
         n = sqrt((self.exponent.x + 1.0) * (self.exponent.y + 1.0))
         return sqr((n - 1.0) / (n + 8.0))
 
@@ -99,8 +100,8 @@ def _faded(cos: Scalar) -> Scalar:
 
 @function
 def _half_vector(u1: Scalar, u2: Scalar, exponent: Pair) -> Direction:
-    """A half vector of density p: tan phi = sqrt((n_x + 1) / (n_y + 1)) tan(2 pi u2), then the power lobe of that azimuth
-    (Ashikhmin2000, eq. 9 and 10, all four quadrants at once)."""
+    """A half vector of density p: tan phi = sqrt((n_x + 1) / (n_y + 1)) tan(2 pi u2), then the power lobe of that
+    azimuth (Ashikhmin2000, eq. 9 and 10, all four quadrants at once)."""
     s, c = sincos((2.0 * ops.pi) * u2)
     across = s * sqrt((exponent.x + 1.0) / (exponent.y + 1.0))
     over = ops.rsqrt(sqr(c) + sqr(across))

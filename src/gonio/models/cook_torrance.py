@@ -20,16 +20,15 @@ from .parameters import Angle, Colour, Width, spectrum, width
 class CookTorrance(_Glossy):
     """Rough metal or varnish as of 1982: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
 
-    D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), Beckmann's without its 1 / pi, and G that of V-grooves: as printed. Today
-    D has the 1 / pi and the denominator a 4 (`conductor`), so this lobe is four times as bright as its facets; hence
-    specular = 1/4 for a real surface. Ngan2005 divides by pi once more, so specular is then pi / 4. F is that of an index
-    eta without absorption, which stands for a metal of reflectance F0 by eta = (1 + sqrt F0) / (1 - sqrt F0).
+    D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), Beckmann's without its 1 / pi, and G that of V-grooves: as printed.
+    Today D has the 1 / pi and the denominator a 4 (`conductor`), so this lobe is four times as bright as its facets;
+    hence specular = 1/4 for a real surface. Ngan2005 divides by pi once more. F is that of an index eta without
+    absorption, which stands for a metal of reflectance F0 by eta = (1 + sqrt F0) / (1 - sqrt F0). Reciprocal. Sampled
+    by visible normals of Beckmann's D with Smith's masking.
     """
 
     specular: Colour = spectrum(default=0.25, doc="factor of the lobe; 1/4 is that of a real surface", low=0.0)
-    alpha: Width = width(
-        default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0
-    )
+    alpha: Width = width(default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0)
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()

@@ -41,11 +41,11 @@ class HeTorrance(_Glossy):
     (n.o)(n.i)) (He1991, eq. 71, 76 and 78).
 
     D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), v = o + i along the surface,
-    g = (2 pi s / lambda (n.o + n.i))^2 with s = sigma / sqrt(1 + w) the roughness of what is not in shadow, w e^w = x^2, x
-    = sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi). G, of the vectors of polarization, is 4 (o.h)^2 / (n.h)^2 for
-    any pair: those of eq. 76 are orthonormal, and the rest cancels. S is Smith's masking of Beckmann's slopes, width 2
-    sigma / tau, times (1 + erf(cot / width)) / 2 for either direction, with the exponential that eq. 25 lost in print
-    (Holzschuch2017).
+    g = (2 pi s / lambda (n.o + n.i))^2 with the roughness s = sigma / sqrt(1 + w) of what lies in no shadow, where
+    w e^w = x^2, x = sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi). G, of the vectors of polarization, is
+    4 (o.h)^2 / (n.h)^2 for any pair: those of eq. 76 are orthonormal, and the rest cancels. S is Smith's masking of
+    Beckmann's slopes, of width 2 sigma / tau, times (1 + erf(cot / width)) / 2 for either direction, with the
+    exponential that eq. 25 lost in print (Holzschuch2017).
 
     As Ngan2005 used it: F of a real index, unpolarized; no coherent part (a mirror's), which no measured table holds.
     From g = 18 on D is the limit of the series, exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2). Reciprocal.
@@ -71,6 +71,11 @@ class HeTorrance(_Glossy):
     def _width(self) -> Scalar:
         """Width of the slopes, as Beckmann's alpha."""
         return 2.0 * self.sigma / self.tau
+
+    @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^2 of r = 1 / (4 width^2), the density at a rough surface's peak against the cosine's."""
+        return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
 
     @function
     def _seen(self, v: Direction) -> Scalar:

@@ -23,10 +23,10 @@ class Lafortune(_Glossy):
     """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
 
     The three C are cx, cy, cz, n is `exponent`, the base is cut at 0 (Lafortune1997, eq. 4). C = (-1, -1, 1) is Phong's
-    lobe about the mirror direction, normalized (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans it
-    toward the horizon, and where cx and cy are positive, light is thrown back. The largest C should have size 1, as in
-    Ngan2005's normalization: what is less goes into the lobe's strength, to the n-th power. Reciprocal. Sampled by a power
-    lobe about (C o_x, C o_y, C o_z).
+    lobe about the mirror direction, normalized (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans
+    it toward the horizon, and where cx and cy are positive, light is thrown back. The largest C should have size 1, as
+    in Ngan2005's normalization: what is less goes into the lobe's strength, to the n-th power. Reciprocal. Sampled by a
+    power lobe about (C o_x, C o_y, C o_z).
     """
 
     specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at C = (-1, -1, 1), seen from the normal", low=0.0)
@@ -63,6 +63,11 @@ class Lafortune(_Glossy):
         off = wi - axis
         versine = 0.5 * dot(off, off)
         return power_of_cosine(dot(axis, wi), versine * (2.0 - versine), self.exponent)
+
+    @function
+    def _focus(self) -> Scalar:
+        """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the density of light at the peak against the cosine's."""
+        return sqr(self.exponent / (self.exponent + 2.0))
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:

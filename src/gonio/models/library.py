@@ -1,7 +1,7 @@
 """A hundred named materials: what three papers fitted to the measured BRDFs of the MERL database, as parameters.
 
     go.material("alum-bronze")                                  Bagher2012's fit, by `shifted-gamma`
-    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as `go.fits("alum-bronze")` lists them
+    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
 
 As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The figures stand in
 `published/`, as the papers print them; here is what they mean. Every fit is a preset of its model too.
@@ -9,6 +9,7 @@ As text, for the command line and scenes, the second is alum-bronze:low2012/lows
 
 from __future__ import annotations
 
+import difflib
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -19,7 +20,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import model
+from . import model, models
 from .material import BSDF, Preset
 from .parameters import Value
 
@@ -73,6 +74,12 @@ def knows(text: str) -> bool:
     return text.partition(":")[0] in published()[DEFAULT].materials
 
 
+def resembles(text: str) -> bool:
+    """Whether a text is the name of a material, with or without a fit, or nearer to one than to a model's name."""
+    near = difflib.get_close_matches(text.partition(":")[0].lower(), [*materials(), *models()], n=1, cutoff=0.75)
+    return bool(near) and near[0] in materials()
+
+
 def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
     """(class, its preset's name) of NAME or NAME:FILE/FIT."""
     name, _, fit = text.partition(":")
@@ -86,7 +93,7 @@ def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
 
 
 def presets(model_name: str) -> dict[str, Preset]:
-    """The fits of a model as its presets: "alum-bronze", or "alum-bronze:low2012/lowsmooth_E2" of fits but the default."""
+    """The fits of a model as its presets: "alum-bronze" of the default, else "alum-bronze:low2012/lowsmooth_E2"."""
     return {
         key: Preset(key, values, fit.source)
         for fit in published().values()

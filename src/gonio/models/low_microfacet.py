@@ -34,7 +34,7 @@ class LowMicrofacet(_Glossy):
     breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach("D is not normalized, ")}
 
     def _most(self) -> np.ndarray:
-        """16 specular int D d(n.h): the weight of a sample is 8 specular F G (o.h) / (n.o) of it, G (o.h) <= 2 (n.o)."""
+        """16 specular int D d(n.h): a sample weighs 8 specular F G (o.h) / (n.o) of it, and G (o.h) <= 2 (n.o)."""
         b, c = np.asarray(self.b, float), np.asarray(self.c, float)
         log_t, q = np.log1p(b), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
         return np.max(np.asarray(self.specular, float)) * 16.0 * np.max(np.expm1(q * log_t) / (q * b))
@@ -55,7 +55,7 @@ class LowMicrofacet(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """((1 - int D) / (1 + 8 int D))^2: 0 for the flat lobe; the density of light at the peak is 1 / (8 int D) of the cosine's."""
+        """((1 - int D) / (1 + 8 int D))^2: 0 for the flat lobe; at the peak r is 1 / (8 int D)."""
         mass = self._mass()
         return sqr((1.0 - mass) / (1.0 + 8.0 * mass))
 

@@ -39,9 +39,9 @@ class LowSmooth(_Glossy):
     """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
 
     Dp = o + i along the surface, how far the pair is from a mirror's, after the power spectrum of polished surfaces
-    (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the surface, the facet's own angle for a
-    mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, not an albedo. Sampled by its own power law,
-    cut near the rim of the disk of directions.
+    (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the surface: the facet's own angle
+    for a mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, no albedo. Sampled by its own power
+    law, cut near the rim of the disk of directions.
     """
 
     specular: Colour = spectrum(default=10.0, doc="height of the peak over F, 1/sr", low=0.0)
@@ -80,7 +80,7 @@ class LowSmooth(_Glossy):
 
     @function
     def _focus(self) -> Scalar:
-        """(1 - 1 / r)^2, r = 1 / (2 mass) the lobe's density at its peak against the cosine's, which is flat on the disk."""
+        """(1 - 1 / r)^2, r = 1 / (2 mass) the density at the peak against the cosine's, which is flat on the disk."""
         mass = self._mass(1.0 + 0.0 * self.b)
         return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
 
@@ -95,8 +95,8 @@ class LowSmooth(_Glossy):
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
-        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, ending at its rim or at
-        `RIM`; beyond the rim it has failed."""
+        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, ending at its rim or
+        at `RIM`; beyond the rim it has failed."""
         s, c = sincos((2.0 * ops.pi) * u.z)
         rim = _rim(wo, c, s)
         q = 1.0 - self.c

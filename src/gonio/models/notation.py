@@ -3,6 +3,8 @@
     conductor                                   its name; parameters follow as NAME=VALUE
     ward.py:Ward                                a class in a Python file, which runs because the user named it
     gold.binary                                 a file of measured values
+    alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
+    alum-bronze:low2012/lowsmooth_E2            the same by another published fit
     conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
     {"type": "conductor", "alpha": [.1, .4]}    as in a scene
 
@@ -20,11 +22,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import model, outside, tree
+from . import is_model, library, model, outside, tree
 from .material import BSDF
 from .parameters import Parameter, Value
 
-_CALL = re.compile(r"\s*([\w-]+|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
+_CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
 
 
 def assignment(text: str, option: str = "--param") -> tuple[str, str]:
@@ -186,12 +188,28 @@ def _inner(value: Value, where: str) -> BSDF:
         name = str(fields.pop("type"))
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise _no_material(value, where) from None
-    return made(class_named(name, where), fields)[0]
+    cls, preset = class_and_preset(name, where)
+    return made(cls, {"preset": preset, **fields} if preset else fields)[0]
 
 
 def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
     """The class of a name, or of FILE.py:CLASS."""
-    return outside.load(name, where=where) if outside.names_code(name) else model(name)
+    return class_and_preset(name, where)[0]
+
+
+def names_material(name: str) -> bool:
+    """Whether a name, without parameters, is meant for a material: known, code, or nearest to one of the library."""
+    return outside.names_code(name) or is_model(name) or library.resembles(name)
+
+
+def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
+    """The class of a name, of FILE.py:CLASS or of a material of the library, of which the preset too; "" for none.
+    InputError, with the nearest known name, where there is nothing of that name."""
+    if outside.names_code(name):
+        return outside.load(name, where=where), ""
+    if not is_model(name) and (":" in name or library.resembles(name)):
+        return library.named(name, where)
+    return model(name), ""
 
 
 def spelled(cls: type[BSDF]) -> str:
@@ -220,7 +238,9 @@ def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, 
     match = _CALL.fullmatch(text)
     if not match or re.fullmatch(r"[\d.-]+", match[1]):
         raise _no_material(text, where)
-    return class_named(match[1], where), dict(assignment(part, where) for part in _parts(match[2] or ""))
+    own = dict(assignment(part, where) for part in _parts(match[2] or ""))
+    cls, preset = class_and_preset(match[1], where)
+    return cls, {"preset": preset, **own} if preset else own
 
 
 def _parts(text: str) -> list[str]:

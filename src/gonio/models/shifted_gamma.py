@@ -31,22 +31,22 @@ from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
 from .parameters import Colour, spectrum
 
-
 # G1 ends here. Those of the paper reach -0.002 at 90 degrees, which is kept; further down, where only parameters of
 # one's own lead, two negative G1 would multiply to a positive light without bound.
 LEAST = -0.01
 
 
 class ShiftedGamma(_Glossy):
-    """Microfacets with a distribution fitted to measured ones: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), each
-    channel for itself (Bagher2012).
+    """Microfacets of a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), a channel each
+    (Bagher2012).
 
-    D = normalization e^-x / (x^p pi cos^4 h), x = alpha + tan^2 h / alpha; G = G1(o) G1(i), G1 = 1 + Lambda (1 - exp(t^k))
-    of t = (theta - theta0) / reach, 1 below theta0; F = f0 + (1 - f0) (1 - cos)^5 - f1 cos. In the paper c = reach^-k,
-    which is past 1e100 in its own fits; the angle is not. normalization = 1 / (alpha Gamma(1 - p, alpha)) makes D integrate
-    to 1. All of these are fitted numbers: F can pass 1 and, where f1 > f0, be negative, G1 ends below 0 within a degree of
-    the horizon, and the light is then negative as printed. Reciprocal. Sampled by a power law and an exponential that
-    together stay within a factor e of D, of the narrowest channel's width and the widest's.
+    D = normalization e^-x / (x^p pi cos^4 h), x = alpha + tan^2 h / alpha; G = G1(o) G1(i), where
+    G1 = 1 + Lambda (1 - exp(t^k)) of t = (theta - theta0) / reach, 1 below theta0;
+    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos. In the paper c = reach^-k, which is past 1e100 in its own fits; the angle is
+    not. normalization = 1 / (alpha Gamma(1 - p, alpha)) makes D integrate to 1. All of these are fitted numbers: F can
+    pass 1 and, where f1 > f0, be negative, G1 can end below 0 at the horizon, and the lobe is then negative, as
+    printed. Reciprocal. Sampled by a power law and an exponential that together stay within a factor e of D, of the
+    narrowest channel's width and the widest's.
     """
 
     specular: Colour = spectrum(default=0.3, doc="factor of the lobe", low=0.0)
@@ -63,7 +63,7 @@ class ShiftedGamma(_Glossy):
     breaks: ClassVar[Mapping[str, Breach]] = {
         "energy": sum_breach("F and G are fitted factors, which no law bounds, "),
         "positivity": Breach(
-            "F is negative where f1 cos is more than Schlick's curve, and G1 close to the horizon where Lambda is large",
+            "F is negative where f1 cos is more than Schlick's curve, and G1 may be at the horizon",
             1.0,
             certain=False,
         ),
@@ -80,7 +80,8 @@ class ShiftedGamma(_Glossy):
         theta = atan2(sqrt(maximum(frame.sin2(v), 1e-20)), v.z)
         t = maximum(theta - self.theta0, 1e-6) / self.reach
         power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 stays in float32, and is far below the least G1
-        return maximum(1.0 - self.Lambda * (power * exprel(power)), LEAST)
+        depth = self.Lambda * power * exprel(power)
+        return maximum(1.0 - depth, LEAST)
 
     @function
     def _density(self, h: Direction) -> Spectrum:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -16,7 +15,7 @@ from .parameters import Angle, Colour, Width, spectrum, width
 
 
 class Ward(_Glossy):
-    """Ward's anisotropic Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
+    """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
 
     e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), h the half vector (Walter2005). Reciprocal. A narrow lobe
     reflects specular cos theta_o, so it loses energy as the view gets flat, and beyond, where a wide one has spread to
@@ -31,8 +30,10 @@ class Ward(_Glossy):
         "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing, and "),
     }
 
-    def _most(self) -> float:
-        return math.inf
+    @property
+    def _height(self) -> Spectrum:
+        """`specular`; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        return self.specular
 
     @function
     def _shape(self, wo: Direction, wi: Direction) -> Scalar:
@@ -44,6 +45,11 @@ class Ward(_Glossy):
     def _density(self, h: Direction) -> Scalar:
         """Beckmann's D."""
         return distribution("beckmann").D(frame.rotate(h, self.rotation), self.alpha)
+
+    @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^2 of r = 1 / (4 alpha_x alpha_y), the density of light at the peak against the cosine's."""
+        return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:

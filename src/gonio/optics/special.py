@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import ops
-from ..ops import Scalar, abs, clamp, erf, exp, fma, function, is_short, log, minimum, sqr, sqrt, where
+from ..ops import Scalar, Spectrum, abs, clamp, erf, exp, fma, function, is_short, log, minimum, sqr, sqrt, where
+
+V = TypeVar("V", Scalar, Spectrum)
 
 # Giles2010, the single-precision polynomial: coefficients in falling powers.
 # fmt: off
@@ -89,7 +92,7 @@ def power_of_cosine(cos_theta: Scalar, sin2: Scalar, p: Scalar) -> Scalar:
 
 
 @function
-def exprel(x: Scalar) -> Scalar:
+def exprel(x: V) -> V:
     """(e^x - 1) / x, 1 at x = 0: by its series up to |x| = 1/2, whose next term is under 2e-17 of it."""
     t = clamp(x, -0.5, 0.5)
     series = 1.0 + t * (1.0 / 13.0)

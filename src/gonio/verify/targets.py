@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..models import notation, outside
+from ..models import library, notation, outside
 from .subject import Subject
 
 STEPS = 5  # of a sweep
@@ -79,7 +79,8 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     if Path(target).suffix in (".merl", ".csv", ".txt") or Path(target).is_file():
         hint = "gonio convert reads measurements: .binary, .bsdf, .brdf, .astm, .npz, .gonio"
         raise InputError(f"'{target}' is in no format that can be verified", "TARGET", hint)
-    if ":" in target.partition("(")[0] and ".py:" not in target:
+    name = target.partition("(")[0]
+    if ":" in name and ".py:" not in name and not library.resembles(name):
         raise InputError(f"'{target}' is no target", "TARGET", "give MODEL, FILE.py:CLASS or mitsuba:PLUGIN")
     cls, own = notation.taken_apart(target)
     bsdf, values = notation.made(cls, {**own, **given})

@@ -15,6 +15,7 @@ from .base import MATERIALS, verb
 @verb(MATERIALS, place=4)
 def models(
     quality: Annotated[bool, Option("--quality", help="How well each samples itself, at its defaults.")] = False,
+    library: Annotated[bool, Option("--library", help="The named materials, with the fits there are of each.")] = False,
     as_json: Json = False,
 ) -> None:
     """List the materials.
@@ -23,8 +24,13 @@ def models(
     Examples:
       gonio models
       gonio models --quality
+      gonio models --library
     """
     from ...models import models
+
+    if library:
+        _library(as_json)
+        return
 
     if quality:
         _qualities(as_json)
@@ -38,6 +44,26 @@ def models(
     table = listing("material", "what it is", "parameters")
     for name, (doc, parameters) in rows.items():
         table.add_row(name, doc, ", ".join(parameters))
+    print_rich(table)
+
+
+def _library(as_json: bool) -> None:
+    from ...models import library
+
+    published = library.published()
+    rows = {name: library.fits(name) for name in library.materials()}
+    if as_json:
+        fits = {name: {"model": fit.model, "source": fit.source} for name, fit in published.items()}
+        print(json.dumps({"materials": rows, "fits": fits}))
+        return
+    table = listing("fit", "model", "source", "materials")
+    for name, fit in published.items():
+        table.add_row(name, fit.model, fit.source, str(len(fit.materials)))
+    print_rich(table)
+    table = listing("material", "fits, the first of which is meant where none is named")
+    for name, found in rows.items():
+        left = sorted({fit.split("/")[0] for fit in published if fit not in found})
+        table.add_row(name, f"all but those of {', '.join(left)}" if left else "all")
     print_rich(table)
 
 

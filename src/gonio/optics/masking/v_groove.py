@@ -10,7 +10,7 @@ from .base import Masking
 class VGroove(Masking):
     """V-grooves (Torrance1967): every facet masks the one opposite.
 
-    G1 = min(1, 2 (n.m) (n.v) / (v.m)), which knows no width: the facet that masks has the slope of the one that is seen.
+    G1 = min(1, 2 (n.m) (n.v) / (v.m)), which knows no width: the facet that masks has the seen one's slope.
     """
 
     name = "v-groove"

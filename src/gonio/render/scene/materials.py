@@ -34,7 +34,7 @@ from pydantic_core import PydanticCustomError
 
 from ... import measure
 from ...errors import GonioWarning, InputError
-from ...models import BSDF, Parameter, models, outside
+from ...models import BSDF, Parameter, library, models, outside
 from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
@@ -280,7 +280,7 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
     for key in lab.ignored if lab else ():
         fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="Accepted and ignored."))
     if model.presets():
-        doc = 'A named refractive index in place of the numbers, e.g. "Au".'
+        doc = f'Named values in place of the numbers, e.g. "{next(iter(model.presets()))}".'
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
     title = "".join(word.capitalize() for word in names[0].split("-"))
     cls = create_model(title, __base__=MaterialPart, __doc__=lab.doc if lab else _summary(model), **fields)
@@ -320,6 +320,8 @@ def part_of(name: str) -> type[MaterialPart] | None:
     """The part that describes materials of a type, also of one that was registered since; None where there is none."""
     if name in BY_TYPE:
         return BY_TYPE[name]
+    if library.knows(name):
+        return BY_TYPE[library.named(name)[0].name]
     model: Any = models().get(name.replace("_", "-").removeprefix("gonio-"))  # Any: mypy takes it for unhashable
     return None if model is None else _own_part(name, model)
 
@@ -347,7 +349,7 @@ def _tag(value: object) -> str | None:
     name = value.get("type")
     if not isinstance(name, str):
         return None if name is None else OWN
-    own = name not in BY_TYPE and (outside.names_code(name) or part_of(name) is not None)
+    own = name not in BY_TYPE and (outside.names_code(name) or part_of(name) is not None or library.resembles(name))
     return OWN if own else name
 
 
@@ -360,6 +362,8 @@ def _own(value: object, info: ValidationInfo) -> object:
     name, context = value["type"], info.context or {}
     if not isinstance(name, str):
         raise invalid(f"unknown type '{name}'", "known: " + ", ".join(sorted(BY_TYPE)), "type")
+    if not outside.names_code(name) and library.resembles(name):
+        return _from_library(name, value, context)
     part = part_of(name)
     if part is None:
         if not context.get("allow_code"):
@@ -371,6 +375,15 @@ def _own(value: object, info: ValidationInfo) -> object:
         except InputError as error:
             raise invalid(f"{error.where}: {error.what}", error.hint, "type") from None
     return part.model_validate(value, context=context)
+
+
+def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
+    """A named material, as its model with a preset."""
+    try:
+        model, preset = library.named(name)
+    except InputError as error:
+        raise invalid(error.what, error.hint, "type") from None
+    return BY_TYPE[model.name].model_validate({**value, "type": model.name, "preset": preset}, context=context)
 
 
 if TYPE_CHECKING:

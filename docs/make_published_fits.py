@@ -1,0 +1,402 @@
+"""Write docs/published-fits.md, its pictures and cards.json: what the published fits of the MERL materials are worth.
+
+    python docs/make_published_fits.py [--networks merl.npz] [--only FILE/FIT,...]
+
+merl.npz holds networks of 675 weights for 13 of the materials (Sztrajman2021): `NAME/kernel0..2`, `NAME/bias0..2`.
+Without it, or with --only, nothing is written but the table on the terminal. Nothing here judges by chance: all points
+are the same for every fit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gonio as go
+import numpy as np
+from gonio.models import library
+from gonio.verify import quality
+from gonio.verify.subject import Subject
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+HERE = Path(__file__).parent
+FOLDER = HERE / "published-fits"
+Array = NDArray[np.float64]
+BRDF = Callable[[Array, Array], Array]
+
+THETA = np.array([1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 88.0, 89.5])  # of the view, degrees
+POINTS = 4096  # of a rank-1 lattice, for each view: albedos to about a thousandth
+SIZE = 96  # pixels of a sphere
+LIGHTS = np.array([[-0.45, 0.55, 0.7], [0.9, 0.35, 0.25], [0.3, -0.75, -0.15]])  # key, rim, and from behind
+
+
+class Card(NamedTuple):
+    """One fit of one material.
+
+    gain      largest albedo of a channel over the views, less 1; `at`, in degrees
+    mean      what it gains on average over all views, weighed by their cosine, in its worst channel
+    negative  share of the light that is negative, at the view where it is largest
+    recip     |f(o, i) - f(i, o)| relative to the larger, at worst
+    cosine    variance of cosine sampling over that of its own
+    """
+
+    material: str
+    fit: str
+    gain: float
+    at: float
+    mean: float
+    negative: float
+    recip: float
+    cosine: float | None
+
+    @property
+    def severity(self) -> float:
+        """What a picture is wrong by: gained or negative light, on average; the worst view counts a tenth."""
+        return self.mean + self.negative + 0.1 * max(self.gain, 0.0)
+
+
+# --------------------------------------------------------------------------- directions
+
+
+def unit(w: Array) -> Array:
+    return w / np.linalg.norm(w, axis=-1, keepdims=True)
+
+
+def polar(theta: Array, phi: Array | float) -> Array:
+    """Unit vectors of angles in radians."""
+    theta, phi = np.broadcast_arrays(theta, phi)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+
+def rusinkiewicz() -> tuple[Array, Array]:
+    """(wo, wi) on the coordinates of MERL's tables, every few of them: theta_h by its square root, theta_d and phi_d
+    evenly; pairs below the surface are left out."""
+    half = (np.arange(24) + 0.5) ** 2 / 24**2 * np.pi / 2
+    difference = (np.arange(12) + 0.5) / 12 * np.pi / 2
+    turn = (np.arange(12) + 0.5) / 12 * np.pi
+    h, d, p = (x.ravel() for x in np.meshgrid(half, difference, turn, indexing="ij"))
+    v = polar(d, p)
+    x, y = np.stack([np.cos(h), 0 * h, -np.sin(h)], -1), np.array([0.0, 1.0, 0.0])
+    n = polar(h, 0.0)
+    wi = v[:, :1] * x + v[:, 1:2] * y + v[:, 2:] * n
+    wo = -v[:, :1] * x - v[:, 1:2] * y + v[:, 2:] * n
+    above = (wo[:, 2] > 0.01) & (wi[:, 2] > 0.01)
+    return unit(wo[above]), unit(wi[above])
+
+
+def sphere() -> tuple[Array, Array, Array]:
+    """(mask of the ball's pixels, wo and wi of each and each light in the surface's frame)."""
+    at = (np.arange(SIZE) + 0.5) / SIZE * 2.1 - 1.05
+    x, y = np.meshgrid(at, -at)
+    inside = x**2 + y**2 < 1.0
+    n = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], -1)[inside]
+    tangent = unit(np.cross([0.0, 1.0, 0.0], n))
+    frame = np.stack([tangent, np.cross(n, tangent), n], 1)
+    wo = frame @ np.array([0.0, 0.0, 1.0])
+    wi = np.stack([frame @ light for light in unit(LIGHTS)])
+    return inside, wo, wi
+
+
+def network(weights: dict[str, Array], name: str) -> BRDF:
+    """The network of a material: half and difference vector in, exp(x) - 1 out, ReLU between (Sztrajman2021)."""
+    layers = [(weights[f"{name}/kernel{i}"], weights[f"{name}/bias{i}"]) for i in range(3)]
+
+    def f(wo: Array, wi: Array) -> Array:
+        h = unit(wo + wi)
+        sin = np.hypot(h[:, 0], h[:, 1])
+        c, s = (np.where(sin > 1e-12, x / np.maximum(sin, 1e-12), one) for x, one in ((h[:, 0], 1.0), (h[:, 1], 0.0)))
+        flat = np.stack([c * wi[:, 0] + s * wi[:, 1], c * wi[:, 1] - s * wi[:, 0], wi[:, 2]], -1)  # h to azimuth 0
+        d = np.stack([h[:, 2] * flat[:, 0] - sin * flat[:, 2], flat[:, 1], sin * flat[:, 0] + h[:, 2] * flat[:, 2]], -1)
+        x = np.concatenate([np.stack([sin, 0 * sin, h[:, 2]], -1), d], 1)
+        for kernel, bias in layers[:-1]:
+            x = np.maximum(x @ kernel + bias, 0.0)
+        return np.expm1(x @ layers[-1][0] + layers[-1][1])
+
+    return f
+
+
+def of(material: go.BSDF) -> BRDF:
+    return lambda wo, wi: np.asarray(material.f(wo, wi, precision="float64"))
+
+
+# --------------------------------------------------------------------------- figures
+
+
+GRID = rusinkiewicz()
+INSIDE, EYE, TO_LIGHTS = sphere()
+
+
+def card(name: str, fit: str) -> Card:
+    """The figures of one fit."""
+    material = go.material(name, fit)
+    wo = np.repeat(polar(np.radians(THETA), 0.35), POINTS, axis=0)
+    i = np.arange(POINTS)[:, None]
+    u = np.tile((i * np.array([0.8191725134, 0.6710436067, 0.5497004779]) + 0.5) % 1.0, (len(THETA), 1))
+    drawn = material.sample(wo, u, precision="float64")
+    weight = np.where(drawn.pdf[:, None] > 0.0, drawn.weight, 0.0).reshape(len(THETA), POINTS, 3)
+    albedo = weight.mean(1)
+    row, _ = np.unravel_index(np.argmax(albedo), albedo.shape)
+    # a trapezoid over sin^2, as 2 cos sin dtheta is its step
+    views = np.concatenate([[0.0], np.sin(np.radians(THETA)) ** 2, [1.0]])
+    excess = np.maximum(albedo - 1.0, 0.0)
+    excess = np.concatenate([excess[:1], excess, excess[-1:]])
+    negative = np.minimum(weight, 0.0).mean(1).sum(1) / np.abs(weight).mean(1).sum(1)
+    a, b = GRID[0][::7], GRID[1][::7]
+    one, other = of(material)(a, b), of(material)(b, a)
+    off = np.abs(one - other) / np.maximum(np.maximum(np.abs(one), np.abs(other)), 1e-9)
+    found = quality.of(Subject(material, name))
+    return Card(
+        name,
+        fit,
+        float(albedo.max() - 1.0),
+        float(THETA[row]),
+        float(np.trapezoid(excess, views, axis=0).max()),
+        float(max(-negative.min(), 0.0)),
+        float(off.max()),
+        None if found is None else found.cosine,
+    )
+
+
+def mapped(brdf: BRDF) -> Array:
+    """Cube root of f cos theta_i over MERL's coordinates, flat: in it errors count about as the eye counts them."""
+    wo, wi = GRID
+    return np.cbrt(brdf(wo, wi) * wi[:, 2:]).ravel()
+
+
+def picture(brdf: BRDF) -> Array:
+    """The sphere under three lights of irradiance pi, as sRGB values 0 to 1, (pixels of the ball, 3)."""
+    total = np.zeros((len(EYE), 3))
+    for wi in TO_LIGHTS:
+        lit = wi[:, 2] > 0.0
+        total[lit] += np.pi * brdf(EYE[lit], wi[lit]) * wi[lit, 2:]
+    total = np.clip(total, 0.0, 1.0)
+    return np.where(total <= 0.0031308, 12.92 * total, 1.055 * total ** (1 / 2.4) - 0.055)
+
+
+def apart(a: Array, b: Array) -> float:
+    """|a - b| over the mean of |a| and |b|."""
+    return float(2.0 * np.linalg.norm(a - b) / (np.linalg.norm(a) + np.linalg.norm(b)))
+
+
+def rms(a: Array, b: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(a - b))))
+
+
+# --------------------------------------------------------------------------- the page
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    header = list(header)
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join(lines + ["| " + " | ".join(map(str, row)) + " |" for row in rows])
+
+
+def short(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def percent(value: float) -> str:
+    return "0" if value < 5e-5 else f"{100.0 * value:.2g} %" if value < 10.0 else f"{value:.3g} x"
+
+
+def summary(cards: list[Card]) -> str:
+    rows = []
+    for fit, one in library.published().items():
+        mine = [c for c in cards if c.fit == fit]
+        cosine = np.array([c.cosine for c in mine if c.cosine is not None])
+        gains = sorted(mine, key=lambda c: -c.gain)
+        rows.append(
+            (
+                f"`{fit}`",
+                f"`{one.model}`",
+                len(mine),
+                sum(c.gain > 1e-3 for c in mine),
+                sum(c.mean > 1e-3 for c in mine),
+                f"{gains[0].material}, {short(1 + gains[0].gain)} at {gains[0].at:g}" if gains[0].gain > 1e-3 else "-",
+                sum(c.negative > 1e-6 for c in mine),
+                f"{short(float(cosine.min()))} / {short(float(np.median(cosine)))}",
+            )
+        )
+    header = (
+        "fit",
+        "model",
+        "fits",
+        "gain at some view",
+        "gain on average",
+        "largest albedo, at degrees",
+        "negative light",
+    )
+    return table((*header, "sampling x cosine, least / median"), rows)
+
+
+def worst(cards: list[Card], count: int) -> str:
+    rows = [
+        (
+            c.material,
+            f"`{c.fit}`",
+            f"{short(1.0 + c.gain)} at {c.at:g}",
+            percent(c.mean),
+            percent(c.negative),
+        )
+        for c in sorted(cards, key=lambda c: -c.severity)[:count]
+    ]
+    return table(("material", "fit", "largest albedo, at degrees", "gained on average", "negative at worst"), rows)
+
+
+class Material(NamedTuple):
+    """A material's fits side by side: cube roots and pictures by fit, the network's under "network"."""
+
+    name: str
+    values: dict[str, Array]
+    pictures: dict[str, Array]
+
+    def distance(self, a: str, b: str) -> float:
+        return apart(self.values[a], self.values[b])
+
+    @property
+    def spread(self) -> float:
+        """Median distance of two of its fits."""
+        fits = [fit for fit in self.values if fit != "network"]
+        return float(np.median([self.distance(a, b) for i, a in enumerate(fits) for b in fits[:i]]))
+
+
+def side_by_side(name: str, weights: dict[str, Array]) -> Material:
+    brdfs = {fit: of(go.material(name, fit)) for fit in library.fits(name)}
+    if f"{name}/kernel0" in weights:
+        brdfs["network"] = network(weights, name)
+    return Material(name, {fit: mapped(f) for fit, f in brdfs.items()}, {fit: picture(f) for fit, f in brdfs.items()})
+
+
+def figure_energy(cards: list[Card]) -> None:
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    axes = figure.subplots(1, 2)
+    fits = list(library.published())
+    for row, fit in enumerate(fits):
+        mine = [c for c in cards if c.fit == fit]
+        color = {"b": "#2b5d8a", "l": "#3f7d4f", "n": "#b3403a"}[fit[0]]
+        axes[0].plot([1.0 + c.gain for c in mine], [row + 0.0] * len(mine), "|", color=color, markersize=9)
+        axes[1].plot([max(c.cosine or 0.0, 0.5) for c in mine], [row] * len(mine), "|", color=color, markersize=9)
+    axes[0].axvline(1.0, color="0.5", lw=0.8)
+    axes[1].axvline(1.0, color="0.5", lw=0.8)
+    axes[0].set(xscale="log", xlabel="largest albedo over the views (1: all light)", yticks=range(len(fits)))
+    axes[0].set_yticklabels(fits)
+    axes[1].set(xscale="log", xlabel="variance of cosine sampling over its own", yticks=[])
+    for axis in axes:
+        axis.invert_yaxis()
+        axis.tick_params(labelsize=8)
+        axis.spines[["top", "right"]].set_visible(False)
+    figure.savefig(FOLDER / "energy.svg", metadata={"Date": None})
+
+
+def figure_spheres(materials: list[Material]) -> None:
+    fits = [*library.published(), "network"]
+    figure = Figure(figsize=(1.02 * len(fits), 1.06 * len(materials) + 0.3), layout="constrained")
+    axes = figure.subplots(len(materials), len(fits), squeeze=False)
+    for row, material in enumerate(materials):
+        for column, fit in enumerate(fits):
+            axis = axes[row][column]
+            image = np.ones((SIZE, SIZE, 3))
+            if fit in material.pictures:
+                image[INSIDE] = material.pictures[fit]
+                axis.imshow(image)
+            axis.set(xticks=[], yticks=[])
+            axis.spines[:].set_visible(False)
+            if row == 0:
+                axis.set_title(fit.replace("/", "\n"), fontsize=5.5)
+            if column == 0:
+                axis.set_ylabel(material.name, fontsize=6)
+    figure.savefig(FOLDER / "spheres.jpg", dpi=150)
+
+
+def generations(materials: list[Material]) -> str:
+    fits = list(library.published())
+    rows = []
+    for a in fits:
+        row = [f"`{a}`"]
+        for b in fits:
+            both = [m.distance(a, b) for m in materials if a in m.values and b in m.values]
+            row.append("-" if a == b else f"{float(np.median(both)):.2f}")
+        rows.append(row)
+    return table(
+        ("", *(str(i + 1) for i in range(len(fits)))), [(f"{i + 1} {r[0]}", *r[1:]) for i, r in enumerate(rows)]
+    )
+
+
+def networks(materials: list[Material]) -> str:
+    with_network = [m for m in materials if "network" in m.values]
+    rows = []
+    for m in with_network:
+        fits = {fit: m.distance(fit, "network") for fit in m.values if fit != "network"}
+        best = min(fits, key=lambda fit: fits[fit])
+        image = rms(m.pictures[best], m.pictures["network"])
+        rows.append(
+            (
+                m.name,
+                f"`{best}`",
+                f"{fits[best]:.2f}",
+                f"{fits[library.DEFAULT]:.2f}",
+                f"{float(np.median(list(fits.values()))):.2f}",
+                f"{image:.3f} / {rms(m.pictures[library.DEFAULT], m.pictures['network']):.3f}",
+            )
+        )
+    header = "material", "nearest fit", "its distance", "Bagher's", "median of all", "sphere, RMS: nearest / Bagher's"
+    return table(header, rows)
+
+
+def spreads(materials: list[Material], count: int) -> str:
+    rows = []
+    for m in sorted(materials, key=lambda m: -m.spread)[:count]:
+        fits = [fit for fit in m.values if fit != "network"]
+        pairs = {(a, b): m.distance(a, b) for i, a in enumerate(fits) for b in fits[:i]}
+        a, b = max(pairs, key=lambda pair: pairs[pair])
+        image = float(np.median([rms(m.pictures[x], m.pictures[y]) for x, y in pairs]))
+        rows.append((m.name, f"{m.spread:.2f}", f"{image:.3f}", f"{pairs[a, b]:.2f}: `{a}`, `{b}`"))
+    return table(("material", "median distance of two fits", "sphere, median RMS", "farthest apart"), rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--networks", type=Path)
+    parser.add_argument("--only", default="")
+    given = parser.parse_args()
+    start = time.perf_counter()
+    wanted = given.only.split(",") if given.only else list(library.published())
+    cards = [card(name, fit) for fit in wanted for name in sorted(library.published()[fit].materials)]
+    seconds = time.perf_counter() - start
+    print(worst(cards, 20))
+    print(f"{len(cards)} cards in {seconds:.0f} s")
+    if given.only or given.networks is None:
+        return
+    with np.load(given.networks) as data:
+        weights = {key: np.asarray(data[key], float) for key in data.files}
+    materials = [side_by_side(name, weights) for name in library.materials()]
+    FOLDER.mkdir(exist_ok=True)
+    kept: list[dict[str, Any]] = [
+        {key: float(f"{v:.5g}") if isinstance(v, float) else v for key, v in c._asdict().items()} for c in cards
+    ]
+    (FOLDER / "cards.json").write_text("[\n" + ",\n".join(json.dumps(one) for one in kept) + "\n]\n")
+    figure_energy(cards)
+    order = sorted((m for m in materials if "network" in m.values), key=lambda m: -m.spread)
+    figure_spheres(order)
+    text = (HERE / "published-fits" / "page.md").read_text()
+    parts = {
+        "COUNT": str(len(cards)),
+        "SUMMARY": summary(cards),
+        "WORST": worst(cards, 40),
+        "GENERATIONS": generations(materials),
+        "SPREADS": spreads(materials, 20),
+        "NETWORKS": networks(materials),
+    }
+    for key, part in parts.items():
+        text = text.replace("{" + key + "}", part)
+    (HERE / "published-fits.md").write_text(text)
+    print(f"all in {time.perf_counter() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
