@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._callable import make_callable
-from ..owner import alone
+from ..owner import public
 
 if TYPE_CHECKING:
     from ..models import BSDF
     from .exposures import RGB, Exposure
 
 
-@alone
+@public
 def render(
     scene: str | Path | BSDF,
     *,
@@ -91,7 +91,7 @@ def render(
         settings = prepared.settings | {"spp": prepared.render.done}
         notices += filter(None, [images.show(output, picture, settings, exposure).notice])
     for notice in notices:
-        warnings.warn(notice, GonioWarning, stacklevel=4)  # past the lock and the call of the module
+        warnings.warn(notice, GonioWarning, stacklevel=5)  # past the checks, the lock and the call of the module
     return picture
 
 

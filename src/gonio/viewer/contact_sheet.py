@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..models import notation
-from ..owner import alone
+from ..owner import public
 from ..render import exposures, images, passes, run
 from . import figures
 from .figures import Drawing
@@ -86,7 +86,7 @@ def parse_variation(text: str) -> Variation:
     return Variation(path, tuple(figures.split_values(values)))
 
 
-@alone
+@public
 def study(
     scene: str | Path,
     vary: Mapping[str, Sequence[object]],
