@@ -7,6 +7,11 @@ exits with `code`, Python users catch one class.
 from __future__ import annotations
 
 
+def printable(text: str) -> str:
+    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 class GonioError(Exception):
     """Something the user can put right.
 
@@ -18,8 +23,8 @@ class GonioError(Exception):
     code = 2  # exit code of the command line: 2 is bad usage or input
 
     def __init__(self, what: str, where: str = "", hint: str = "") -> None:
-        self.what, self.where, self.hint = what, where, hint
-        super().__init__(what, where, hint)
+        self.what, self.where, self.hint = map(printable, (what, where, hint))
+        super().__init__(self.what, self.where, self.hint)
 
     def __str__(self) -> str:
         lines = [f"{self.where}: {self.what}" if self.where else self.what]

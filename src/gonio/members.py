@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from .arguments import shown
 from .errors import GonioWarning, InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -65,6 +66,8 @@ class Family(Generic[Member]):
         """The member of that name. InputError with the nearest known spelling where there is none."""
         if self._found is None:
             self.all()
+        if not isinstance(name, str):
+            raise InputError(f"{shown(name)} is no name", where or self.where, "give the name of a " + self.kind)
         for known in (self._added, self._found or {}):  # asked at every call of a formula: nothing is sorted here
             if name in known:
                 return known[name]

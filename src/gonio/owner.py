@@ -19,6 +19,8 @@ import threading
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
+from .arguments import checked
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -48,3 +50,8 @@ def alone(call: Callable[P, R]) -> Callable[P, R]:
                 settle()
 
     return held
+
+
+def public(call: Callable[P, R]) -> Callable[P, R]:
+    """A function of Gonio's that users call: its arguments are `checked`, and it runs `alone`."""
+    return alone(checked(call))

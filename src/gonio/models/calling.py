@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import ops
+from ..arguments import shown
 from ..errors import InputError
 from ..ops import Direction, Mode, Precision, Scalar, Spectrum, Vector3, backend
 from ..owner import COMPUTING
@@ -103,8 +104,9 @@ def method(formula: Callable[..., object], /) -> object:
         if self.is_bound:
             with backend.formula_of(wo):
                 return inner(self, wo, other, *args)
-        if mode not in MODES:
-            raise InputError(f"unknown mode '{mode}'", f"{type(self).__name__}.{formula.__name__}", " or ".join(MODES))
+        if not isinstance(mode, str) or mode not in MODES:
+            where = f"{type(self).__name__}.{formula.__name__}"
+            raise InputError(f"unknown mode {shown(mode)}", where, " or ".join(MODES))
         with COMPUTING:
             if backend.is_drjit(wo):
                 return enter(binding.bind_to(self, backend.types_like(type(wo))), wo, other, mode)
@@ -171,6 +173,8 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, i
             raise InputError(f"an array of shape {array.shape}, expected (N, 3)", where)
         if label != "u":
             _check_unit(array, where)
+        elif not np.all((array >= 0.0) & (array <= 1.0)):  # NaN compares false
+            raise InputError("random numbers outside of [0, 1]", where, "give rng.random((N, 3))")
         arrays.append(array)
     sizes = sorted({len(x) for x in arrays if x.ndim == 2 and len(x) != 1}) or [1]
     if len(sizes) > 1:
@@ -180,7 +184,7 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, i
 
 def _check_unit(array: np.ndarray, where: str) -> None:
     length = np.sqrt(np.einsum("...i,...i->...", array, array))
-    off = np.abs(length - 1.0) > UNIT
+    off = ~(np.abs(length - 1.0) <= UNIT)  # NaN compares false
     if np.any(off):
         row = int(np.argmax(off)) if array.ndim == 2 else 0
         what = f"row {row} has length {np.atleast_1d(length)[row]:.4g}, unit vectors expected"

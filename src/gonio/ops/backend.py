@@ -40,7 +40,7 @@ class Types(NamedTuple):
 def set_precision(precision: Precision) -> None:
     """Set the precision of evaluations on NumPy arrays: "float32" (default) or "float64", the oracle."""
     global _precision
-    if precision not in PRECISIONS:
+    if not isinstance(precision, str) or precision not in PRECISIONS:
         raise InputError(f"unknown precision '{precision}'", "set_precision", 'give "float32" or "float64"')
     _precision = precision
 
@@ -76,8 +76,8 @@ def _types(backend: str, double: bool) -> Types:
 
 def types(precision: Precision | None = None) -> Types:
     """The types for a precision; the one that is set where `precision` is None. CPU: small arrays live there."""
-    precision = precision or _precision
-    if precision not in PRECISIONS:
+    precision = _precision if precision is None else precision
+    if not isinstance(precision, str) or precision not in PRECISIONS:
         raise InputError(f"unknown precision '{precision}'", "precision", 'give "float32" or "float64"')
     return _types("llvm", precision == "float64")
 

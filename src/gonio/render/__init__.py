@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._callable import make_callable
-from ..owner import alone
+from ..owner import public
 
 if TYPE_CHECKING:
     from ..models import BSDF
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .request import Request
 
 
-@alone
+@public
 def render(
     scene: str | Path | BSDF,
     *,
@@ -84,10 +84,10 @@ def render(
         material=scene if isinstance(scene, BSDF) else None,
         checkpoint=None if checkpoint is None else Path(checkpoint),
     )
-    return _picture(request, level=5)  # past the lock and the call of the module
+    return _picture(request, level=6)  # past the checks, the lock and the call of the module
 
 
-@alone
+@public
 def resume(
     checkpoint: str | Path,
     *,
@@ -116,7 +116,7 @@ def resume(
         timeout=timeout,
     )
     change.check()
-    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=4)
+    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=5)
 
 
 def _picture(request: Request, level: int) -> RGB:

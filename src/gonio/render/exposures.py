@@ -33,7 +33,9 @@ def parse(text: str) -> Exposure:
 
 def check(exposure: Exposure) -> Exposure:
     """The exposure, or an InputError where it is none."""
-    if exposure != "auto" and not (isinstance(exposure, int | float) and abs(exposure) <= 100):
+    if isinstance(exposure, str) and exposure == "auto":
+        return exposure
+    if not (isinstance(exposure, int | float) and abs(exposure) <= 100):
         what = f"{exposure} given as exposure"
         raise InputError(what, "--exposure", "give stops from -100 to 100, where 1 doubles the brightness, or auto")
     return exposure

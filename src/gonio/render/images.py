@@ -64,6 +64,8 @@ def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, expos
     exposure  stops; PNG only, since the other formats keep radiance as it is
     """
     target = check_writable(path)
+    if np.iscomplexobj(pixels):
+        raise InputError("complex numbers given, an RGB picture expected", str(path))
     picture = np.ascontiguousarray(pixels, dtype=np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))

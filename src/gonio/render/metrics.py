@@ -132,6 +132,7 @@ def mean_ratio(test: Floats, reference: Floats) -> float:
 
 def compare(test: Floats, reference: Floats, hdr: bool = True, tolerance: Tolerance = Tolerance()) -> Comparison:
     """All measures at once; `hdr` False takes both pictures as shown on a screen, in [0, 1]."""
+    _pair(test, reference)
     exposures = exposure_range(reference) if hdr else None
     return Comparison(
         rmse(test, reference),

@@ -17,6 +17,10 @@ from . import denoise, exposures, images
 # file's bytes. It is the estimate by which a film is refused as too large.
 BYTES_PER_PIXEL = 250
 
+MOST = 1 << 30  # samples a pixel, and segments: kernels count them in 32 bits
+MOST_THREADS = 1024
+LONGEST_SIDE = 1 << 16  # of a film, pixels
+
 
 @dataclass(frozen=True)
 class Request:
@@ -43,14 +47,14 @@ class Request:
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""
-        if self.spp is not None and self.spp < 1:
-            raise InputError(f"{self.spp} samples per pixel", "--spp", "give 1 or more")
-        if self.max_depth is not None and self.max_depth < 1:
-            raise InputError(f"depth {self.max_depth}", "--max-depth", "give 1 or more")
+        if self.spp is not None and not 1 <= self.spp <= MOST:
+            raise InputError(f"{self.spp} samples per pixel", "--spp", f"give 1 to {MOST}")
+        if self.max_depth is not None and not 1 <= self.max_depth <= MOST:
+            raise InputError(f"depth {self.max_depth}", "--max-depth", f"give 1 to {MOST}")
         if self.seed is not None and not 0 <= self.seed < 1 << 32:
             raise InputError(f"seed {self.seed} is out of range", "--seed", "give 0 to 4294967295")
-        if self.threads is not None and self.threads < 1:
-            raise InputError(f"{self.threads} threads asked for", "--threads", "give 1 or more")
+        if self.threads is not None and not 1 <= self.threads <= MOST_THREADS:
+            raise InputError(f"{self.threads} threads asked for", "--threads", f"give 1 to {MOST_THREADS}")
         if self.timeout is not None and not self.timeout > 0:
             raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
         exposures.check(self.exposure)
@@ -77,6 +81,9 @@ def check_film(size: tuple[int, int], where: str) -> None:
     width, height = size
     if width < 1 or height < 1:
         raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
+    if max(width, height) > LONGEST_SIDE:
+        what = f"a film of {width}x{height} is longer than {LONGEST_SIDE} pixels"
+        raise InputError(what, where, "give a smaller size")
     needed = width * height * BYTES_PER_PIXEL
     if needed > memory():
         gib = 1 << 30

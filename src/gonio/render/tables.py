@@ -25,11 +25,11 @@ from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, models, notation, outside
 from ..optics.ndf import distributions
-from ..owner import alone
+from ..owner import public
 from . import images
 
 
-@alone
+@public
 def bake(
     target: str | Path | BSDF,
     output: str | Path | None = None,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from .. import members
 from ..errors import GonioWarning, InputError
 from ..models import BSDF
-from ..owner import alone
+from ..owner import public
 from . import box, diagnosis, directions, quality, statistics, subject
 from .box import Place
 from .ci.outputs import Outputs
@@ -32,7 +32,7 @@ Target = BSDF | Subject | str
 Begin = Callable[[str], None]
 
 
-@alone
+@public
 def verify(
     target: Target | Sequence[Target],
     *,
@@ -74,6 +74,8 @@ def verify(
     Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; printed, it is the terminal's table.
     Raises InputError for unknown laws and targets. A failing BSDF raises nothing: the law fails.
     """
+    if seed < 0:
+        raise InputError(f"seed {seed} given, 0 or more expected", "--seed")
     if quick and deep:
         raise InputError("quick and deep together", "--quick", "give one of them")
     outputs = Outputs(report, junit, sarif, baseline, write_baseline)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import GonioWarning, InputError
 from ..models import notation
-from ..owner import alone
+from ..owner import public
 from ..render import checkpoints, exposures, images, passes, run
 from ..work import crew, parts
 from . import figures
@@ -90,7 +90,7 @@ def parse_variation(text: str) -> Variation:
     return Variation(path, tuple(figures.split_values(values)))
 
 
-@alone
+@public
 def study(
     scene: str | Path,
     vary: Mapping[str, Sequence[object]],

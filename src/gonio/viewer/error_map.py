@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..owner import alone
+from ..owner import public
 from ..render import images, metrics
 from . import figures
 
@@ -20,7 +20,7 @@ _TITLES = {
 }
 
 
-@alone
+@public
 def compare(
     test: str | Path | ArrayLike,
     reference: str | Path | ArrayLike,

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, notation, outside
-from ..owner import alone
+from ..owner import public
 from . import curves, energy_figures, figures, lobes
 from .curves import Curve
 from .figures import Drawing
@@ -28,7 +28,7 @@ VIEWS = (0.0, 30.0, 60.0, 80.0)
 _LONGEST = 70  # letters of a title or a label
 
 
-@alone
+@public
 def plot(
     *materials: BSDF | str | Path,
     kind: str = "lobe",

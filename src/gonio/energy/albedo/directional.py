@@ -24,7 +24,7 @@ from ...models import BSDF, tree
 from ...models.microfacet import SMOOTH
 from ...models.parameters import pair_of
 from ...ops import Direction, Spectrum, backend
-from ...owner import alone
+from ...owner import public
 from . import cubature, quadrature
 
 METHODS = ("auto", "closed-form", "quadrature", "sampling")
@@ -43,7 +43,7 @@ class Albedo(NamedTuple):
         return _html.table(shown, ("albedo", "error"), self.method)
 
 
-@alone
+@public
 def albedo(
     model: BSDF,
     mu: ArrayLike = 1.0,

@@ -1,0 +1,195 @@
+"""What callers from Python hand over, held against what a function's annotations promise.
+
+    @checked
+    def bake(target: str | Path, size: int = 128, aspect: float | None = None): ...
+
+    bake("ggx", size="4")      # InputError: size: '4' given, a whole number expected
+
+Told by annotation, once for all: None, bool, int, float, str, Path, BSDF, ArrayLike, tuple, Sequence and Mapping of
+these. An annotation of another kind is left to the function. Whole numbers come out as `int`, be they NumPy's.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import ParamSpec, TypeAlias, TypeVar
+
+import numpy as np
+
+from .errors import InputError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+# gives the value as the function is to have it; ValueError where it is wrong
+Check: TypeAlias = Callable[[object], object]
+
+_SHOWN = 60  # letters of a wrong value
+
+
+def checked(call: Callable[P, R]) -> Callable[P, R]:
+    """The function, which raises InputError where an argument is not what its annotation says."""
+    signature = inspect.signature(call)
+    kinds = {name: _check_of(str(p.annotation)) for name, p in signature.parameters.items()}
+    several = {name for name, p in signature.parameters.items() if p.kind == p.VAR_POSITIONAL}
+
+    @functools.wraps(call)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
+        bound = signature.bind(*args, **kwargs)
+        for name, value in bound.arguments.items():
+            check = kinds[name]
+            if check is None:
+                continue
+            try:
+                bound.arguments[name] = tuple(map(check, value)) if name in several else check(value)
+            except ValueError as error:
+                raise InputError(f"{shown(value)} given, {error} expected", f"{call.__name__}: {name}") from None
+        return call(*bound.args, **bound.kwargs)
+
+    return guarded
+
+
+def shown(value: object) -> str:
+    """A value as an error shows it: short, and printable everywhere."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+
+
+# ---------------------------------------------------------------------- one kind each
+
+
+def whole(value: object) -> int:
+    """A whole number, Python's or NumPy's; True is none."""
+    if isinstance(value, bool | np.bool_):
+        raise ValueError
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise ValueError from None
+
+
+def number(value: object) -> object:
+    """A number that is one: not NaN, no text."""
+    if isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
+        raise ValueError
+    try:
+        if math.isnan(float(value)):  # type: ignore[arg-type]
+            raise ValueError
+    except (TypeError, OverflowError):
+        raise ValueError from None
+    return value
+
+
+def _flag(value: object) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError
+    return bool(value)
+
+
+def _text(value: object) -> object:
+    if not isinstance(value, str) or "\0" in value:
+        raise ValueError
+    return value
+
+
+def _nothing(value: object) -> None:
+    if value is not None:
+        raise ValueError
+
+
+def _array(value: object) -> object:
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # ragged
+        raise ValueError from None
+    if array.dtype.kind not in "fiub":
+        raise ValueError
+    return value
+
+
+def _mapping(value: object) -> object:
+    if not isinstance(value, Mapping):
+        raise ValueError
+    return value
+
+
+def _callable(value: object) -> object:
+    if not callable(value):
+        raise ValueError
+    return value
+
+
+def _of_class(name: str) -> Check:
+    def check(value: object) -> object:
+        if not any(cls.__name__ == name for cls in type(value).__mro__) or (name == "Path" and "\0" in str(value)):
+            raise ValueError
+        return value
+
+    return check
+
+
+_KINDS: dict[str, tuple[Check, str]] = {
+    "None": (_nothing, ""),
+    "bool": (_flag, "True or False"),
+    "int": (whole, "a whole number"),
+    "float": (number, "a number"),
+    "str": (_text, "a text"),
+    "Path": (_of_class("Path"), "a path"),
+    "BSDF": (_of_class("BSDF"), "a material"),
+    "ArrayLike": (_array, "an array of numbers"),
+    "Floats": (_array, "an array of numbers"),
+}
+
+
+@functools.cache
+def _check_of(annotation: str) -> Check | None:
+    """The check of an annotation; None for one that says nothing known."""
+    options = []
+    for part in re.split(r"\|(?![^\[]*\])", annotation):
+        found = _one(part.strip())
+        if found is None:
+            return None
+        options.append(found)
+    expected = " or ".join(words for _, words in options if words)
+
+    def check(value: object) -> object:
+        for option, _ in options:
+            try:
+                return option(value)
+            except ValueError:
+                continue
+        raise ValueError(expected)
+
+    return check
+
+
+def _one(name: str) -> tuple[Check, str] | None:
+    if name in _KINDS:
+        return _KINDS[name]
+    if name.startswith("Callable["):
+        return _callable, "a function"
+    match = re.fullmatch(r"(Mapping|Sequence|list|tuple)\[(.*)\]", name)
+    if match is None:
+        return None
+    if match[1] == "Mapping":
+        return _mapping, "a dictionary"
+    parts = [part.strip() for part in match[2].split(",") if part.strip() != "..."]
+    inner = _check_of(parts[0])
+    if inner is None or len(set(parts)) > 1:
+        return None
+    count = len(parts) if match[1] == "tuple" and "..." not in match[2] else None
+
+    def check(value: object) -> object:
+        if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
+            raise ValueError
+        if count is not None and len(value) != count:
+            raise ValueError
+        items = [inner(item) for item in value]
+        return tuple(items) if count is not None else items
+
+    words = {"int": "whole numbers", "float": "numbers", "str": "texts"}.get(parts[0], "such values")
+    return check, f"{count} {words}" if count is not None else f"several {words}"
