@@ -19,9 +19,8 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-
 import gonio as go
+import numpy as np
 from gonio.models import guide_search
 
 FLOOR = 1e-4  # relative, of one sample: 1 % of the light, as much as an 8-bit step

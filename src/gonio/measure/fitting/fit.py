@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import InputError
 from ...models import BSDF, notation, tree
 from ...models.sum import Sum
-from ...owner import alone
+from ...owner import public
 from .. import read
 from ..tables.base import Floats, Measurement
 from .data import GRAZING, Data, data_of
@@ -142,7 +142,7 @@ def modelled(text: str, lobes: int = 1) -> Model:
     return whole
 
 
-@alone
+@public
 def fit(
     data: str | os.PathLike[str] | Measurement | Data,
     model: str | BSDF = "conductor",
