@@ -5,8 +5,8 @@
 Our own materials with their `pdf` and `sample` hidden. For each, PICTURES pictures of SAMPLES samples by independent
 numbers: the variance of a pixel over the pictures, averaged over the ball, guided over by hand. "furnace": a ball in a
 white sky, whose light is found by the BSDF's samples alone; "lit": the shading ball, two lamps and a sky, path tracing.
-In brackets the relative variance by hand. A variance below FLOOR counts as that: at one sample a pixel such noise is less
-than a step of an 8-bit picture.
+In brackets the relative variance by hand. A variance below FLOOR counts as FLOOR: at one sample a pixel such noise is
+less than a step of an 8-bit picture.
 """
 
 from __future__ import annotations
