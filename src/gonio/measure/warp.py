@@ -1,6 +1,6 @@
 """Densities on the unit square given by numbers on a grid, sampled and inverted exactly.
 
-    warp = Warp("guide", values)                     # (slices, rows, columns), >= 0, nodes on the square's edges
+    warp = Warp("normals", values)                   # (slices, rows, columns), >= 0, nodes on the square's edges
     place, pdf = warp.sample(slices, u, v)
     place, pdf = warp.invert(slices, x, y)           # the numbers that `sample` would have needed
 

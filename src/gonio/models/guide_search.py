@@ -7,6 +7,7 @@ the cosine which makes that variance least. It takes some tenths of a second, an
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -97,6 +98,16 @@ def find(material: Any) -> Guide:
         _version(material, {one: float(t) for one, t in zip(varying, reversed(shares), strict=True)})
         for shares in itertools.product(*reversed(steps))
     ]
+    return _found(versions, tuple(one.axis(count) for one, count in zip(varying, counts, strict=True)))
+
+
+def of_values(values: Guided) -> Guide:
+    """The guide of anything that has `eval` and `transmits`, and the same values everywhere: a measured table."""
+    return _found([values], ())
+
+
+def _found(versions: list[Any], axes: tuple[Axis, ...]) -> Guide:
+    """The guide of a material with one value everywhere, or of several such along axes, the first the fastest."""
     probed = versions[len(versions) // 2]
     above, below = (_probe(probed, side) for side in (1.0, -1.0))
     lit = [side for side, values in ((1.0, above), (-1.0, below)) if np.any(values > 0.0)]
@@ -105,26 +116,30 @@ def find(material: Any) -> Guide:
     turns = any(_turns(probed, side) for side in lit)
     behind = len(lit) == 2 and not _alike(above, below)
     slices = _Slices(versions, AZIMUTHS if turns else 1, [1.0, -1.0] if behind else lit[:1])
-    sides = (False, True) if material.transmits else (False,)
+    sides = (False, True) if probed.transmits else (False,)
     found = [best for across in sides if (best := slices.best(across)) is not None]
     if not found:
         return _nothing()
     total = np.sum([best.light for best in found], axis=0)
     shares = sum(best.light for best in found if best.across) / np.maximum(total, LEAST)
-    name = f"guide_{abs(hash(material)) % 10**6:06d}"
     light = float(np.sum(total))
     cosine = sum(best.cosine * float(np.sum(best.light)) for best in found) / light
     return Guide(
-        lobes=tuple(best.lobe(f"{name}_{'across' if best.across else 'here'}") for best in found),
+        lobes=tuple(best.lobe() for best in found),
         angles=len(slices.angles),
         azimuths=slices.azimuths,
         behind=behind,
         above=1.0 in lit,
         below=-1.0 in lit,
-        axes=tuple(one.axis(name, count) for one, count in zip(varying, counts, strict=True)),
-        shares=Table(f"{name}_shares", np.broadcast_to(shares, total.shape)[:, None]),
-        cosine=Table(f"{name}_cosine", np.array([[cosine]])),
+        axes=axes,
+        shares=_named("shares", np.broadcast_to(shares, total.shape)[:, None]),
+        cosine=_named("cosine", np.array([[cosine]])),
     )
+
+
+def _named(stem: str, values: Grid) -> Table:
+    """A table under a name of its own, as two guides may stand in one shader."""
+    return Table(f"guide_{stem}_{hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()[:8]}", values)
 
 
 def _nothing() -> Guide:
@@ -212,9 +227,9 @@ class _Varying:
         """At a place from 0 to 1; widths by equal steps of their root."""
         return self.low + (self.high - self.low) * (share * share if self.kind == "alpha" else share)
 
-    def axis(self, name: str, count: int) -> Axis:
+    def axis(self, count: int) -> Axis:
         """The slices along it."""
-        ends = Table(f"{name}_{self.path.replace('.', '_')}", np.array([[self.low, 1.0 / (self.high - self.low)]]))
+        ends = _named("ends", np.array([[self.low, 1.0 / (self.high - self.low)]]))
 
         def read(material: Any) -> Scalar:
             given = tree.value_at(material, self.path)
@@ -368,7 +383,7 @@ class _Best:
     def across(self) -> bool:
         return self.chart.across
 
-    def lobe(self, name: str) -> Lobe:
+    def lobe(self) -> Lobe:
         """For formulas."""
         span = 2.0 * np.pi if self.full else np.pi
         g = self.density
@@ -382,11 +397,11 @@ class _Best:
             self.chart.name,
             self.chart.q_max,
             self.full,
-            Table(f"{name}_density", g[..., None]),
-            Table(f"{name}_below", below[..., None]),
-            Table(f"{name}_rows", over_s[..., None]),
-            Table(f"{name}_scales", np.array([[self.chart.q0, 1.0 / self.chart.span]])),
-            Table(f"{name}_centres", self.centres),
+            _named("density", g[..., None]),
+            _named("below", below[..., None]),
+            _named("rows", over_s[..., None]),
+            _named("scales", np.array([[self.chart.q0, 1.0 / self.chart.span]])),
+            _named("centres", self.centres),
         )
 
 

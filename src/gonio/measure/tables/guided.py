@@ -4,28 +4,32 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from ...ops import Direction, Scalar
-from .. import colours
-from ..guide import Floats, Guide
-from .base import Measurement
+from ...models import guide_search
+from ...models.guide import Guide
+from ...ops import Direction, Scalar, Spectrum, where
+from .base import Measurement, above
 
 
 class Guided(Measurement):
-    """What is sampled by a `Guide` over the luminance of its own values."""
+    """What is sampled by a guide (`gonio.models.guide`) found from its own values."""
+
+    transmits = False
+
+    def eval(self, wo: Direction, wi: Direction) -> Spectrum:
+        """f cos theta_i, 0 below the surface: what the guide is found from."""
+        return where(above(wo, wi), self.value(wo, wi), 0.0)
 
     @cached_property
     def guide(self) -> Guide:
-        def luminance(wo: Floats, wi: Floats) -> Floats:
-            return self.rgb(wo, wi) @ colours.LUMINANCE
-
-        return Guide(luminance)
+        return guide_search.of_values(self)
 
     def prepare(self) -> None:
         """The guide."""
         _ = self.guide
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        return self.guide.pdf(wo, wi)
+        return self.guide.pdf(self, wo, wi)
 
     def draw(self, wo: Direction, u: Direction) -> tuple[Direction, Scalar]:
-        return self.guide.draw(wo, u)
+        wi = self.guide.draw(self, wo, u)
+        return wi, self.guide.pdf(self, wo, wi)
