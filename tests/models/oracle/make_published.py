@@ -45,7 +45,12 @@ def printed() -> Iterator[tuple[str, str, str, dict[str, np.ndarray]]]:
             shapes = {name: tuple(shape) for name, shape in one["parameters"].items()}
             ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])
             for material, numbers in one["materials"].items():
-                yield f"{file}/{fit}", material, one["model"], dict(zip(shapes, np.split(numbers, ends[:-1]), strict=True))
+                yield (
+                    f"{file}/{fit}",
+                    material,
+                    one["model"],
+                    dict(zip(shapes, np.split(numbers, ends[:-1]), strict=True)),
+                )
 
 
 def line(model: str, figures: dict[str, np.ndarray]) -> str:
