@@ -313,6 +313,43 @@ def figure_spheres(materials: list[Material]) -> None:
     figure.savefig(FOLDER / "spheres.jpg", dpi=150)
 
 
+def scales() -> str:
+    """Medians, over the materials that are not black, of diffuse parts of Ngan's fits over those of Low's."""
+    fits = library.published()
+    low = fits["low2012/cooktorrance_E1"].materials
+    rows = []
+    for name, fit in fits.items():
+        if not name.startswith("ngan2005"):
+            continue
+        pairs = [(np.array(fit.materials[m]["diffuse"]), np.array(low[m]["diffuse"])) for m in fit.materials]
+        ratio = np.array([a / b for a, b in pairs if a.min() > 0.005 and b.min() > 0.02])
+        _, green, blue = np.median(ratio / ratio[:, :1], axis=0)
+        rows.append((f"`{name}`", len(ratio), f"{green:.3f}", f"{blue:.3f}"))
+    return table(
+        ("fit", "materials", f"green / red (1 / 1.15 = {1 / 1.15:.3f})", f"blue / red (1 / 1.66 = {1 / 1.66:.3f})"),
+        rows,
+    )
+
+
+def rescaled(materials: list[Material]) -> tuple[float, float]:
+    """Median distance of Ngan's fits from the others of the same material: as printed, and with MERL's factors."""
+    factor = np.cbrt(np.array([1.0, 1.15, 1.66]))
+    plain, mended = [], []
+    for m in materials:
+        for a in (fit for fit in m.values if fit.startswith("ngan2005")):
+            scaled = (m.values[a].reshape(-1, 3) * factor).ravel()
+            for b in (fit for fit in m.values if not fit.startswith("ngan2005") and fit != "network"):
+                plain.append(m.distance(a, b))
+                mended.append(apart(scaled, m.values[b]))
+    return float(np.median(plain)), float(np.median(mended))
+
+
+def strangers(materials: list[Material]) -> float:
+    """Median distance of two different materials by the same fit, Bagher's."""
+    values = [m.values[library.DEFAULT] for m in materials]
+    return float(np.median([apart(a, b) for i, a in enumerate(values) for b in values[:i]]))
+
+
 def generations(materials: list[Material]) -> str:
     fits = list(library.published())
     rows = []
@@ -387,9 +424,23 @@ def main() -> None:
     parts = {
         "COUNT": str(len(cards)),
         "SUMMARY": summary(cards),
-        "WORST": worst(cards, 40),
+        "WORST": worst([c for c in cards if c.severity > 1e-6], 40),
         "GENERATIONS": generations(materials),
         "SPREADS": spreads(materials, 20),
+        "SCALES": scales(),
+        "PLAIN": f"{rescaled(materials)[0]:.2f}",
+        "MENDED": f"{rescaled(materials)[1]:.2f}",
+        "STRANGERS": f"{strangers(materials):.2f}",
+        "SPREAD": f"{float(np.median([m.spread for m in materials])):.2f}",
+        "GAINS": str(sum(c.gain > 1e-3 for c in cards)),
+        "RECIP": f"{max(c.recip for c in cards):.0e}",
+        "DARK": str(
+            sum(
+                library.published()["ngan2005/he"].materials[m]["eta"] == 1.0
+                for m in library.published()["ngan2005/he"].materials
+            )
+        ),
+        "BELOW": str(sum(c.cosine is not None and c.cosine < 1.0 for c in cards)),
         "NETWORKS": networks(materials),
     }
     for key, part in parts.items():

@@ -1,8 +1,8 @@
 """The materials that the laws are tested on: every model, every choice of its parts.
 
-`SMALL` has each kind once, `ALL` every distribution with every masking, both Fresnel forms, every way of sampling,
-widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED` has every way to give lost
-light back that can be recorded: energy's own tests judge them, recording looks at them too.
+`SMALL` has each kind once, of the historic models some, `ALL` every distribution with every masking, both Fresnel forms,
+every way of sampling, widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED` has every
+way to give lost light back that can be recorded: energy's own tests judge them, recording looks at them too.
 """
 
 from __future__ import annotations
@@ -10,13 +10,26 @@ from __future__ import annotations
 import gonio as go
 
 NDFS = ("ggx", "beckmann", "student-t")
-MASKINGS = ("smith-correlated", "smith-separable", "smith-separable-exact", "schlick-direct", "schlick-ibl")
+MASKINGS = ("smith-correlated", "smith-separable", "smith-separable-exact", "schlick-direct", "schlick-ibl", "v-groove")
 
 DIFFUSE = {
     "lambert": go.Lambert((0.2, 0.5, 0.9)),
     "oren-nayar": go.OrenNayar(0.8, 0.4),
     "phong": go.Phong((0.3, 0.4, 0.5), 0.3, 20.0),
     "blinn-phong": go.BlinnPhong(0.2, (0.4, 0.5, 0.6), 60.0),
+}
+HISTORIC = {
+    "ward": go.Ward((0.1, 0.2, 0.3), (0.4, 0.3, 0.2), (0.1, 0.3), rotation=0.5),
+    "ward-duer": go.WardDuer(0.2, (0.4, 0.3, 0.2), 0.2),
+    "ward-duer-bounded": go.WardDuer(0.2, 0.3, (0.3, 0.1), bounded=True),
+    "lafortune": go.Lafortune((0.3, 0.2, 0.1), 0.4, -0.9, -1.0, 0.8, 30.0),
+    "ashikhmin-shirley": go.AshikhminShirley((0.1, 0.3, 0.2), 0.8, (20.0, 300.0), rotation=-0.4, eta=(1.5, 2.0, 3.0)),
+    "ashikhmin-shirley-coupled": go.AshikhminShirley(0.8, 0.5, 60.0, eta=2.0, fresnel="exact", coupled=True),
+    "cook-torrance": go.CookTorrance((0.1, 0.2, 0.1), (0.2, 0.25, 0.1), (0.3, 0.15), eta=(2.0, 3.0, 1.5)),
+    "he-torrance": go.HeTorrance(0.1, (0.9, 0.8, 0.7), 150.0, 2500.0, 2.0),
+    "low-smooth": go.LowSmooth((0.1, 0.2, 0.3), 20.0, 500.0, 1.2, 1.6),
+    "low-microfacet": go.LowMicrofacet((0.3, 0.2, 0.1), (8.0, 6.0, 5.0), 200.0, 1.4, 1.6),
+    "shifted-gamma": go.material("brass"),
 }
 IDEAL = {
     "mirror": go.Mirror(0.9),
@@ -59,8 +72,8 @@ def _rough() -> dict[str, go.BSDF]:
 
 
 ROUGH = _rough()
-ALL = {**DIFFUSE, **IDEAL, **NESTED, **ROUGH}
-FINITE = {**DIFFUSE, **NESTED, **ROUGH}  # those that have a density somewhere
+ALL = {**DIFFUSE, **HISTORIC, **IDEAL, **NESTED, **ROUGH}
+FINITE = {**DIFFUSE, **HISTORIC, **NESTED, **ROUGH}  # those that have a density somewhere
 COMPENSATED = {
     "kulla-conty-metal": go.KullaConty(go.Conductor.preset("Au", alpha=0.4)),
     "kulla-conty-sheet": go.KullaConty(go.Conductor.preset("Cu", alpha=0.7), color="sheet", average="imageworks"),
@@ -80,6 +93,7 @@ COMPENSATED = {
 }
 SMALL = {
     **DIFFUSE,
+    **{name: HISTORIC[name] for name in ("ashikhmin-shirley", "cook-torrance", "lafortune", "ward-duer-bounded")},
     **IDEAL,
     **NESTED,
     **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned")},

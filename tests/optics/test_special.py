@@ -10,7 +10,7 @@ import pytest
 import scipy.special
 from gonio.errors import InputError
 from gonio.ops import backend
-from gonio.optics import frame, fresnel, indices, masking, warp
+from gonio.optics import frame, fresnel, indices, masking, special, warp
 from gonio.optics.ndf import distribution
 from gonio.optics.special import beta, erfinv, gaussian_ramp
 
@@ -189,3 +189,21 @@ def test_every_index_names_its_source_and_is_found_by_symbol_or_name() -> None:
         go.Conductor.preset("goldd")
     with pytest.raises(InputError, match="did you mean 'water'"):
         go.Dielectric.preset("watr")
+
+
+@pytest.mark.parametrize("precision, tolerance", [("float32", 3e-7), ("float64", 1e-15)])
+def test_exprel_and_logrel_keep_their_digits_about_zero(precision: str, tolerance: float) -> None:
+    x = np.concatenate([-np.logspace(-12, np.log10(0.9), 200), np.logspace(-12, 1, 200)])
+    rounded = x.astype(np.float32).astype(float) if precision == "float32" else x
+    for word, exact in ((special.exprel, np.expm1(rounded) / rounded), (special.logrel, np.log1p(rounded) / rounded)):
+        found = np.asarray(backend.to_numpy(word(_number(x, precision)), len(x)), float)
+        assert np.max(np.abs(found / exact - 1.0)) < tolerance, word
+
+
+def test_a_power_law_s_quantile_turns_its_integral_round() -> None:
+    log_t = np.linspace(0.1, 12.0, 50)
+    for q in (-1.5, -1e-9, 0.0, 0.3, 1.0):
+        power = _number(np.array([q]), "float64")
+        area = special.power_integral(_number(log_t, "float64"), power)
+        back = backend.to_numpy(special.power_quantile(area, power), 50)
+        assert np.allclose(back, log_t, rtol=1e-6)

@@ -104,8 +104,9 @@ class LowSmooth(_Glossy):
         log_t = power_quantile(u.y * power_integral(self._log_fall(sqr(end)), q), q)
         r = sqrt(log_t * exprel(log_t) / self.b)
         # 1 - x^2 - y^2 as a product: near the rim the difference has no digits left
-        z = safe_sqrt((rim.ahead - r) * (rim.behind + r))
-        return vec3(r * c - wo.x, r * s - wo.y, z)
+        z2 = (rim.ahead - r) * (rim.behind + r)
+        beyond = ops.rsqrt(1.0 + maximum(-z2, 0.0))
+        return vec3((r * c - wo.x) * beyond, (r * s - wo.y) * beyond, safe_sqrt(z2))
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """specular F times the lobe's integral over a disk of radius 1, about the whole of it seen from the normal."""
