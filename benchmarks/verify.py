@@ -47,6 +47,7 @@ def correct() -> dict[str, go.BSDF]:
         "mix with mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
         "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=0.3)),
     }
+    found["measured"] = go.model("measured")()
     if "kulla-conty" in go.models():
         found["kulla-conty"] = go.model("kulla-conty")(go.Conductor.preset("Au", alpha=0.6))
     return found

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# CIE standard illuminant D65 at 380, 390, ... 780 nm, relative to 560 nm (CIE15).
+# CIE standard illuminant D65 at 380, 390, ... 780 nm, relative to 560 nm (CIE 15).
 D65 = np.array([
     49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.865, 117.008, 117.812, 114.861, 115.923, 108.811, 109.354,
     107.802, 104.790, 107.689, 104.405, 104.046, 100.000, 96.3342, 95.7880, 88.6856, 90.0062, 89.5991, 87.6987, 83.2886,

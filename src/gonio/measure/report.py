@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from . import format_of, parted, read
+from . import SAMPLE, format_of, parted, read
 from .compare import asymmetry
 from .formats.base import contents
 from .tables.base import ANGLES
@@ -20,7 +20,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
     """
     text, item = parted(os.fspath(file))
     path = Path(text).expanduser()
-    if not item:
+    if not item and text != SAMPLE:
         data = contents(path)
         items = format_of(path, data).items(data, str(path))
         if len(items) > 1:

@@ -387,9 +387,9 @@ def flag(default: bool, doc: str) -> bool:
     return _declare(FlagParameter, default, doc)
 
 
-def file(doc: str) -> Value:
+def file(default: str | None = None, doc: str = "") -> Value:
     """Declare a file of data, by its path; it shapes the code, so it is read when the material is made."""
-    return _declare(FileParameter, None, doc)
+    return _declare(FileParameter, default, doc)
 
 
 def bsdf(doc: str, default: Material | None = None) -> Value:

@@ -30,7 +30,7 @@ def info(
     """
     from ... import measure
 
-    if measure.names_table(path) or (path.lower().endswith(".npz") and not _is_baked(path)):
+    if path == measure.SAMPLE or measure.names_table(path) or (path.lower().endswith(".npz") and not _is_baked(path)):
         from ...measure import report
 
         about = report.describe(path)

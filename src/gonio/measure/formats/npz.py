@@ -20,6 +20,8 @@ LARGEST = 1 << 28  # bytes of all arrays together where they are compressed: def
 
 def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
     """The arrays in a file, by name. InputError for what is no zip, damaged, or holds objects (pickles)."""
+    if data[-22:-18] != b"PK\5\6":  # the end of an archive without a comment
+        raise InputError("it does not end as a .npz does", where, "the file is truncated, longer, or no .npz")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as file:
             members = file.infolist()

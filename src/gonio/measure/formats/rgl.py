@@ -19,6 +19,7 @@ MAGIC = b"tensor_file\0"
 TYPES = {
     1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8",
 }  # fmt: skip
+ALIGNED = 8  # bytes that fields start at multiples of, and a file may end with
 FIELDS, NAME, RANK = 64, 256, 8  # most of each that a sane file has
 
 
@@ -101,6 +102,7 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
     if not 0 < count <= FIELDS:
         raise InputError(f"{count} fields, 1 to {FIELDS} expected", where, "the file is damaged")
     found: dict[str, NDArray[np.generic]] = {}
+    end = 0
     for _ in range(count):
         (length,) = take("<H")
         if not 0 < length <= NAME or place + length > len(data):
@@ -121,6 +123,9 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
         if name in found:
             raise InputError(f"the field '{name}' stands twice", where, "the file is damaged")
         found[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
+        end = max(end, offset + size)
+    if len(data) > end + ALIGNED:
+        raise InputError(f"{len(data)} bytes, the fields end at {end}", where, "the file is longer than its fields")
     return found
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ... import ops
 from ...models import BSDF, Breach, Sample, file, method, never
 from ...ops import Direction, Mode, Scalar, Spectrum, where
-from .. import names_table, read
+from .. import SAMPLE, names_table, read
 from ..tables.base import Measurement, above
 
 
@@ -21,7 +21,10 @@ class Measured(BSDF):
     only, black from below. A table is sampled by its own densities (RGL), or by a density found from its values.
     """
 
-    file: str = file("file of measured values; behind a colon which one, of files that hold several")
+    file: str = file(
+        default=SAMPLE,
+        doc="file of measured values; behind a colon which one, of files that hold several; `sample` comes with Gonio",
+    )
     breaks: ClassVar[Mapping[str, Breach]] = {
         "energy": Breach(
             "the measured albedo is over 1, and shown as it is",

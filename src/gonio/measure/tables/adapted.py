@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from .. import colours
 from .adaptive import Adaptive
@@ -51,6 +50,8 @@ def adapted(source: Measurement) -> Adaptive:
 
 def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
     """The table whose values are those of `source` where each node of it stands."""
+    from scipy.ndimage import distance_transform_edt
+
     blank = np.ones((1, len(warp["theta_i"]), PLACES, PLACES))
     empty = Adaptive({**warp, "luminance": blank, "values": np.repeat(blank[:, :, None], 3, axis=2)})
     wo, wi, factor = empty.nodes()

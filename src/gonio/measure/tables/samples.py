@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RBFInterpolator
 
 from ... import ops
 from ...errors import InputError
@@ -76,6 +75,8 @@ class Samples(Guided, Measurement):
     @cached_property
     def table(self) -> HalfDifference:
         """What stands for the samples between them."""
+        from scipy.interpolate import RBFInterpolator
+
         features = _features(*self.pairs())
         rgb = np.maximum(in_rgb(self.values, self.wavelengths), 0.0)
         _, first = np.unique(np.round(features / SAME), axis=0, return_index=True)

@@ -134,7 +134,7 @@ class MaterialPart(Part):
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
         """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""
         path, item = measure.parted(file)
-        if not self._given and locate is not None:
+        if not self._given and locate is not None and path != measure.SAMPLE:
             path = str(locate(path, pointer))
         return f"{path}:{item}" if item else path
 
