@@ -106,6 +106,10 @@ class MaterialPart(Part):
     dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
     lab: ClassVar[LabType | None]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its type's name: the classes are made, and no module holds them."""
+        return _pickled, (self.type, self.model, dict(self.__dict__), set(self.model_fields_set))
+
     def get(self, key: str) -> Value | None:
         return getattr(self, _attribute(key))
 
@@ -321,6 +325,13 @@ def described(material: BSDF) -> MaterialPart:
         elif value is not None:
             fields[key] = np.asarray(value).tolist() if parameter.numeric else value
     return part.model_validate(fields)
+
+
+def _pickled(name: str, model: Model, values: dict[str, Any], given: set[str]) -> MaterialPart:
+    """What `MaterialPart.__reduce__` has taken apart."""
+    known = BY_TYPE.get(name)
+    cls: Any = known if known is not None and known.model is model else _own_part(name, model)
+    return cls.model_construct(given, **values)
 
 
 def _tag(value: object) -> str | None:
