@@ -13,7 +13,19 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, TypeVar, Union
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    ForwardRef,
+    Literal,
+    NamedTuple,
+    TypeAlias,
+    TypeVar,
+    Union,
+    cast,
+)
 
 import numpy as np
 from pydantic import (
@@ -329,8 +341,8 @@ def described(material: BSDF) -> MaterialPart:
 
 def _pickled(name: str, model: Model, values: dict[str, Any], given: set[str]) -> MaterialPart:
     """What `MaterialPart.__reduce__` has taken apart."""
-    known = BY_TYPE.get(name)
-    cls: Any = known if known is not None and known.model is model else _own_part(name, model)
+    known, own = BY_TYPE.get(name), cast(Any, model)
+    cls: Any = known if known is not None and known.model is model else _own_part(name, own)
     return cls.model_construct(given, **values)
 
 
