@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all lint bench install clean docs browser
+.PHONY: demo test test-all test-gpu lint bench install clean docs browser
 
 install: .venv/installed
 
@@ -51,6 +51,14 @@ test: .venv/installed browser lint
 
 test-all: .venv/installed browser lint
 	$(BIN)/python -m pytest $(PARALLEL)
+
+# The core of the suite on the CUDA variant. Where there is no GPU nothing is tried, which is said loudly, and fails.
+GPU_TESTS := tests/render/test_integrators.py tests/render/test_adapter.py tests/render/test_run.py \
+	tests/render/test_checkpoints.py tests/render/test_lights.py
+test-gpu: .venv/installed
+	@$(BIN)/python -c 'import sys; from gonio.render import engine; sys.exit(not engine.cuda_available())' \
+	|| { echo "NO GPU: no NVIDIA driver with a device answers, so NOTHING WAS TESTED on CUDA" >&2; exit 1; }
+	GONIO_TEST_DEVICE=cuda $(BIN)/python -m pytest -m 'not slow' $(GPU_TESTS)
 
 bench: .venv/installed
 	$(BIN)/python benchmarks/startup.py

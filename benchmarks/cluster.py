@@ -2,10 +2,10 @@
 
     python benchmarks/cluster.py [--workers 2,4,8] [--render]
 
-The master hands parts out and takes results in, one after the other: with W workers and parts of s seconds it keeps up as
-long as W / s parts a second are not more than R, what it manages where parts do nothing. A part travels while others are
-worked on, so that only the first and the last cost: a worker waits half a part at the end on average, and `begin` seconds
-at the start, in which it imports Gonio, loads the scene and takes the kernel from the cache. For N parts
+The master hands parts out and takes results in, one after the other: with W workers and parts of s seconds it keeps up
+as long as W / s parts a second are not more than R, what it manages where parts do nothing. A part travels while others
+are worked on, so that only the first and the last cost: a worker waits half a part at the end on average, and `begin`
+seconds at the start, in which it imports Gonio, loads the scene and takes the kernel from the cache. For N parts
 
     efficiency = T / (T + begin + s / 2),  T = max(N s / W, N / R) + what the bytes take,  relative to N s / W
 """
@@ -83,7 +83,9 @@ def main() -> None:
         samples = min(max(total // (tiles.PARTS * workers), tiles.LEAST_SAMPLES), tiles.MOST_SAMPLES)
         parts, seconds = total // samples, samples / speed
         share = predicted(parts, seconds, workers, rate, 3.0, back * samples / (1 << 25), band)
-        need = next(s for s in np.geomspace(1e-3, 100, 400) if predicted(100 * workers, s, workers, rate, 0, 1e5, band) > 0.9)
+        need = next(
+            s for s in np.geomspace(1e-3, 100, 400) if predicted(100 * workers, s, workers, rate, 0, 1e5, band) > 0.9
+        )
         print(f"{workers:7}  {parts:5}  {seconds:6.2f}  {share:.1%};  {need:.2f} s")
     cards, seconds = 100 * 10, 6.0
     share = predicted(cards, seconds, 100, rate, 3.0, 1e5, band)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,6 +36,24 @@ SCENE = {
         "lights": [{"type": "spotLight", "position": [2, 3, 4], "energy": [40, 40, 40]}],
     },
 }
+
+
+@pytest.fixture(scope="session", autouse=True)
+def on_the_gpu_where_asked() -> Iterator[None]:
+    """`make test-gpu` runs these tests on CUDA: what would take the CPU takes the GPU."""
+    if os.environ.get("GONIO_TEST_DEVICE") != "cuda":
+        yield
+        return
+    from gonio.render import engine
+
+    choose = engine.variant_for
+
+    def on_cuda(device: str = "cpu", spectral: bool = False) -> str:
+        return choose("cuda" if device == "cpu" else device, spectral)
+
+    engine.variant_for = on_cuda
+    yield
+    engine.variant_for = choose
 
 
 @pytest.fixture

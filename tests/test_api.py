@@ -24,6 +24,7 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
 }
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
 TEXT = {"param", "preset", "as_json"}
+CREW = {"workers", "cluster"}  # in a program: with go.cluster(...)
 ONLY_TYPED = {"verify": {"at", "github"}, "emit": {"output", "bundle"}}
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
@@ -35,7 +36,7 @@ def test_options_have_the_same_names_and_defaults(name: str) -> None:
     called = inspect.signature(FUNCTIONS[name]).parameters
     assert all(p.kind is not inspect.Parameter.VAR_KEYWORD for p in called.values())
     options = {key for key, p in typed.items() if p.default is not inspect.Parameter.empty}
-    options -= TEXT | ONLY_TYPED.get(name, set())
+    options -= TEXT | CREW | ONLY_TYPED.get(name, set())
     assert options <= set(called)
     for key in sorted(options):
         if f"{name} {key}" not in OTHER_DEFAULTS:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the camera's rays
 MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
 LEAST_SAMPLES = 1 << 21  # less is soon lost to sending it
-PARTS = 16  # for each worker at least, so that none waits long for the last
+PARTS = 12  # for each worker at least, so that none waits long for the last
 
 
 class Gathered:

@@ -42,6 +42,8 @@ FEW = 3.0  # times the median of the others that it may take
 SILENT = 8.0  # seconds without a sign of life after which a worker is given nothing more
 FROZEN = 30.0  # and after which one of this machine is ended, and another started
 MOST_COPIES = 5
+TOGETHER = 64  # results taken at once
+FETCH = 20.0  # seconds for that
 DEATHS = 3  # of workers while they did a part, after which it is the part's fault
 ANSWER = 10.0  # seconds for a scheduler to answer
 NOBODY = 60.0  # seconds to wait for the first worker
@@ -81,10 +83,7 @@ class Cluster:
         from distributed import Client, LocalCluster
         from distributed.security import Security
 
-        quiet: dict[str, object] = {
-            "distributed.scheduler.worker-saturation": 1.0,
-            "distributed.scheduler.allowed-failures": 1000,
-        }
+        quiet: dict[str, object] = {"distributed.scheduler.allowed-failures": 1000}
         quiet |= {"distributed.comm.timeouts.connect": "10s", "distributed.admin.low-level-log-length": 0}
         # A worker that computes does not answer for a while; one that is frozen has its parts done by others anyway.
         quiet |= {"distributed.scheduler.worker-ttl": "300s"}
@@ -190,7 +189,7 @@ class Cluster:
         self._send(files)
         job = _Job(self, function, arguments)
         try:
-            while job.missing:
+            while job.missing or job.ready:
                 job.hand_out()
                 yield job.next()
                 self._revive()
@@ -236,7 +235,8 @@ class _Job:
         self.since: dict[int, float] = {}
         self.deaths: dict[int, int] = {}
         self.took: list[float] = []
-        self.answers: queue.Queue[tuple[int, float | None, Arrays | BaseException]] = queue.Queue()
+        self.answers: queue.Queue[tuple[int, Future]] = queue.Queue()
+        self.ready: deque[tuple[int, Arrays]] = deque()
         from . import worker
 
         self.about, self.do = worker.about(), worker.do
@@ -267,35 +267,46 @@ class _Job:
             self.do, self.function, self.arguments[index], self.about, key=key, pure=False, **options
         )
         self.out.setdefault(index, []).append(future)
-        future.add_done_callback(lambda done: self._answer(index, done))
-
-    def _answer(self, index: int, future: Future) -> None:
-        """In a thread of Dask's: take the result from the worker that has it."""
-        try:
-            if future.cancelled() or index not in self.missing:
-                return
-            seconds, arrays = future.result(timeout=60)
-            self.answers.put((index, seconds, arrays))
-        except BaseException as error:
-            self.answers.put((index, None, error))
+        future.add_done_callback(lambda done: self.answers.put((index, done)))
 
     def next(self) -> tuple[int, Arrays]:
         """A part that is done; (-1, {}) where none is for a while."""
+        if not self.ready:
+            self._fetch()
+        return self.ready.popleft() if self.ready else (-1, {})
+
+    def _fetch(self) -> None:
+        """Take what is done from the workers that have it, all at once: one by one takes four times as long."""
         try:
-            index, seconds, found = self.answers.get(timeout=LOOK)
+            answers = [self.answers.get(timeout=LOOK)]
         except queue.Empty:
-            return -1, {}
-        if index not in self.missing:
-            return -1, {}
-        if isinstance(found, BaseException):
-            self._failed(index, found)
-            return -1, {}
-        if seconds is not None:
+            return
+        with contextlib.suppress(queue.Empty):
+            while len(answers) < TOGETHER:
+                answers.append(self.answers.get_nowait())
+        done: dict[int, Future] = {}
+        for index, future in answers:
+            if index not in self.missing or future.cancelled():
+                continue
+            if future.status == "finished":
+                done[index] = future
+            else:
+                self._failed(index, future.exception(timeout=5) or TimeoutError())
+        if not done:
+            return
+        try:
+            fetch = self.client._gather
+            found = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH)
+        except Exception:  # one of the workers died, or froze, with what it had: ask for each again, elsewhere
+            for index in done:
+                self._failed(index, TimeoutError())
+            return
+        for index, (seconds, arrays) in zip(done, found, strict=True):
             self.took.append(seconds)
-        self.missing.discard(index)
-        for future in self.out.pop(index, []):
-            future.release()
-        return index, found
+            self.missing.discard(index)
+            for future in self.out.pop(index, []):
+                future.release()
+            self.ready.append((index, arrays))
 
     def _failed(self, index: int, error: BaseException) -> None:
         """Raise what the part itself has raised; give it to another where its worker was lost."""

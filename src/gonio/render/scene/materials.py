@@ -14,7 +14,19 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, ForwardRef, Literal, NamedTuple, TypeAlias, TypeVar, Union
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    ForwardRef,
+    Literal,
+    NamedTuple,
+    TypeAlias,
+    TypeVar,
+    Union,
+    cast,
+)
 
 import numpy as np
 from pydantic import (
@@ -110,6 +122,10 @@ class MaterialPart(Part):
     declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
     dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
     lab: ClassVar[LabType | None]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its type's name: the classes are made, and no module holds them."""
+        return _pickled, (self.type, self.model, dict(self.__dict__), set(self.model_fields_set))
 
     def get(self, key: str) -> Value | None:
         return getattr(self, _attribute(key))
@@ -341,6 +357,13 @@ def described(material: BSDF) -> MaterialPart:
     made = part.model_validate(fields)
     made._given = True
     return made
+
+
+def _pickled(name: str, model: Model, values: dict[str, Any], given: set[str]) -> MaterialPart:
+    """What `MaterialPart.__reduce__` has taken apart."""
+    known, own = BY_TYPE.get(name), cast(Any, model)
+    cls: Any = known if known is not None and known.model is model else _own_part(name, own)
+    return cls.model_construct(given, **values)
 
 
 def _tag(value: object) -> str | None:
