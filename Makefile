@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all lint bench install clean docs browser
+.PHONY: demo test test-all fuzz lint bench install clean docs browser
 
 install: .venv/installed
 
@@ -51,6 +51,11 @@ test: .venv/installed browser lint
 
 test-all: .venv/installed browser lint
 	$(BIN)/python -m pytest $(PARALLEL)
+
+# spoilt inputs for every reader; make fuzz COUNT=100000 TARGETS='exr ply'
+COUNT ?= 2000
+fuzz: .venv/installed
+	$(BIN)/python tests/fuzz/run.py --count $(COUNT) $(TARGETS)
 
 bench: .venv/installed
 	$(BIN)/python benchmarks/startup.py
