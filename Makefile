@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all test-gpu lint bench install clean docs browser
+.PHONY: demo test test-all test-gpu fuzz lint bench install clean docs browser
 
 install: .venv/installed
 
@@ -59,6 +59,11 @@ test-gpu: .venv/installed
 	@$(BIN)/python -c 'import sys; from gonio.render import engine; sys.exit(not engine.cuda_available())' \
 	|| { echo "NO GPU: no NVIDIA driver with a device answers, so NOTHING WAS TESTED on CUDA" >&2; exit 1; }
 	GONIO_TEST_DEVICE=cuda $(BIN)/python -m pytest -m 'not slow' $(GPU_TESTS)
+
+# spoilt inputs for every reader; make fuzz COUNT=100000 TARGETS='exr ply'
+COUNT ?= 2000
+fuzz: .venv/installed
+	$(BIN)/python tests/fuzz/run.py --count $(COUNT) $(TARGETS)
 
 bench: .venv/installed
 	$(BIN)/python benchmarks/startup.py

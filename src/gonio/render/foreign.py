@@ -110,7 +110,7 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     kind = str(description.get("type", ""))
     try:
         with engine.file_threads():
-            bsdf = mi.load_dict(description)
+            bsdf = mi.load_dict(description, parallel=False)
     except Exception as error:
         raise _refused(error, kind) from None
     if not isinstance(bsdf, mi.BSDF):
@@ -148,7 +148,7 @@ def load_file(path: Path) -> Native:
     mitsuba_scene.check_files(path, {}, allow_outside=True)
     try:
         with engine.file_threads():
-            found = mi.load_file(str(path))
+            found = mi.load_file(str(path), parallel=False)
     except Exception as error:
         raise _refused(error, path.name) from None
     if isinstance(found, mi.BSDF):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -111,6 +111,12 @@ def check_file(path: Path) -> None:
     content = path.read_bytes()
     kind = kind_of(content)
     if kind is None:
+        for starts, checked in _PLAIN:
+            if starts(path, content):
+                try:
+                    checked(content)
+                except (struct.error, IndexError):
+                    raise Unreadable("it is cut off in its header") from None
         return
     claimed = check(content, kind)
     if kind == "RGBE":
@@ -278,5 +284,49 @@ def _runs(data: memoryview, width: int, height: int) -> NDArray[np.uint8]:
         raise error if isinstance(error, Unreadable) else Unreadable("it is cut off") from None
     return lines.reshape(height, 4, width).transpose(0, 2, 1)
 
+
+# ---------------------------------------------------------------------- formats that only Mitsuba's scenes name
+
+
+def _fits(content: bytes, at: int, needed: int) -> None:
+    if not 0 <= at <= len(content) or not 0 < needed <= len(content) - at:
+        raise Unreadable("it claims more pixels than it holds")
+
+
+def _plain_text(content: bytes) -> None:
+    """PPM and PFM: numbers in letters, then the values."""
+    found = re.match(rb"P([6Ff])\s(\d{1,6})\s(\d{1,6})\s([-+.\d]{1,20})\s", content)
+    if found is None:
+        raise Unreadable("its header is damaged")
+    kind, width, height = found[1], int(found[2]), int(found[3])
+    if kind == b"6" and found[4] not in (b"255", b"65535"):
+        raise Unreadable("its values go neither to 255 nor to 65535")
+    each = {b"6": 3 if found[4] == b"255" else 6, b"F": 12, b"f": 4}[kind]
+    _fits(content, found.end(), width * height * each)
+
+
+def _bmp(content: bytes) -> None:
+    start, size, width, height, planes, depth, packed = struct.unpack("<IIiiHHI", content[10:34])
+    if size < 40 or planes != 1 or depth not in (1, 8, 16, 24, 32) or packed or width <= 0 or height == 0:
+        raise Unreadable("it is packed, or its header is damaged: save it as PNG")
+    colours = struct.unpack("<I", content[46:50])[0] or (1 << depth if depth <= 8 else 0)
+    if colours > 256 or start < 14 + size + 4 * colours:
+        raise Unreadable("its header is damaged")
+    _fits(content, start, (depth * width + 31) // 32 * 4 * abs(height))
+
+
+def _tga(content: bytes) -> None:
+    text, table, kind, width, height, depth = struct.unpack("<BBB9xHHB", content[:17])
+    if table or kind not in (2, 3) or depth not in (8, 16, 24, 32):
+        raise Unreadable("it is packed or has a table of colours, which is not supported: save it as PNG")
+    _fits(content, 18 + text, width * height * depth // 8)
+
+
+# how each begins, and what is asked of it
+_PLAIN: tuple[tuple[Callable[[Path, bytes], bool], Callable[[bytes], None]], ...] = (
+    (lambda path, content: content[:2] in (b"P6", b"PF", b"Pf"), _plain_text),
+    (lambda path, content: content[:2] == b"BM", _bmp),
+    (lambda path, content: path.suffix.lower() == ".tga" or content[-18:-2] == b"TRUEVISION-XFILE", _tga),
+)
 
 _HEADERS = {"PNG": _png, "JPEG": _jpeg, "OpenEXR": _exr, "RGBE": _rgbe}

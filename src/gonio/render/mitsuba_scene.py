@@ -87,6 +87,7 @@ def load(request: Request, mi: ModuleType) -> Scene:
     try:
         # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance
         with engine.file_threads():
+            # In parallel a file that cannot be read ends the process: the error has a thread of its own.
             values = {key: _as_xml(value) for key, value in request.overrides.items()}
             scene = mi.load_file(where, parallel=False, optimize=False, **values)
         if not isinstance(scene, mi.Scene):
@@ -137,12 +138,16 @@ def check_files(file: Path, parameters: Mapping[str, object], allow_outside: boo
     """Raise InputError where a Mitsuba scene, or a file it includes, names a file that must not be opened: one outside
     the scene's folder, or a picture that contradicts itself, by which a library in C++ could be corrupted."""
     folder = file.parent.resolve()
+    from .scene import meshes
+
     for current, name, target, _ in _named(file, parameters):
         if not allow_outside and not target.is_relative_to(folder):
             what = f"'{name}' lies outside the scene's folder {folder}"
             raise InputError(what, str(current), "copy it there, or use --allow-outside")
         try:
             formats.check_file(target)
+            if target.suffix.lower() == ".ply":  # Mitsuba's reader believes its counts and indices
+                meshes.read_mesh(target, str(current))
         except formats.Unreadable as error:
             raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
         except OSError as error:

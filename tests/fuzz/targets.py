@@ -1,0 +1,429 @@
+"""The readers: of each its seeds and how to call it. A further one is one more function here.
+
+@target("merl", seeds=lambda: [small_merl()], tokens=[b"MERL"])
+def merl(data: bytes, folder: Path) -> object:
+    return measured.read(saved(folder / "a.binary", data))
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import io
+import json
+import shlex
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .mutation import png_repaired
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[1] / "examples"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader.
+
+    seeds   inputs that it takes, from which others are made
+    read    called with an input and an empty folder; it may raise GonioError
+    tokens  what its language is made of, put in now and then
+    repair  what makes a spoilt input pass for one again, such as a checksum
+    """
+
+    name: str
+    seeds: Callable[[], Sequence[bytes]]
+    read: Callable[[bytes, Path], object]
+    tokens: Sequence[bytes] = ()
+    repair: Callable[[bytes], bytes] | None = None
+
+
+TARGETS: dict[str, Target] = {}
+
+
+def target(
+    name: str,
+    seeds: Callable[[], Iterable[bytes]],
+    tokens: Sequence[bytes] = (),
+    repair: Callable[[bytes], bytes] | None = None,
+) -> Callable[[Callable[[bytes, Path], object]], Callable[[bytes, Path], object]]:
+    """Declare a reader: the function is called with an input and an empty folder."""
+
+    def declare(read: Callable[[bytes, Path], object]) -> Callable[[bytes, Path], object]:
+        TARGETS[name] = Target(name, functools.cache(lambda: tuple(seeds())), read, tokens, repair)
+        return read
+
+    return declare
+
+
+def saved(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path
+
+
+# ---------------------------------------------------------------------- scenes
+
+
+def _scene(shape: dict[str, object], **more: object) -> bytes:
+    scene = {
+        "output": {"filename": "a.exr"},
+        "sampler": {"type": "independent", "samples": 2},
+        "camera": {
+            "type": "pinhole",
+            "transform": {"position": [0, 1, 4], "up": [0, 1, 0], "lookAt": [0, 0, 0]},
+            "verticalFov": 45,
+            "film": {"size": [6, 4]},
+        },
+        "integrator": {"type": "path", "maxDepth": 3},
+        "scene": {
+            "shapes": [shape],
+            "lights": [
+                {"type": "spotLight", "position": [2, 3, 4], "energy": [40, 40, 40]},
+                {"type": "environmentLight", "radiance": [0.3, 0.3, 0.3]},
+            ],
+        },
+        **more,
+    }
+    return json.dumps(scene).encode()
+
+
+def scenes() -> list[bytes]:
+    phong = {"type": "phong", "kd": [0.2, 0.2, 0.2], "ks": [0.5, 0.5, 0.5], "p": 8}
+    gold = {"type": "gonio-conductor", "preset": "Au", "alpha": [0.1, 0.4]}
+    mixed = {"type": "gonio-mix", "a": {"type": "gonio-lambert"}, "b": gold, "weight": 0.3}
+    turned = {"rotate": {"axis": [0, 1, 0], "angle": 30}, "scale": [1, 2, 1], "translate": [0, 1, 0]}
+    return [
+        _scene({"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": phong}),
+        _scene({"type": "cube", "material": gold}),
+        _scene({"type": "disk", "radius": 1, "material": mixed}),
+        _scene({"type": "cone", "radius": 1, "height": 2, "transform": turned, "material": {"type": "matte"}}),
+        (EXAMPLES / "phong" / "scene.json").read_bytes(),
+    ]
+
+
+@target("scene-json", scenes, [b'"type"', b'"material"', b"null", b"[[", b"1e400", b"gonio-mix"])
+def scene_json(data: bytes, folder: Path) -> object:
+    from gonio.render import engine, scene
+
+    return scene.build(scene.read(saved(folder / "scene.json", data)), engine.load("cpu"))
+
+
+XML = b"""<scene version="3.0.0"><default name="spp" value="2"/>
+<integrator type="path"><integer name="max_depth" value="3"/></integrator>
+<sensor type="perspective"><float name="fov" value="45"/>
+<transform name="to_world"><lookat origin="0,1,4" target="0,0,0" up="0,1,0"/></transform>
+<sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
+<film type="hdrfilm"><integer name="width" value="6"/><integer name="height" value="4"/></film></sensor>
+<emitter type="constant"><rgb name="radiance" value="1,1,1"/></emitter>
+%s</scene>"""
+SHAPES = (
+    b'<shape type="sphere"><point name="center" x="0" y="0" z="0"/><bsdf type="gonio_conductor" id="b">'
+    b'<string name="preset" value="Au"/><float name="alpha" value="0.2"/></bsdf></shape>',
+    b'<shape type="rectangle"><bsdf type="roughplastic"><spectrum name="diffuse_reflectance" value="400:.1,700:.5"/>'
+    b'</bsdf><emitter type="gonio_area"><rgb name="radiance" value="1,2,3"/></emitter></shape>',
+    b'<shape type="cube"><bsdf type="twosided"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/>'
+    b"</bsdf></bsdf></shape>",
+)
+
+
+def _load_xml(path: Path) -> object:
+    from gonio.render import adapter, engine, lights, mitsuba_scene
+    from gonio.render.request import Request
+
+    mi = engine.load("cpu")
+    mi.set_log_level(mi.LogLevel.Error)
+    adapter.register(mi)
+    lights.register(mi)
+    return mitsuba_scene.load(Request(path), mi)
+
+
+@target("scene-xml", lambda: [XML % shape for shape in SHAPES], [b"<!--", b"<bsdf>", b'"$spp"', b"&amp;", b"<include"])
+def scene_xml(data: bytes, folder: Path) -> object:
+    return _load_xml(saved(folder / "scene.xml", data))
+
+
+# ---------------------------------------------------------------------- meshes
+
+OBJ = b"""# square
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1
+f 1/1/1 2/2/1 3/3/1 4/1/1\nf -4 -3 -2\n"""
+PLY = b"""ply\nformat ascii 1.0\ncomment x\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z
+property float nx\nproperty float ny\nproperty float nz\nproperty float u\nproperty float v\nelement face 2
+property list uchar int vertex_indices\nend_header\n0 0 0 0 0 1 0 0\n1 0 0 0 0 1 1 0\n1 1 0 0 0 1 1 1\n0 1 0 0 0 1 0 1
+3 0 1 2\n4 0 1 2 3\n"""
+
+
+def plies() -> list[bytes]:
+    header = b"ply\nformat %s 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    header += b"element face 1\nproperty list uchar %s vertex_indices\nend_header\n"
+    found = [PLY]
+    for name, order in ((b"binary_little_endian", "<"), (b"binary_big_endian", ">")):
+        corners = struct.pack(order + "9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
+        found += [
+            header % (name, b"int") + corners + struct.pack(order + "B3i", 3, 0, 1, 2),
+            header % (name, b"short") + corners + struct.pack(order + "B4h", 4, 0, 1, 2, 0),
+        ]
+    return found
+
+
+@target("obj", lambda: [OBJ], [b"f 1 2 3\n", b"v 1 2\n", b"//", b"-0"])
+def obj(data: bytes, folder: Path) -> object:
+    from gonio.render.scene import meshes
+
+    return meshes.read_mesh(saved(folder / "a.obj", data), "here")
+
+
+@target("ply", plies, [b"property float x\n", b"property list uchar int i\n", b"element face 9\n", b"double"])
+def ply(data: bytes, folder: Path) -> object:
+    from gonio.render.scene import meshes
+
+    return meshes.read_mesh(saved(folder / "a.ply", data), "here")
+
+
+# Files that a Mitsuba scene names: Mitsuba itself reads them
+NAMED = XML % b'<shape type="%s"><string name="filename" value="a.%s"/></shape>'
+
+
+@target("xml-obj", lambda: [OBJ], [b"f 1 2 3\n", b"f 1/2/3 4/5/6 7/8/9\n"])
+def xml_obj(data: bytes, folder: Path) -> object:
+    saved(folder / "a.obj", data)
+    return _load_xml(saved(folder / "scene.xml", NAMED % (b"obj", b"obj")))
+
+
+@target("xml-ply", plies, [b"property float x\n", b"property list uchar int i\n", b"element face 9\n", b"double"])
+def xml_ply(data: bytes, folder: Path) -> object:
+    saved(folder / "a.ply", data)
+    return _load_xml(saved(folder / "scene.xml", NAMED % (b"ply", b"ply")))
+
+
+# ---------------------------------------------------------------------- pictures
+
+
+def _bmp(values: np.ndarray) -> bytes:
+    height, width, channels = values.shape
+    table = bytes(k for grey in range(256) for k in (grey, grey, grey, 0)) if channels == 1 else b""
+    start = 54 + len(table)
+    head = struct.pack("<2sIHHI", b"BM", start + values.size, 0, 0, start)
+    sizes = struct.pack("<IiiHHIIiiII", 40, width, height, 1, 8 * channels, 0, values.size, 0, 0, 0, 0)
+    return head + sizes + table + values[::-1].tobytes()
+
+
+def _tga(values: np.ndarray) -> bytes:
+    height, width, channels = values.shape
+    kind = 3 if channels == 1 else 2
+    return struct.pack("<BBBHHBHHHHBB", 0, 0, kind, 0, 0, 0, 0, 0, width, height, 8 * channels, 32) + values.tobytes()
+
+
+CHANNELS = {"hdr": (3,), "ppm": (3,), "pfm": (1, 3), "jpg": (1, 3), "bmp": (1, 3)}  # that a format has
+
+
+@functools.cache
+def _pictures(*kinds: str) -> tuple[bytes, ...]:
+    """Small pictures of these formats, of several depths and channels."""
+    import tempfile
+
+    from gonio.render import engine, images
+
+    mi, rng, found = engine.load("cpu"), np.random.default_rng(3), []
+    with tempfile.TemporaryDirectory() as name, engine.file_threads():
+        path = Path(name)
+        for kind in kinds:
+            for channels, mode in ((3, "RGB"), (1, "Y"), (4, "RGBA")):
+                if channels not in {"hdr": (3,), "ppm": (3,), "pfm": (1, 3), "jpg": (1, 3), "bmp": (1, 3)}.get(
+                    kind, (1, 3, 4)
+                ):
+                    continue
+                whole = kind in ("png", "jpg", "bmp", "tga", "ppm")
+                pixels = rng.random((9, 16, channels)).astype(np.float32)
+                pixels[3:5] = 0.5
+                values = (pixels * 255).astype(np.uint8) if whole else pixels
+                if kind in ("bmp", "tga"):  # which Mitsuba reads and does not write
+                    found.append((_bmp if kind == "bmp" else _tga)(values))
+                    continue
+                mi.Bitmap(values, getattr(mi.Bitmap.PixelFormat, mode)).write(str(path / f"a.{kind}"))
+                found.append((path / f"a.{kind}").read_bytes())
+            if kind in ("exr", "png", "hdr"):
+                pixels = rng.random((5, 9, 3)).astype(np.float32)
+                images.write(path / f"b.{kind}", pixels, {"scene": "é", "spp": 4, "time": 1.5})
+                found.append((path / f"b.{kind}").read_bytes())
+            if kind == "exr":
+                mi.Bitmap(rng.random((40, 40, 3)).astype(np.float16)).write(str(path / "c.exr"))
+                found.append((path / "c.exr").read_bytes())
+    return tuple(found)
+
+
+def _picture(kind: str, tokens: Sequence[bytes] = (), repair: Callable[[bytes], bytes] | None = None) -> None:
+    @target(kind, lambda: _pictures(kind), tokens, repair)
+    def read(data: bytes, folder: Path) -> object:
+        from gonio.errors import GonioError
+        from gonio.render import images
+        from gonio.render.scene import textures
+
+        path = saved(folder / f"a.{kind}", data)
+        with contextlib.suppress(GonioError):
+            textures.load_image(path, "here", srgb=True)
+        return images.read(path) if path.suffix in images.SUFFIXES else None
+
+
+_picture("png", [b"tEXt", b"iTXtgonio.spp\0\0\0\0\0", b"tRNS", b"PLTE", b"iCCP", b"gAMA"], png_repaired)
+_picture("jpg", [b"\xff\xd8", b"\xff\xc0", b"\xff\xc4", b"\xff\xdb", b"\xff\xda", b"\xff\xe1"])
+_picture("exr", [b"dataWindow\0box2i\0", b"channels\0chlist\0", b"tiles\0tiledesc\0", b"string\0", b"compression\0"])
+_picture("hdr", [b"\n\n", b"-Y 9 +X 9\n", b"\x02\x02\0\x11", b"FORMAT=32-bit_rle_rgbe\n", b"\x81", b"\x80", b"\xff"])
+
+TEXTURE = XML % (
+    b'<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">'
+    b'<string name="filename" value="a.%s"/></texture></bsdf></shape>'
+)
+
+
+def _xml_picture(kind: str, tokens: Sequence[bytes] = (), repair: Callable[[bytes], bytes] | None = None) -> None:
+    @target(f"xml-{kind}", lambda: _pictures(kind), tokens, repair)
+    def read(data: bytes, folder: Path) -> object:
+        saved(folder / f"a.{kind}", data)
+        return _load_xml(saved(folder / "scene.xml", TEXTURE % kind.encode()))
+
+
+for _kind in ("exr", "hdr", "jpg", "bmp", "tga", "pfm", "ppm"):
+    _xml_picture(_kind)
+_xml_picture("png", (), png_repaired)
+
+
+@functools.cache
+def _archives() -> tuple[bytes, ...]:
+    found = []
+    for save in (np.savez, np.savez_compressed):
+        stream = io.BytesIO()
+        save(stream, radiance=np.ones((4, 5, 3), np.float32), metadata=np.array('{"spp": 4}'))
+        found.append(stream.getvalue())
+    return tuple(found)
+
+
+@target("npz", _archives, [b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06", b"'|O'", b"(4, 5, 3)", b"(1000000000,)"])
+def npz(data: bytes, folder: Path) -> object:
+    from gonio.render import images
+
+    return images.read(saved(folder / "a.npz", data))
+
+
+# ---------------------------------------------------------------------- tables, notation, messages, options
+
+
+@functools.cache
+def _tables() -> tuple[bytes, ...]:
+    import gonio as go
+
+    return (go.bake("ggx", lut=["E"], size=4).npz(),)
+
+
+@target("tables", _tables, [b"manifest", b"seal", b"(4, 4)", b"PK\x01\x02"])
+def tables(data: bytes, folder: Path) -> object:
+    from gonio.energy.tables import baked
+
+    found = baked.load(saved(folder / "tables.npz", data))
+    return baked.title(found.manifest), baked.rows(found.manifest)
+
+
+@target("notation", lambda: [
+    b"conductor", b"conductor(alpha=.3,preset=Au)", b"kulla-conty(base=conductor(alpha=.3,preset=Au))",
+    b"mix(a=lambert(albedo=.9,.8,.7),b=phong,weight=.2)", b'{"type": "conductor", "alpha": [0.1, 0.4]}',
+    b"two-sided(base=oren-nayar(sigma=.4))",
+], [b"(", b")", b"=", b",", b"base=", b"alpha=", b"1e999", b"nan", b"preset=", b".py:X"])  # fmt: skip
+def material_notation(data: bytes, folder: Path) -> object:
+    from gonio.models import notation
+
+    return notation.named(data.decode("utf-8", "surrogateescape"))
+
+
+def messages() -> list[bytes]:
+    state = {
+        "rows": [{"material": "gold", "choices": {"ndf": "ggx"}, "balls": [{"alpha": 0.1}, {"alpha": [0.1, 0.2]}]}],
+        "lights": [
+            {"type": "directional", "direction": [0, 1, 0], "irradiance": [1, 1, 1]},
+            {"type": "area", "center": [0, 2, 0], "u": [1, 0, 0], "v": [0, 0, 1], "radiance": [1, 1, 1]},
+            {"type": "environment", "image": {"key": "a"}, "rotation": 0.5},
+        ],
+        "camera": {"target": [0, 0, 0], "distance": 4, "azimuth": 0.1, "elevation": 0.2, "fov": 30},
+    }
+    return [
+        json.dumps(message).encode()
+        for message in (
+            {"type": "scene", "id": 1, "width": 16, "height": 16, "state": state, "spp": 4},
+            {"type": "ack", "frame": 3},
+            {"type": "upload", "key": "a", "width": 2, "height": 2},
+            {"type": "choice", "id": 2, "material": "gold", "choices": {"ndf": "beckmann", "flag": True}},
+        )
+    ]
+
+
+@target("message", messages, [b'"type":', b"1e400", b"{{", b"\\ud800"])
+def message(data: bytes, folder: Path) -> object:
+    from gonio.errors import InputError
+    from gonio.viewer import messages as protocol
+
+    try:
+        found = protocol.parse(data.decode("utf-8", "replace"))
+    except InputError as error:
+        return protocol.failure(error).encode()  # it is sent
+    if isinstance(found, protocol.Upload):
+        return protocol.environment(found, np.arange(16, dtype="<f2").tobytes())
+    return found
+
+
+@target("link", lambda: [b"token=abc|127.0.0.1:80|http://127.0.0.1:80", b"token=%61bc&token=x|[::1]:80|null"], [
+    b"%", b"%00", b"&", b"token=", b"[", b"]", b"@", b"xn--", b"localhost",
+])  # fmt: skip
+def link(data: bytes, folder: Path) -> object:
+    """The address of the page, and the headers by which the server tells its own page from a stranger's."""
+    from gonio.viewer.server import Door
+    from starlette.datastructures import Headers
+
+    query, _, rest = data.partition(b"|")
+    host, _, origin = rest.partition(b"|")
+    headers = Headers(raw=[(b"host", host), (b"origin", origin)])
+    return Door("127.0.0.1", "abc").refusal(headers, query, needs_origin=False)
+
+
+@target("options", lambda: [
+    b"render nowhere --spp 4 --size 640x480 --seed 3 --timeout 1.5 --exposure -1 -o a.png",
+    b"study nowhere --vary shapes.0.material.alpha=0.1,0.2 --spp 2",
+    b"emit lambert --lang glsl --param albedo=.5", b"compare a.exr b.exr --metric flip --tolerance .1",
+    b"convert a.exr b.png --exposure auto", b"models conductor --json", b"schema scene", b"verify nothing --quick",
+], [b"--", b"-o", b"--size", b"--param", b"=", b"''", b"1e999", b"nan", b"auto"])  # fmt: skip
+def options(data: bytes, folder: Path) -> object:
+    """The command line, in an empty folder; of verbs that compute or serve, only what names nothing to work on."""
+    import os
+
+    from gonio.cli import app
+
+    os.environ["GONIO_DEBUG"] = "1"  # a traceback is a find
+    try:
+        words = shlex.split(data.decode("utf-8", "surrogateescape").replace("\0", ""))
+    except ValueError:
+        return None
+    if not words or words[0] not in ("render", "study", "emit", "compare", "convert", "models", "schema", "verify"):
+        return None
+    named = {"verify": "nothing", "render": "nowhere", "study": "nowhere"}.get(words[0])
+    if named is not None and named not in words:
+        return None
+    os.chdir(folder)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        return app.run(words)
+
+
+# ---------------------------------------------------------------------- the harness itself
+
+
+@target("self-test", lambda: [b"fine", b"divide", b"crash", b"memory"])
+def self_test(data: bytes, folder: Path) -> object:
+    """A reader that breaks in every way, by which the harness is tested; `make fuzz` leaves it out."""
+    import ctypes
+
+    if b"divide" in data:
+        return 1 / 0
+    if b"crash" in data:
+        return ctypes.string_at(0)
+    return len(bytearray(300_000_000 + len(data))) if b"memory" in data else None
