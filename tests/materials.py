@@ -1,8 +1,8 @@
 """The materials that the laws are tested on: every model, every choice of its parts.
 
-`SMALL` has each kind once, of the historic models some, `ALL` every distribution with every masking, both Fresnel forms,
-every way of sampling, widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED` has every
-way to give lost light back that can be recorded: energy's own tests judge them, recording looks at them too.
+`SMALL` has each kind once, of the historic models some, `ALL` every distribution with every masking, both Fresnel
+forms, every way of sampling, widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED`
+has every way to give lost light back that can be recorded: energy's own tests judge them, recording looks at them too.
 """
 
 from __future__ import annotations

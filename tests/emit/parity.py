@@ -100,7 +100,7 @@ def _values(owner: str, parameter: Parameter, value: Any, rng: np.random.Generat
         if not isinstance(value, tuple):
             pair[:, 1] = pair[:, 0]
         pair[rng.random(count) < 0.03] = 0.0
-        return pair.astype(np.float32)
+        return np.maximum(pair, parameter.low).astype(np.float32)
     if parameter.kind == "angle":
         angle = rng.uniform(-np.pi, np.pi, count)
         return np.stack([np.cos(angle), np.sin(angle)], 1).astype(np.float32)
@@ -114,6 +114,7 @@ def _values(owner: str, parameter: Parameter, value: Any, rng: np.random.Generat
         x = rng.uniform(0.0, 10.0, shape) if parameter.name != "p" else 10.0 ** rng.uniform(-2, 3.5, shape)
     else:
         x = rng.uniform(low, high, shape)
+    x = np.maximum(x, low)
     x = np.where(rng.random(shape) < 0.03, low if np.isfinite(low) else 0.0, x)
     return np.where(rng.random(shape) < 0.03, high, x).astype(np.float32) if np.isfinite(high) else x.astype(np.float32)
 

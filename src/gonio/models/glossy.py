@@ -123,8 +123,8 @@ def sum_breach(more: str = "") -> Breach:
 def facet(wo: Direction, wi: Direction) -> tuple[Direction, Scalar]:
     """(half vector h, o.h): the cosine as half the length of o + i, which rounding makes neither 0 nor negative."""
     total = wo + wi
-    length = sqrt(maximum(dot(total, total), TINY))
-    return total * (1.0 / length), 0.5 * length
+    size = sqrt(maximum(dot(total, total), TINY))
+    return total * (1.0 / size), 0.5 * size
 
 
 class _Lit(NamedTuple):

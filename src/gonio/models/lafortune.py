@@ -52,10 +52,10 @@ class Lafortune(_Glossy):
         """(unit axis of the lobe, its length to the n-th power): the length from what is missing to 1, as a length so
         near 1 has no digits left for a large n."""
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
-        short = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
-        short = minimum(short, 1.0 - SHORTEST)
+        missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
+        missing = minimum(missing, 1.0 - SHORTEST)
         axis = where(dot(axis, axis) > SHORTEST, axis, upright(wo))
-        return normalize(axis), exp(self.exponent * (-0.5 * short * logrel(-short)))
+        return normalize(axis), exp(self.exponent * (-0.5 * missing * logrel(-missing)))
 
     @function
     def _power(self, axis: Direction, wi: Direction) -> Scalar:
@@ -72,9 +72,9 @@ class Lafortune(_Glossy):
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular (n + 2) / (2 pi) |C o|^n (axis.wi)^n cos theta_i."""
-        axis, length = self._axis(wo)
+        axis, strength = self._axis(wo)
         norm = (self.exponent + 2.0) * (0.5 * inv_pi)
-        return self.specular * (norm * length * self._power(axis, wi) * wi.z)
+        return self.specular * (norm * strength * self._power(axis, wi) * wi.z)
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -91,8 +91,8 @@ class Lafortune(_Glossy):
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """specular |C o|^n times the axis's cosine: of a narrow lobe."""
-        axis, length = self._axis(wo)
-        return self.specular * (length * ops.clamp(axis.z, 0.1, 1.0))
+        axis, strength = self._axis(wo)
+        return self.specular * (strength * ops.clamp(axis.z, 0.1, 1.0))
 
 
 @function
