@@ -33,7 +33,7 @@ _PLACES = {
     # what a material of one's own is written with
     "models": (
         *("Angle", "BSDF", "Breach", "Colour", "Number", "Parameter", "Preset", "Sample", "Width"),
-        *("angle", "bsdf", "choice", "flag", "method", "model", "never", "number", "spectrum", "width"),
+        *("angle", "bsdf", "choice", "file", "flag", "method", "model", "never", "number", "spectrum", "width"),
     ),
     "energy": ("Albedo", "albedo"),
     "render.integrators": ("Integrator",),
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from .energy.materials.random_walk import RandomWalk
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
+    from .measure.materials.measured import Measured
     from .members import register
     from .models import BSDF, Breach, Parameter, Preset, Sample, method, model, models, never
     from .models.blinn_phong import BlinnPhong
@@ -68,7 +69,20 @@ if TYPE_CHECKING:
     from .models.mix import Mix
     from .models.mix import Mix as mix
     from .models.oren_nayar import OrenNayar
-    from .models.parameters import Angle, Colour, Number, Width, angle, bsdf, choice, flag, number, spectrum, width
+    from .models.parameters import (
+        Angle,
+        Colour,
+        Number,
+        Width,
+        angle,
+        bsdf,
+        choice,
+        file,
+        flag,
+        number,
+        spectrum,
+        width,
+    )
     from .models.phong import Phong
     from .models.two_sided import TwoSided
     from .models.two_sided import TwoSided as two_sided
@@ -114,9 +128,9 @@ def __dir__() -> list[str]:
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Colour", "Conductor", "Dielectric", "Direction",
     "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty", "Lambert", "Law",
-    "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter",
-    "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width",
-    "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "flag", "get_precision", "method", "mix", "model",
-    "models", "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum", "study", "two_sided",
-    "verify", "view", "width",
+    "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel",
+    "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided",
+    "Width", "albedo", "angle", "bake", "bsdf", "choice", "compare", "emit", "file", "flag", "get_precision", "method",
+    "mix", "model", "models", "never", "number", "ops", "plot", "register", "render", "set_precision", "spectrum",
+    "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip
