@@ -33,7 +33,7 @@ _PLACES = {
     # what a material of one's own is written with
     "models": (
         *("Angle", "BSDF", "Breach", "Colour", "Number", "Parameter", "Preset", "Sample", "Width"),
-        *("angle", "bsdf", "choice", "flag", "method", "model", "never", "number", "spectrum", "width"),
+        *("angle", "bsdf", "choice", "file", "flag", "method", "model", "never", "number", "spectrum", "width"),
     ),
     "models.library": ("fits", "material", "materials"),
     "measure.fitting.fit": ("fit",),
@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
     from .measure.fitting.fit import fit
+    from .measure.materials.measured import Measured
     from .members import register
     from .models import BSDF, Breach, Parameter, Preset, Sample, method, model, models, never
     from .models.blinn_phong import BlinnPhong
@@ -74,7 +75,20 @@ if TYPE_CHECKING:
     from .models.mix import Mix
     from .models.mix import Mix as mix
     from .models.oren_nayar import OrenNayar
-    from .models.parameters import Angle, Colour, Number, Width, angle, bsdf, choice, flag, number, spectrum, width
+    from .models.parameters import (
+        Angle,
+        Colour,
+        Number,
+        Width,
+        angle,
+        bsdf,
+        choice,
+        file,
+        flag,
+        number,
+        spectrum,
+        width,
+    )
     from .models.phong import Phong
     from .models.two_sided import TwoSided
     from .models.two_sided import TwoSided as two_sided
@@ -124,10 +138,10 @@ def __dir__() -> list[str]:
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
     "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty",
-    "Lambert", "Law", "MachineError", "Mask", "Masking", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair",
-    "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "Turquin",
-    "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "emit", "fit", "fits",
-    "flag", "get_precision", "material", "materials", "method", "mix", "model", "models", "never", "number", "ops",
-    "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view",
-    "width",
+    "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
+    "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
+    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "emit", "file",
+    "fit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model", "models", "never",
+    "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
+    "verify", "view", "width",
 ]  # fmt: skip

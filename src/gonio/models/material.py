@@ -94,6 +94,7 @@ class BSDF(Material):
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
 
     breaks      law -> Breach, for laws that the model breaks by nature (Phong: reciprocity, energy)
+    only_rgb    whether eval gives red, green and blue, whatever channels the renderer has
     stochastic  whether eval, pdf and weight are random numbers that only in the mean are what they are called
     lossless    the greatest loss that a white furnace may find (where F = 1 and every albedo 1); None claims nothing
     """
@@ -102,6 +103,7 @@ class BSDF(Material):
     name: ClassVar[str] = ""
     breaks: ClassVar[Mapping[str, Breach]] = {}
     stochastic: ClassVar[bool] = False
+    only_rgb: ClassVar[bool] = False
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors

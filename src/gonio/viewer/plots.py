@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, notation, outside
 from ..owner import public
-from . import curves, energy_figures, figures, lobes
+from . import curves, energy_figures, figures, image_slices, lobes
 from .curves import Curve
 from .figures import Drawing
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KINDS = ("lobe", "slice", "albedo")
+KINDS = ("lobe", "slice", "albedo", "image")
 Colour = str | tuple[float, float, float, float]
 VIEWS = (0.0, 30.0, 60.0, 80.0)
 _LONGEST = 70  # letters of a title or a label
@@ -35,13 +35,14 @@ def plot(
     angles: Sequence[float] | None = None,
     output: str | Path | None = None,
 ) -> Drawing:
-    """Draw materials over each other: their lobes, a slice over angle, or their albedo.
+    """Draw materials over each other: their lobes, a slice over angle, their albedo, or image slices side by side.
 
         go.plot(go.Conductor.preset("Au", alpha=0.2), "lambert", kind="slice", output="two.png")
 
     materials  materials, or their text as the command line takes it; or one folder that `go.bake` wrote
-    kind       "lobe" (polar), "slice" (over the angle of wi) or "albedo" (over the angle of wo)
-    angles     of wo from the normal, degrees, 0 to below 90; up to 8; not for "albedo"
+    kind       "lobe" (polar), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over half
+               vector and difference angle)
+    angles     of wo from the normal, degrees, 0 to below 90; up to 8; not for "albedo" and "image"
     output     file to write, .png, .pdf or .svg; None writes nothing
     Returns a Drawing, which a notebook shows; `.figure` is Matplotlib's.
     Raises InputError for a material, kind, angle or file that cannot be.
@@ -94,6 +95,8 @@ def _drawn(materials: Sequence[tuple[str, BSDF]], kind: str, views: Sequence[flo
     with matplotlib.rc_context(figures.STYLE):
         if kind == "albedo":
             figure = _albedo(title, labels, bsdfs)
+        elif kind == "image":
+            figure = image_slices.draw(title, labels, bsdfs)
         else:
             panels = [[curves.curve(bsdf, view) for bsdf in bsdfs] for view in views]
             figure = (lobes.draw if kind == "lobe" else _slice)(title, labels, panels)

@@ -24,11 +24,11 @@ def plot(
     ],
     *,
     made: Material,
-    kind: Annotated[str, Option(metavar="lobe|slice|albedo", help="What to draw.")] = "lobe",
+    kind: Annotated[str, Option(metavar="lobe|slice|albedo|image", help="What to draw.")] = "lobe",
     angles: Annotated[str | None, Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = None,
     output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help=".png, .pdf, .svg.")] = None,
 ) -> None:
-    """Draw materials: their lobes (polar), a slice over angle, or their albedo; or the tables in a baked folder.
+    """Draw materials: their lobes (polar), slices over angle, albedo, or image slices; or the tables in a baked folder.
 
     The density that a material is sampled with is drawn dashed over its values. Several materials share their axes.
 
@@ -38,6 +38,7 @@ def plot(
       gonio plot "conductor(preset=Au)" "conductor(preset=Cu)" lambert --kind slice
       gonio plot phong -p p=32 --kind slice -o phong.pdf
       gonio plot dielectric -p alpha=.2 --kind albedo
+      gonio plot gold.binary "conductor(preset=Au,alpha=.2)" --kind image
       gonio plot ./tables -o tables.png
     """
     from ...viewer import figures, plots

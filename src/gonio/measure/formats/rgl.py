@@ -124,7 +124,7 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
             raise InputError(f"the field '{name}' stands twice", where, "the file is damaged")
         found[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
         end = max(end, offset + size)
-    if len(data) > end + ALIGNED:
+    if len(data) > end + ALIGNED or data[end:].strip(b"\0"):
         raise InputError(f"{len(data)} bytes, the fields end at {end}", where, "the file is longer than its fields")
     return found
 

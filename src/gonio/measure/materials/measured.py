@@ -25,6 +25,7 @@ class Measured(BSDF):
         default=SAMPLE,
         doc="file of measured values; behind a colon which one, of files that hold several; `sample` comes with Gonio",
     )
+    only_rgb: ClassVar[bool] = True
     breaks: ClassVar[Mapping[str, Breach]] = {
         "energy": Breach(
             "the measured albedo is over 1, and shown as it is",

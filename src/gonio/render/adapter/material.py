@@ -7,7 +7,7 @@ import warnings
 import drjit as dr
 
 from ...errors import InputError, did_you_mean
-from ...models import BSDF, binding, guide_search
+from ...models import BSDF, binding, guide_search, tree
 from ...models.two_sided import TwoSided
 from ..native import Native
 from ..types import Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
@@ -58,6 +58,9 @@ class PlacedMaterial:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the slots have warned
             self.model: BSDF = model(**values)
+        if variant.channels != 3 and any(inner.only_rgb for _, inner in tree.walk(self.model)):
+            what = f"{self.model.name} knows red, green and blue only, this is {variant.mi.variant()}"
+            raise InputError(what, self.name, "render in an RGB variant, such as llvm_ad_rgb")
         self.sides = TwoSided(self.model) if sides and not self.model.transmits else None
         self.derived: OfVariant = None
         self.derive()

@@ -26,6 +26,7 @@ class Variant:
     def __init__(self, mi: ModuleType) -> None:
         self.mi = mi
         self.spectrum = mi.UnpolarizedSpectrum
+        self.channels = dr.size_v(self.spectrum)
         self.spectral = bool(mi.is_spectral)  # colours depend on the ray's wavelengths: they are textures
 
     def handed_out(self, value: Radiance) -> Radiance:

@@ -1,0 +1,56 @@
+"""Image slices of materials: f over half vector and difference angle at phi_d = 90 degrees, as measured ones are shown.
+
+At the left edge the highlight, at the top grazing angles with Fresnel's rise, at the bottom retro-reflection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..measure.tables.half_difference import pair_at
+from ..models import BSDF
+from . import figures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STEPS = 180  # pixels along each axis
+ACROSS = 4  # panels in a row
+LONGEST = 32  # letters over a panel
+
+
+def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
+    """f at theta_d (rows, 90 degrees first) and theta_h (columns), phi_d = 90 degrees, where all pairs are above."""
+    middle = (np.arange(steps) + 0.5) / steps * (0.5 * np.pi)
+    theta_d, theta_h = (a.ravel() for a in np.meshgrid(middle[::-1], middle, indexing="ij"))
+    wo, wi = pair_at(theta_h, theta_d, np.full(theta_h.shape, 0.5 * np.pi))
+    return np.asarray(bsdf.f(wo, wi), float).reshape(steps, steps, 3)
+
+
+def draw(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
+    """A panel for each material, on the same scale: colours are sRGB of pi f, cut at 1; below 0 they are magenta."""
+    subtitle = "π f at φd = 90°, as sRGB, cut at 1; magenta: below 0"
+    columns, rows = min(len(bsdfs), ACROSS), -(-len(bsdfs) // ACROSS)
+    width, height = max(0.5 + 3.3 * columns, 5.2), 0.8 + 3.5 * rows
+    figure = figures.blank(width, height, title, subtitle)
+    for index, (label, bsdf) in enumerate(zip(labels, bsdfs, strict=True)):
+        row, column = divmod(index, columns)
+        x, y = (0.65 + 3.3 * column) / width, (3.5 * (rows - 1 - row) + 0.55) / height
+        axes = figure.add_axes((x, y, 2.5 / width, 2.5 / height))
+        values = slice_of(bsdf)
+        shown = np.clip(np.pi * values, 0.0, 1.0)
+        shown = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * np.maximum(shown, 1e-9) ** (1.0 / 2.4) - 0.055)
+        shown[values.min(axis=-1) < 0.0] = (0.85, 0.1, 0.75)
+        axes.imshow(shown, extent=(0.0, 90.0, 0.0, 90.0), interpolation="nearest")
+        axes.set_xticks(range(0, 91, 30), [f"{angle}°" for angle in range(0, 91, 30)])
+        axes.set_yticks(range(0, 91, 30), [f"{angle}°" for angle in range(0, 91, 30)])
+        axes.set_xlabel("θh, half vector")
+        axes.set_ylabel("θd, difference")
+        if len(bsdfs) > 1:
+            short = label if len(label) <= LONGEST else "…" + label[1 - LONGEST :]  # a path is told by its end
+            axes.set_title(short, fontsize=10, fontweight="bold")
+    return figure
