@@ -13,6 +13,11 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))  # `sphere`, `materials`
 
 from gonio import ops
+from gonio.render import engine
+
+if os.environ.get("GONIO_TEST_DEVICE") == "cuda":  # `make test-gpu`: what would take the CPU takes the GPU
+    _choose = engine.variant_for
+    engine.variant_for = lambda device="cpu", spectral=False: _choose("cuda" if device == "cpu" else device, spectral)
 
 SCENE = {
     "output": {"filename": "ball.png"},
@@ -36,24 +41,6 @@ SCENE = {
         "lights": [{"type": "spotLight", "position": [2, 3, 4], "energy": [40, 40, 40]}],
     },
 }
-
-
-@pytest.fixture(scope="session", autouse=True)
-def on_the_gpu_where_asked() -> Iterator[None]:
-    """`make test-gpu` runs these tests on CUDA: what would take the CPU takes the GPU."""
-    if os.environ.get("GONIO_TEST_DEVICE") != "cuda":
-        yield
-        return
-    from gonio.render import engine
-
-    choose = engine.variant_for
-
-    def on_cuda(device: str = "cpu", spectral: bool = False) -> str:
-        return choose("cuda" if device == "cpu" else device, spectral)
-
-    engine.variant_for = on_cuda
-    yield
-    engine.variant_for = choose
 
 
 @pytest.fixture

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
+import re
 import signal
 import sys
 import time
@@ -88,6 +90,41 @@ def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_pa
         other = go.bake("ggx", size=12, seed=1)
     assert together._repr_png_() == alone._repr_png_()
     assert all(np.array_equal(table.arrays[name], other.arrays[name]) for name in table.arrays)
+
+
+def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
+    two: Cluster, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from gonio.verify import child, trials
+
+    items = [child.Item("lambert"), child.Item("mirror"), child.Item("phong", ("p=20", "kd=0.6,0.6,0.6"))]
+    task = child.Task(items, "quick", 1, ["reciprocity", "energy", "pdf"])
+
+    def plain(report: object) -> object:
+        text = json.dumps(report.as_dict())  # type: ignore[attr-defined]
+        return json.loads(re.sub(r'"seconds": [\d.e-]+', '"seconds": 0', text))
+
+    alone = child.trial(task)
+    with crew.working(two):
+        assert plain(trials.trial(task)) == plain(alone)
+    # one after the other, stopped after the second: the next run judges the third only
+    monkeypatch.setenv("GONIO_CACHE", str(tmp_path))
+    task = task._replace(effort="default", laws=["reciprocity"])
+    judged, really = list[str](), child.trial
+
+    def counted(task: child.Task, **options: object) -> object:
+        if len(judged) == 2 and not stopped:
+            stopped.append(True)
+            raise KeyboardInterrupt
+        judged.append(str(task.items[0].target))
+        return really(task, **options)  # type: ignore[arg-type]
+
+    stopped: list[bool] = []
+    monkeypatch.setattr(child, "trial", counted)
+    with pytest.raises(KeyboardInterrupt):
+        trials.trial(task)
+    assert [card.passed for card in trials.trial(task).cards] == [True, True, True]
+    assert judged[:3] == ["lambert", "mirror", "phong"]
 
 
 def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(

@@ -71,6 +71,36 @@ def test_garbage_is_collected_again_after_an_error_and_not_before() -> None:
         gc.enable()
 
 
+def test_shapes_of_another_size_compile_no_kernel(scene: Path) -> None:
+    def compiled(radius: float) -> int:
+        import drjit as dr
+
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            go.render(
+                go.Lambert(),
+                spp=1,
+                size=(8, 8),
+                overrides={"shapes.0.radius": radius, "shapes.0.center": [radius, 1, 0]},
+            )
+            return len({kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel} - known)
+
+    known: set[str] = set()
+    import drjit as dr
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for radius in (0.31, 0.42, 0.53):
+            dr.kernel_history_clear()
+            go.render(
+                go.Lambert(),
+                spp=1,
+                size=(8, 8),
+                overrides={"shapes.0.radius": radius, "shapes.0.center": [radius, 1, 0]},
+            )
+            known |= {kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel}
+    assert compiled(0.6180339) == 0
+
+
 def test_renders_in_a_loop_leave_nothing_behind(scene: Path) -> None:
     import resource
 

@@ -316,7 +316,9 @@ class Lights:
         if box.valid():
             # Multiples of the plastic number's kin mod 1 (R3 sequence, M. Roberts): even, and the same every time.
             spread = mi.Point3f(*(fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
-            it.p = mi.Point3f(box.min) + spread * mi.Vector3f(box.extents())
+            low, extents = mi.Point3f(box.min), mi.Vector3f(box.extents())
+            dr.make_opaque(low, extents)  # data: as literals they would make a kernel for every size of scene
+            it.p = low + spread * extents
         if mi.is_spectral:
             it.wavelengths = type(it.wavelengths)(550)
         sample = mi.Point2f(fraction(mi.Float(index) * 0.7548777), fraction(mi.Float(index) * 0.5698403))

@@ -101,12 +101,16 @@ def trial(
     limit: float | None = None,
     memory: float | None = None,
     progress: Progress | None = None,
+    threshold: float | None = None,
+    lowest: list[float] | None = None,
 ) -> Report:
     """The report of a task.
 
     jobs    processes at a time
     limit   seconds for each law, GONIO_VERIFY_LIMIT or 300 if not given
     memory  GB for each process; if not given, half of the machine's for all together
+    threshold  p-value below which a test rejects, where the task is a part of a larger one
+    lowest     gets the smallest p-value of each card
     """
     if jobs < 1:
         raise InputError(f"{jobs} jobs", "--jobs", "give 1 or more")
@@ -116,7 +120,10 @@ def trial(
     jobs = min(jobs, sum(item.cards for item in task.items))
     most = 0.5 * _machine_memory() / max(jobs, 1) if memory is None else memory * 1e9
     with _Pool(task, jobs, limit, most, progress) as pool:
-        return pool.run()
+        report = pool.run(threshold)
+        if lowest is not None:
+            lowest += pool.lowest.values()
+        return report
 
 
 class _Worker:
@@ -237,6 +244,7 @@ class _Pool:
         self.waiting: list[int] = []  # cards that are to be judged
         self.holder: dict[int, _Worker] = {}
         self.tests: dict[int, int] = {}
+        self.lowest: dict[int, float] = {}
         self.skip: dict[int, dict[str, str]] = {}  # by law, why it must not be asked again
         self.forbidden: dict[int, dict[tuple[str, str], str]] = {}  # by method and values, why it must not be called
         self.notes: dict[int, list[str]] = {}
@@ -255,7 +263,7 @@ class _Pool:
         for worker in self.workers:
             worker.forget()
 
-    def run(self) -> Report:
+    def run(self, given: float | None = None) -> Report:
         for _ in range(self.jobs):
             self._new()
         from . import statistics  # while the first process loads what it needs
@@ -268,7 +276,7 @@ class _Pool:
                 continue
             if threshold is None and len(self.tests) == len(self.titles):
                 tests = sum(self.tests.values())
-                threshold = statistics.sidak(SIGNIFICANCE, tests)
+                threshold = statistics.sidak(SIGNIFICANCE, tests) if given is None else given
             self._distribute(threshold)
         if tests is None or threshold is None:
             tests, threshold = 0, SIGNIFICANCE
@@ -335,11 +343,12 @@ class _Pool:
         worker.ready, worker.busy = True, False
         worker.begins(0, BETWEEN)
 
-    def _judged(self, worker: _Worker, card: int, tests: int) -> None:
+    def _judged(self, worker: _Worker, card: int, tests: int, lowest: float) -> None:
         worker.busy = False
         worker.begins(card, BETWEEN)
         self.holder[card] = worker
         self.tests[card] = tests
+        self.lowest[card] = lowest
 
     def _card(self, worker: _Worker, card: int, made: Card, printed: int) -> None:
         worker.busy = False

@@ -92,7 +92,9 @@ def verify(
 
         asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.object_(one) for one in all_]
         task = child.Task(asked_of, effort, seed, names)
-        made = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+        from . import trials
+
+        made = trials.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     else:
         made = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
     outputs.write(made, known)
@@ -132,6 +134,12 @@ class Held(NamedTuple):
     @property
     def tests(self) -> int:
         return sum(len(it.what.trials) for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding))
+
+    @property
+    def lowest(self) -> float:
+        """The smallest p-value of them, 1 where there are none."""
+        found = [it.what for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding)]
+        return min((trial.p for one in found for trial in one.trials), default=1.0)
 
     def card(self, threshold: float, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
         """The verdicts, and what failures are worth and come from; the BSDF is asked again for both."""

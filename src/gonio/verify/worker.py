@@ -65,7 +65,7 @@ def main(folder: str) -> None:
                 calls.judge(subjects[card].model, forbidden)
                 held[card] = run.judged(subjects[card], laws, task.effort, task.seed, begin, skip)
                 lines[card] = printed.since(before)
-                say("judged", card, held[card].tests)
+                say("judged", card, held[card].tests, held[card].lowest)
             else:
                 made = held[card].card(what[0], task.seed, task.effort, begin)
                 say("card", card, _plain(made), lines[card] + printed.since(before))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Exit, Option
 
 from .. import completion
-from ..options import Json, Parameters
+from ..options import Crew, Json, Parameters
 from ..output import Bar
 from .base import MATERIALS, verb
 
@@ -50,6 +50,7 @@ def verify(
             autocompletion=completion.materials,
         ),
     ],
+    *,
     to: Files,
     param: Parameters = None,
     sweep: Annotated[
@@ -68,6 +69,7 @@ def verify(
     jobs: Annotated[int, Option("--jobs", "-j", metavar="N", help="Targets and settings at a time.")] = 1,
     limit: Annotated[float | None, Option(metavar="SECONDS", help="Longest that a law may take; 300.")] = None,
     memory: Annotated[float | None, Option(metavar="GB", help="Most that a BSDF may take; half of all.")] = None,
+    crew: Crew,
     as_json: Json = False,
 ) -> None:
     """Prove BSDFs: energy, reciprocity, sampling, gradients, precision.
@@ -108,7 +110,13 @@ def verify(
                     bars.append(stack.enter_context(Bar(", ".join(target))))
                 bars[0].step(done, total, state)
 
-        found = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+        if crew.workers is None and crew.cluster is None and len(items) == 1:
+            found = child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+        else:
+            from ...verify import trials
+
+            with crew.working():
+                found = trials.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     wanted.write(found, known)
     _annotate(found, to.github, as_json)
     if as_json:
