@@ -180,6 +180,28 @@ def test_mesh_in_a_scene_is_placed_and_lit(tmp_path):
     assert np.allclose(np.array(si.emitter(built).eval(si)), 3)
 
 
+def ply(vertex: str, body: str) -> str:
+    faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    return f"ply\nformat ascii 1.0\nelement vertex 3\n{vertex}{faces}{body}"
+
+
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+@pytest.mark.parametrize(
+    ("vertex", "body", "reason"),
+    [
+        (XYZ + "property float x\n", "0 0 0 0\n1 0 0 0\n0 1 0 0\n3 0 1 2\n", "'x' is given twice"),
+        (XYZ, f"0 0 0\n1 0 0\n0 1 0\n3 0 1 {10**30}\n", "a number that no file has"),
+        (XYZ.replace("float x", "list uchar int x"), "1 0 0 0\n2 0 1 0 0\n1 1 0 0\n3 0 1 2\n", "no vertices with x"),
+    ],
+)
+def test_a_ply_that_contradicts_itself_is_one_clear_error(tmp_path, vertex, body, reason):
+    (tmp_path / "a.ply").write_text(ply(vertex, body))
+    with pytest.raises(InputError, match=reason):
+        meshes.read_mesh(tmp_path / "a.ply", "here")
+
+
 # ---------------------------------------------------------------------- images
 
 

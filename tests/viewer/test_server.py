@@ -374,6 +374,32 @@ def test_a_browser_that_holds_up_whoever_opens_it_holds_up_no_end(monkeypatch: p
         closed.set()
 
 
+def test_the_token_stands_in_no_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    found = threading.Event()
+    texts: list[tuple[str, int]] = []
+
+    def browse(url: str) -> None:
+        opened.append(url)
+        path = Path(url.removeprefix("file://"))
+        texts.append((path.read_text(), path.stat().st_mode & 0o777))
+        found.set()
+
+    monkeypatch.setattr(server.webbrowser, "open", browse)
+    one = server.Server(server.Application(STAGE, server.Door("127.0.0.1")), "127.0.0.1", 0, browser=True, quiet=True)
+    thread = threading.Thread(target=one.serve_until_interrupted, daemon=True)
+    thread.start()
+    assert found.wait(20)
+    address = one.url
+    one.should_exit = True
+    thread.join(20)
+    token = one.application.door.token
+    assert opened[0].startswith("file://") and token not in opened[0]
+    assert f"url={address}" in texts[0][0] and token in texts[0][0]
+    assert texts[0][1] == 0o600
+    assert not Path(opened[0].removeprefix("file://")).exists()
+
+
 @pytest.mark.parametrize(("host", "warned"), [("127.1", False), ("localhost", False), ("0", True)])
 def test_the_address_is_the_one_that_was_had(
     host: str, warned: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -81,14 +81,14 @@ def check_film(size: tuple[int, int], where: str) -> None:
     width, height = size
     if width < 1 or height < 1:
         raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
-    if max(width, height) > LONGEST_SIDE:
-        what = f"a film of {width}x{height} is longer than {LONGEST_SIDE} pixels"
-        raise InputError(what, where, "give a smaller size")
     needed = width * height * BYTES_PER_PIXEL
     if needed > memory():
         gib = 1 << 30
         what = f"a film of {width}x{height} needs about {needed / gib:.0f} GiB"
         raise InputError(f"{what}, this machine has {memory() / gib:.0f} GiB", where, "give a smaller size")
+    if max(width, height) > LONGEST_SIDE:
+        what = f"a film of {width}x{height} is longer than {LONGEST_SIDE} pixels"
+        raise InputError(what, where, "give a smaller size")
 
 
 def memory() -> int:

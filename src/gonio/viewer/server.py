@@ -16,15 +16,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import html
 import ipaddress
 import re
 import secrets
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import webbrowser
 from collections.abc import Iterator
+from pathlib import Path
 from urllib.parse import parse_qs
 
 import uvicorn
@@ -305,6 +308,7 @@ class Server(uvicorn.Server):
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
         self.application, self.browser, self.quiet = application, browser, quiet
+        self._redirect: Path | None = None
         guarded = type("Guarded", (_Guarded,), {"waiting": {}, "answering": {}})
         self.listener = _listen(host, port)
         config = uvicorn.Config(
@@ -350,11 +354,14 @@ class Server(uvicorn.Server):
             print(f"{self.url}\nCtrl-C ends it", flush=True)
         if self.browser:
             # some browsers hold up whoever opens them until they are closed
-            threading.Thread(target=_open, args=(self.url,), daemon=True).start()
+            self._redirect = _redirect_file(self.url)
+            threading.Thread(target=_open, args=(self._redirect.as_uri(),), daemon=True).start()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         for session in list(self.application.sessions):
             session.end(1001, "the server ends")
+        if self._redirect is not None:
+            self._redirect.unlink(missing_ok=True)
         await super().shutdown(sockets)
 
     def serve_until_interrupted(self) -> None:
@@ -402,6 +409,16 @@ def _listen(host: str, port: int) -> socket.socket:
         text = getattr(error, "strerror", None) or str(error)
         raise MachineError(f"cannot listen: {text}", f"--host {host} --port {port}", hint) from None
     return listener
+
+
+def _redirect_file(url: str) -> Path:
+    """A file that only this user may read, and that sends a browser on to the page: every user of a machine may read
+    what stands in a command line, and the token would."""
+    handle, name = tempfile.mkstemp(prefix="gonio-", suffix=".html")  # with mode 0600
+    with open(handle, "w", encoding="utf-8") as file:
+        way = f'<meta http-equiv="refresh" content="0; url={html.escape(url)}">'
+        file.write(f"<!doctype html>{way}<title>Gonio</title>")
+    return Path(name)
 
 
 def _open(url: str) -> None:

@@ -129,15 +129,27 @@ class Render:
         return int(dr.sum(self._sums.invalid)[0])
 
     def _mean(self, *sums: Sequence[Float]) -> NDArray[np.float32]:
-        channels = [sum(np.asarray(part) for part in parts) for parts in zip(*sums, strict=True)]
+        channels = list(zip(*sums, strict=True))
         pixels = np.empty((self.height * self.width, len(channels)), np.float32)
-        done = self.done if self._lanes is None else np.asarray(self._lanes)[:, None]
-        pixels[self._order] = np.stack(channels, axis=1) / np.maximum(done, 1)
+        done = np.maximum(self.done if self._lanes is None else np.asarray(self._lanes), 1)
+        for number, (first, *others) in enumerate(channels):  # one at a time: a large film fills the memory
+            total = np.array(first)
+            for part in others:
+                total += np.asarray(part)
+            pixels[self._order, number] = total / done
         return pixels.reshape(self.height, self.width, len(channels))
 
 
 def _tiles(width: int, height: int) -> NDArray[np.uint32]:
     """The pixel (row * width + column) of each lane: tiles of TILE x TILE, row by row, without padding."""
-    row, column = (grid.ravel() for grid in np.mgrid[0:height, 0:width])
-    lane = np.lexsort((column % TILE, row % TILE, column // TILE, row // TILE))
-    return (row * width + column)[lane].astype(np.uint32)
+    pixels = np.arange(height * width, dtype=np.uint32).reshape(height, width)
+    edge = width - width % TILE  # behind it tiles are narrower
+    order = np.empty(height * width, np.uint32)
+    at = 0
+    for top in range(0, height, TILE):
+        band = pixels[top : top + TILE]
+        rows = len(band)
+        order[at : at + rows * edge] = band[:, :edge].reshape(rows, -1, TILE).swapaxes(0, 1).ravel()
+        order[at + rows * edge : at + rows * width] = band[:, edge:].ravel()
+        at += rows * width
+    return order

@@ -308,7 +308,7 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
             refuse(f"the file ends within, or garbles, its {count} '{name}' entries")
         if "vertex" in tables and "face" in tables:
             break
-    vertex = tables.get("vertex", {})
+    vertex = {name: column for name, column in tables.get("vertex", {}).items() if isinstance(column, np.ndarray)}
     if not {"x", "y", "z"} <= set(vertex):
         refuse("no vertices with x, y, z")
     lists = [column for column in tables.get("face", {}).values() if isinstance(column, list)]
@@ -324,9 +324,13 @@ def read_ply(data: bytes, path: Path, where: str) -> Triangles:
     uv = [columns(*names) for names in (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))]
     positions = columns("x", "y", "z")
     assert positions is not None
+    try:
+        triangles = np.array(faces, dtype=np.int64).reshape(-1, 3)
+    except OverflowError:
+        refuse("a face names a vertex of a number that no file has")
     return Triangles(
         positions,
-        np.array(faces, dtype=np.int64).reshape(-1, 3),
+        triangles,
         columns("nx", "ny", "nz"),
         next((table for table in uv if table is not None), None),
     )
@@ -353,6 +357,8 @@ def _ply_header(header: bytes, refuse: _Refuse) -> tuple[str, list[tuple[str, in
         elif words[0] == "property" and elements and len(words) in (3, 5):
             if any(kind not in _PLY_TYPES for kind in (words[2:4] if words[1] == "list" else words[1:2])):
                 refuse(f"unknown property '{line.strip()[:40]}'")
+            if any(words[-1] == known[-1] for known in elements[-1][2]):
+                refuse(f"the property '{words[-1][:40]}' is given twice")
             elements[-1][2].append(tuple(words[1:]))
         else:
             refuse(f"the header line '{line.strip()[:40]}' is not understood")

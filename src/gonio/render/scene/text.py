@@ -125,6 +125,9 @@ def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
     def refuse(what: str, hint: str) -> NoReturn:
         raise InputError(what, f"{path}#{pointer(*steps)}", hint)
 
+    for text in value if isinstance(value, _Object) else (value,):
+        if isinstance(text, str) and not _encodable(text):
+            refuse("a string holds half of a surrogate pair", "write the letter itself; the file is UTF-8")
     if isinstance(value, _Object):
         if value.twice:
             steps = (*steps, value.twice[0])
@@ -141,6 +144,14 @@ def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
     if isinstance(value, int) and abs(value) > MAX_INTEGER:
         refuse("the number is too large", "integers go up to 2^53")
     return value
+
+
+def _encodable(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _syntax_hint(text: str, position: int) -> str:
