@@ -202,6 +202,21 @@ def test_a_program_renders_materials_and_sets_them_in_scenes(here: Path) -> None
     assert go.render(gold, size=(16, 16), spp=1).shape == (16, 16, 3)
 
 
+def test_a_historic_model_gives_its_name_to_a_users_own(tmp_path: Path) -> None:
+    file = tmp_path / "ward.py"
+    file.write_text(
+        "import gonio as go\n\nclass Ward(go.BSDF):\n    def eval(self, wo, wi): return go.ops.vec3(wi.z)\n"
+    )
+    ours = go.models.model("ward")
+    own = outside.load(f"{file}:Ward")
+    go.register(own)
+    try:
+        assert go.models.model("ward") is own
+    finally:
+        go.BSDF.family.remove("ward")
+    assert go.models.model("ward") is ours
+
+
 def test_a_name_of_gonios_own_is_not_taken(here: Path) -> None:
     class Lambert(go.BSDF):
         """Not Gonio's."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class _Glossy(BSDF):
 
     The lobe is asked of two directions above the surface only: where one is not, for the normal in its place.
     """
+
+    gives_way: ClassVar[bool] = True
 
     diffuse: Colour = spectrum(default=0.2, doc="albedo of Lambert's part", low=0.0, high=1.0, soft_high=True)
 

@@ -106,6 +106,7 @@ class BSDF(Material):
     only_rgb: ClassVar[bool] = False
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
+    gives_way: ClassVar[bool] = False  # whether a user's own class may take its name: of Gonio's, those of papers do
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
     _declared: ClassVar[Mapping[str, Parameter]] = {}
 

@@ -80,7 +80,7 @@ def _material(cls: type) -> type[BSDF]:
     if cls.eval is BSDF.eval:
         raise InputError(f"{cls.__name__} has no eval", place, "write eval(self, wo, wi, mode): f |cos theta_i|")
     known = BSDF.family.all().get(cls.name)
-    if known is not None and known.__module__.startswith("gonio."):
+    if known is not None and known.__module__.startswith("gonio.") and not known.gives_way:
         what = f"{cls.__name__} shadows Gonio's material '{cls.name}'"
         raise InputError(what, place, f"give the class another name, such as My{cls.__name__}")
     return cls
