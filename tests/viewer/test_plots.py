@@ -69,7 +69,15 @@ def test_rings_are_round_numbers_below_the_peak() -> None:
     assert lobes._round_ticks(0) == []
 
 
-@pytest.mark.parametrize("kind", plots.KINDS)
+def test_image_slices_stand_side_by_side() -> None:
+    figure = plots.plot(go.Lambert(0.5), "conductor(alpha=.3,eta=.2,k=3)", kind="image").figure
+    assert [axes.get_title() for axes in figure.axes] == ["lambert", "conductor(alpha=.3,eta=.2,k=3)"]
+    flat, metal = (np.asarray(axes.get_images()[0].get_array()) for axes in figure.axes)
+    assert np.ptp(flat) == pytest.approx(0.0, abs=1e-6)
+    assert metal[90, 2].min() > metal[90, 90].max()  # the highlight is at the left
+
+
+@pytest.mark.parametrize("kind", [kind for kind in plots.KINDS if kind != "image"])
 def test_materials_are_laid_over_each_other(kind: str, tmp_path: Path) -> None:
     gold = go.Conductor.preset("Au", alpha=0.3)
     drawing = plots.plot(gold, "dielectric(alpha=.2)", "dielectric(alpha=0)", kind=kind, angles=[0, 60])
