@@ -80,7 +80,7 @@ def main() -> None:
     print("workers  parts  s/part  efficiency of 3840 x 2160 at 4096 samples;  shortest part that keeps 90 %")
     total = 3840 * 2160 * 4096
     for workers in (10, 100, 1000):
-        samples = min(max(total // (tiles.PARTS * workers), tiles.LEAST_SAMPLES), tiles.MOST_SAMPLES)
+        samples = tiles.part_size(total, workers)
         parts, seconds = total // samples, samples / speed
         share = predicted(parts, seconds, workers, rate, 3.0, back * samples / (1 << 25), band)
         need = next(

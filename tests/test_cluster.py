@@ -73,7 +73,7 @@ def test_a_worker_that_is_killed_costs_time_and_no_part(two: Cluster) -> None:
 def test_a_picture_has_the_same_bits(
     two: Cluster, scene: Path, monkeypatch: pytest.MonkeyPatch, options: dict[str, object]
 ) -> None:
-    monkeypatch.setattr(tiles, "LEAST_SAMPLES", 1)  # six parts of 64 lanes
+    monkeypatch.setattr(tiles, "MOST_SAMPLES", 1)  # six parts of 64 lanes
     alone = go.render(scene, spp=5, **options)  # type: ignore[arg-type]
     with crew.working(two):
         assert np.array_equal(go.render(scene, spp=5, **options), alone)  # type: ignore[arg-type]
@@ -130,7 +130,7 @@ def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
 def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
     two: Cluster, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tiles, "LEAST_SAMPLES", 1)
+    monkeypatch.setattr(tiles, "MOST_SAMPLES", 1)
     alone = go.render(scene, spp=6)
     for other in (two, crew.Here()):
         path, seen = tmp_path / type(other).__name__, list[int]()

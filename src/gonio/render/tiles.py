@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the camera's rays
 MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
 LEAST_SAMPLES = 1 << 21  # less is soon lost to sending it
+HANDED_OUT = 1 << 17  # samples that a worker does while one part is handed out
 PARTS = 12  # for each worker at least, so that none waits long for the last
 
 
@@ -118,7 +119,7 @@ def advance(
         spec, named = travelling(prepared)
         files |= named
         done = gathered.arrays[LANES]
-        cuts = _cut(done, prepared.spp, total // (PARTS * crew.current().size))
+        cuts = _cut(done, prepared.spp, part_size(total, crew.current().size))
         left.append(len(cuts))
         for lanes in cuts:
             first = int(done[lanes.start])
@@ -146,10 +147,15 @@ def advance(
     return ""
 
 
+def part_size(total: int, workers: int) -> int:
+    """Samples of a part, of so many in all: small enough for all to have some, large enough that whoever hands them
+    out keeps up, which takes 10 ms or so for each (`benchmarks/cluster.py`)."""
+    return min(max(total // (PARTS * workers), LEAST_SAMPLES, workers * HANDED_OUT), MOST_SAMPLES)
+
+
 def _cut(done: NDArray[np.uint32], wanted: int, samples: int) -> list[slice]:
     """Ranges of lanes that still need samples, each of lanes that have as many; of about so many samples."""
     pixels = len(done)
-    samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
     step = max(samples // wanted // ALIGNED, 1) * ALIGNED
     edges = sorted({*range(0, pixels, step), *(np.flatnonzero(np.diff(done)) + 1).tolist(), pixels})
     ranges = [slice(a, b) for a, b in itertools.pairwise(edges)]
