@@ -15,7 +15,10 @@ def check_file(path: str | Path) -> Path:
     """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
     target = Path(path).expanduser()
     if target.is_symlink():
-        target = target.resolve()
+        try:
+            target = target.resolve()
+        except (OSError, RuntimeError) as error:  # RuntimeError up to Python 3.12
+            raise InputError("this link leads nowhere but to itself", str(path), "name another file") from error
     folder = target.parent
     if not folder.is_dir():
         hint = f"mkdir -p '{folder}', or choose another"
