@@ -115,6 +115,12 @@ def test_output_is_checked_before_work_starts(tmp_path: Path) -> None:
         images.check_writable(tmp_path / "b.exr")
 
 
+def test_a_link_to_itself_is_one_clear_error(tmp_path: Path, picture: np.ndarray) -> None:
+    (tmp_path / "a.exr").symlink_to(tmp_path / "a.exr")
+    with pytest.raises(InputError):
+        images.write(tmp_path / "a.exr", picture)
+
+
 def test_a_link_is_followed_and_stays_a_link(tmp_path: Path, picture: np.ndarray) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "a.npz").symlink_to(tmp_path / "real" / "b.npz")

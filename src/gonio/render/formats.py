@@ -118,9 +118,10 @@ def check_file(path: Path) -> None:
                 except (struct.error, IndexError):
                     raise Unreadable("it is cut off in its header") from None
         return
-    claimed = check(content, kind)
-    if kind == "RGBE":
-        _radiance(content, claimed)
+    if kind in ("RGBE", "OpenEXR"):  # within a scene, an EXR that cannot be read may end the process; alone it raises
+        decode(path, content, kind)
+    else:
+        check(content, kind)
 
 
 def _reason(error: Exception) -> str:
@@ -183,7 +184,10 @@ def _exr(content: bytes) -> Claimed:
         raise Unreadable(f"its header lacks '{error.args[0]}'") from None
     at, count, bits = 0, 0, 0
     while channels[at]:  # name, then type, linear and reserved, sampling along x and y
-        at = channels.index(b"\0", at) + 1
+        end = channels.find(b"\0", at)
+        if end < 0:
+            raise Unreadable("its list of channels is damaged")
+        at = end + 1
         kind, _, along_x, along_y = struct.unpack("<iIii", channels[at : at + 16])
         if not 0 <= kind < 3:
             raise Unreadable(f"it has a channel of unknown type {kind}")
