@@ -93,8 +93,11 @@ def scaled(x: Scalar, e: Scalar) -> Value:
 def log(x: Scalar) -> Scalar:
     """Natural logarithm of a normal float32 > 0, error 1e-7 of the value also near 1, where a GPU's has 5e-7 at best.
 
-    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)).
+    x = m 2^e with m in [1/sqrt(2), sqrt(2)): e log 2 + 2 atanh((m - 1) / (m + 1)). Of a colour, channel by channel.
     """
+    if isinstance(x, graph.Node) and x.type != "float":
+        value: Value = graph.emit("vector", x.type, *(ops.log(channel) for channel in _channels(x)))
+        return value
     e = exponent(x)
     m = scaled(x, -e)
     high = m > SQRT_2

@@ -27,6 +27,7 @@ from ..ops import (
 )
 from ..optics import frame, fresnel
 from ..optics.ndf import distribution
+from ..optics.special import exprel
 from . import microfacet
 from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
@@ -156,7 +157,7 @@ class HeTorrance(_Glossy):
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """specular F (1 - e^-g): what is not reflected as by a mirror."""
         _, g = self._peak(wo)
-        return self.specular * (self.reflectance(wo.z) * (1.0 - exp(-g)))
+        return self.specular * (self.reflectance(wo.z) * g * exprel(-g))
 
 
 @function

@@ -11,7 +11,7 @@ from .. import ops
 from ..ops import Direction, Scalar, Spectrum, exp, function, inv_pi, log, safe_sqrt, sincos, sqr, vec3
 from ..optics import frame, fresnel
 from ..optics.masking.v_groove import v_groove
-from ..optics.special import exprel, power_integral, power_quantile
+from ..optics.special import exprel, logrel, power_integral, power_quantile
 from . import microfacet
 from .glossy import _Glossy, facet, sum_breach
 from .material import Breach
@@ -51,13 +51,18 @@ class LowMicrofacet(_Glossy):
     @function
     def _mass(self) -> Scalar:
         """int_0^1 D d(n.h)."""
-        return power_integral(log(1.0 + self.b), 1.0 - self.c) / self.b
+        return logrel(self.b) * exprel((1.0 - self.c) * self._log_end())
+
+    @function
+    def _log_end(self) -> Scalar:
+        """log(1 + b), where the power law ends."""
+        return self.b * logrel(self.b)
 
     @function
     def _focus(self) -> Scalar:
-        """((1 - int D) / (1 + 8 int D))^2: 0 for the flat lobe; at the peak r is 1 / (8 int D)."""
-        mass = self._mass()
-        return sqr((1.0 - mass) / (1.0 + 8.0 * mass))
+        """(r / (1 + r))^3 of r = 1 / (8 int D), the density of light at the peak against the cosine's."""
+        narrower = 1.0 / (1.0 + 8.0 * self._mass())
+        return narrower * sqr(narrower)
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
@@ -76,7 +81,7 @@ class LowMicrofacet(_Glossy):
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
         """wo mirrored at a half vector of density D: 1 + b (1 - n.h) follows a power law from 1 to 1 + b."""
         q = 1.0 - self.c
-        log_t = power_quantile(u.y * power_integral(log(1.0 + self.b), q), q)
+        log_t = power_quantile(u.y * power_integral(self._log_end(), q), q)
         versine = log_t * exprel(log_t) / self.b
         sin = safe_sqrt(versine * (2.0 - versine))
         s, c = sincos((2.0 * ops.pi) * u.z)

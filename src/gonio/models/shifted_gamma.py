@@ -51,7 +51,7 @@ class ShiftedGamma(_Glossy):
 
     specular: Colour = spectrum(default=0.3, doc="factor of the lobe", low=0.0)
     alpha: Colour = spectrum(default=0.05, doc="width of the distribution: tan^2 h falls off over alpha", low=1e-5)
-    p: Colour = spectrum(default=0.5, doc="power of the distribution's peak", low=0.0)
+    p: Colour = spectrum(default=0.5, doc="power of the distribution's peak", low=0.0, high=3.0)
     f0: Colour = spectrum(default=0.05, doc="F at normal incidence, but for f1")
     f1: Colour = spectrum(default=0.0, doc="what F loses with the cosine")
     normalization: Colour = spectrum(default=17.5, doc="factor of D (K in the paper)", low=0.0)
