@@ -11,7 +11,6 @@ import pytest
 from gonio import measure
 from gonio.errors import InputError
 from gonio.measure import compare
-from gonio.measure.guide import Guide, alias
 from gonio.measure.warp import Warp
 from gonio.models import notation
 from gonio.ops import backend
@@ -82,36 +81,6 @@ def test_a_scene_takes_a_file_of_its_own_folder_only(scene: Path, files: dict[st
     with pytest.raises(InputError, match="lies outside the scene's folder"):
         scenes.read(scene)
     assert scenes.read(scene, allow_outside=True)
-
-
-def test_a_guide_is_far_less_noisy_than_the_cosine() -> None:
-    model = go.Conductor.preset("Au", alpha=0.1)
-    guide = Guide(lambda wo, wi: model.eval(wo, wi, precision="float64").mean(axis=1))
-    types, count = backend.types("float32"), 50_000
-    rng = np.random.default_rng(1)
-    wo, u = np.tile([0.6, 0.0, 0.8], (count, 1)), rng.random((count, 3))
-    drawn = guide.draw(backend.vector_of(wo, 3, types), backend.vector_of(u, 3, types))
-    wi, pdf = (backend.to_numpy(part, count) for part in drawn)
-    kept = (pdf > 0.0) & (wi[:, 2] > 0.0)
-    weight = np.zeros(count)
-    weight[kept] = model.eval(wo[kept], wi[kept]).mean(axis=1) / pdf[kept]
-    radius, turn = np.sqrt(u[:, 1]), 2.0 * np.pi * u[:, 2]
-    cosine = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1.0 - u[:, 1])], -1)
-    flat = model.eval(wo, cosine).mean(axis=1) * np.pi / cosine[:, 2]
-    assert weight.mean() == pytest.approx(model.sample(wo, u).weight.mean(), rel=0.01)
-    assert weight.var() < flat.var() / 100.0
-    assert weight.max() < 4.0  # nothing that carries light is all but never drawn
-
-
-def test_an_alias_table_has_the_weights() -> None:
-    rng = np.random.default_rng(0)
-    for count in (1, 2, 7, 300):
-        weights = rng.random(count) ** 5 * (rng.random(count) < 0.7)
-        weights[0] += 0.1
-        own, other = alias(weights.copy()).T
-        chance = own.copy()
-        np.add.at(chance, other.astype(int), 1.0 - own)
-        np.testing.assert_allclose(chance / count, weights / weights.sum(), atol=1e-14)
 
 
 def test_a_warp_and_its_inverse_agree_and_integrate_to_one() -> None:
