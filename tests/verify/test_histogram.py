@@ -5,7 +5,7 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
-from gonio.verify import directions, histogram, statistics, subject
+from gonio.verify import directions, histogram, statistics, subject, verify
 from scipy import stats
 
 WO = directions.single(directions.at(np.array([0.0, 45.0, 89.5]), np.array([0.0, 20.0, 200.0])))
@@ -63,3 +63,8 @@ def test_p_values_over_a_hundred_seeds_are_uniform() -> None:
             found[1].append(o.coarse)
     for values in found:
         assert stats.kstest(values, "uniform").pvalue > 0.01
+
+
+def test_rounding_of_directions_counts_for_nothing_in_cells_of_their_steps() -> None:
+    narrow = go.Conductor(alpha=2.5e-4, ndf="beckmann")
+    assert verify(narrow, law="pdf", seed=1).passed

@@ -396,20 +396,39 @@ def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> 
 # --------------------------------------------------------------------------- the two compared
 
 
-def compare(expected: Expectation, counts: Counts, row: int) -> Outcome:
-    """p-values of one wo."""
+def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None = None) -> Outcome:
+    """p-values of one wo.
+
+    grid  the cells: where some are hardly larger than the steps of float32 directions, so many samples more or less
+          lie in them by rounding alone
+    """
     n = counts.drawn
     e, o = expected.cells[row] * n, counts.cells[row]
     sides, rows, columns = e.shape
     coarse = (sides, rows // COARSE[0], COARSE[0], columns // COARSE[1], COARSE[1])
-    fine = _pearson(e.ravel(), o.ravel(), n)
+    fine = _pearson(e.ravel(), o.ravel(), n, None if grid is None else _rounding(grid, row).ravel())
     broad = _pearson(e.reshape(coarse).sum((2, 4)).ravel(), o.reshape(coarse).sum((2, 4)).ravel(), n)
     return Outcome(
         fine, broad, _others(float(expected.total[row]), float(expected.error[row]), int(counts.others[row]), n)
     )
 
 
-def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
+STEP = 2.0**-24  # of a component of a float32 direction, half a unit of its last digit
+
+
+def _rounding(grid: Grid, row: int) -> np.ndarray:
+    """Share of a cell's samples that lie in the next one by rounding, (sides, rows, columns): a step of the coordinates
+    over the cell's width, along both. A step of a component moves 1 - |z| by sin theta, and the azimuth by 1 / sin."""
+    edges = grid.rows[row].astype(float)
+    heights, middle = np.diff(edges, axis=-1), 0.5 * (edges[..., 1:] + edges[..., :-1])
+    sin = np.sqrt(np.maximum(middle * (2.0 - middle), STEP))
+    turns = np.diff(grid.columns[row].astype(float), axis=-1)
+    across = STEP * sin / np.maximum(heights, STEP * sin)
+    along = STEP / sin
+    return np.asarray(across[..., None] + along[..., None] / np.maximum(turns, along[..., None]))
+
+
+def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int, rounding: np.ndarray | None = None) -> float:
     """Chi-square of cells, small ones pooled; conditional on how many lie in any cell, which `_others` judges."""
     inside, seen = expected.sum(), observed.sum()
     if seen < LEAST or inside <= 0.0:
@@ -417,6 +436,8 @@ def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
     expected = expected * (seen / inside)
     order = np.argsort(expected, kind="stable")
     e, o = expected[order], observed[order]
+    # what rounding moves adds to the variance, as much as it moves squared; pooled cells are wide
+    more = np.zeros(len(e)) if rounding is None else (rounding[order] * e) ** 2
     cumulative = np.cumsum(e)
     # one pool for all that is below the least expectation: its cells are many and their sum is what they tell
     small = np.searchsorted(e, LEAST)
@@ -425,11 +446,12 @@ def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int) -> float:
     if small:
         e = np.concatenate([[cumulative[small - 1]], e[small:]])
         o = np.concatenate([[o[:small].sum()], o[small:]])
+        more = np.concatenate([[0.0], more[small:]])
     if len(e) < 2:
         return 1.0
     if e[0] <= 0.0:
         return 0.0 if o[0] else 1.0
-    return statistics.chi_square_tail(float(np.sum((o - e) ** 2 / e)), len(e) - 1)
+    return statistics.chi_square_tail(float(np.sum((o - e) ** 2 / (e + more))), len(e) - 1)
 
 
 QUADRATURE = 3e-5  # what float32 pdfs summed over thousands of cells may be off by

@@ -199,7 +199,7 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
         expectation = expected.cells[i] * counts.drawn
         seen = counts.cells[i]
         cells = SampleCells(expectation, seen, grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides)
-        outcome = histogram.compare(expected, counts, i)
+        outcome = histogram.compare(expected, counts, i, grid)
         tested.append(_Tested(grid.wo[i], outcome, float(expected.total[i]), cells, grid.sides))
     return tested
 
