@@ -48,6 +48,11 @@ def correct() -> dict[str, go.BSDF]:
         "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=0.3)),
     }
     found["measured"] = go.model("measured")()
+    found["sum"] = go.model("sum")(go.Lambert(0.4), go.Conductor.preset("Au", alpha=0.3))
+    for name in ("ashikhmin-shirley", "cook-torrance", "he-torrance", "lafortune", "low-microfacet", "low-smooth"):
+        found[name] = go.model(name)()
+    for name in ("shifted-gamma", "ward", "ward-duer"):
+        found[name] = go.model(name)()
     if "kulla-conty" in go.models():
         found["kulla-conty"] = go.model("kulla-conty")(go.Conductor.preset("Au", alpha=0.6))
     return found

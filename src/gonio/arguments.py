@@ -19,8 +19,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import ParamSpec, TypeAlias, TypeVar
 
-import numpy as np
-
 from .errors import InputError
 
 P = ParamSpec("P")
@@ -64,6 +62,8 @@ def shown(value: object) -> str:
 
 def whole(value: object) -> int:
     """A whole number, Python's or NumPy's; True is none."""
+    import numpy as np  # here, as below: `gonio --help` loads this file, and has no use for NumPy
+
     if isinstance(value, bool | np.bool_):
         raise ValueError
     try:
@@ -74,6 +74,8 @@ def whole(value: object) -> int:
 
 def number(value: object) -> object:
     """A number that is one: not NaN, no text."""
+    import numpy as np
+
     if isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
         raise ValueError
     try:
@@ -85,6 +87,8 @@ def number(value: object) -> object:
 
 
 def _flag(value: object) -> bool:
+    import numpy as np
+
     if not isinstance(value, bool | np.bool_):
         raise ValueError
     return bool(value)
@@ -102,6 +106,8 @@ def _nothing(value: object) -> None:
 
 
 def _array(value: object) -> object:
+    import numpy as np
+
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):  # ragged
@@ -184,6 +190,8 @@ def _one(name: str) -> tuple[Check, str] | None:
     count = len(parts) if match[1] == "tuple" and "..." not in match[2] else None
 
     def check(value: object) -> object:
+        import numpy as np
+
         if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
             raise ValueError
         if count is not None and len(value) != count:

@@ -302,6 +302,28 @@ laws: dict[str, go.Law] = go.Law.family.all()
 integrators: dict[str, type[go.Integrator]] = go.Integrator.family.all()
 panels: dict[str, type[go.Panel]] = go.Panel.family.all()
 
+# ---------------------------------------------------------------------- measured and published materials
+
+bronze = go.material("alum-bronze", fit="ngan2005/ward")
+assert_type(bronze, go.BSDF)
+print(sorted(go.materials())[:3], [*go.fits("alum-bronze")][:2])
+gold_table = go.Measured("gold.binary")
+fitted = go.fit("gold.binary", "lambert+ggx", metric="log")
+assert_type(fitted.material, go.BSDF)
+print(fitted.interval[0, 1], fitted.text, fitted.notes)
+
+# ---------------------------------------------------------------------- long jobs
+
+again = go.resume("ball.exr.checkpoint", spp=64)
+print(again.shape)
+
+
+class Folder(go.BSDF):
+    """A file of data as a parameter."""
+
+    path: str = go.file("what it reads")
+
+
 # ---------------------------------------------------------------------- errors and settings
 
 go.set_precision("float64")

@@ -48,7 +48,7 @@ SAME = 0.02  # relative difference under which two sides, or two azimuths, are a
 PROBES = 768
 LEAST_LEFT = 0.25  # of the mean about a node that the refinement leaves: `eval` may be more between the points
 LEAST = 1e-20  # light of a slice that counts as none
-KEPT = 64  # guides in memory
+KEPT = 16  # guides in memory, of each class
 CHARTS = ("half", "normal", "centre")
 
 
@@ -66,15 +66,21 @@ def guide_of(material: Material) -> Guide:
     own = vars(material).get("_guide")
     if own is None:
         plain = _plain(material)
-        if plain not in _kept:
-            _kept[plain] = find(plain)
-            while len(_kept) > KEPT:
-                _kept.popitem(last=False)
-        vars(material)["_guide"] = own = _kept[plain]
+        kept = _kept(type(material))
+        if plain not in kept:
+            kept[plain] = find(plain)
+            while len(kept) > KEPT:
+                kept.popitem(last=False)
+        vars(material)["_guide"] = own = kept[plain]
     return own
 
 
-_kept: OrderedDict[Material, Guide] = OrderedDict()
+def _kept(cls: type) -> OrderedDict[Material, Guide]:
+    """The guides of a class's materials, by content; on the class, and gone with it when a user's file is run anew."""
+    if "_guides" not in vars(cls):
+        cls._guides = OrderedDict()  # type: ignore[attr-defined]
+    found: OrderedDict[Material, Guide] = vars(cls)["_guides"]
+    return found
 
 
 def prepare(material: Material) -> None:

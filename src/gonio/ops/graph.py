@@ -86,7 +86,9 @@ class Node:
         self.source = _source_line()
         self.name, self.depth = "", 1000
         self.index = len(function.nodes)
-        _name_locals(function)
+        # else what our caller's variables hold would be looked into, all the way up
+        if _stack and _stack[-1][1] is function:
+            _name_locals(function)
         function.nodes.append(self)
 
     def __repr__(self) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, MachineError
 from ..models import BSDF, notation, tree
-from ..owner import public
+from ..owner import alone
 from . import page, stage
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ export default { render };
 """
 
 
-@public
+@alone
 def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     """The page of `gonio view` in a notebook cell: balls, sliders, plots.
 
