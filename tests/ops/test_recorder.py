@@ -165,3 +165,9 @@ def test_a_choice_between_plain_numbers_is_as_exact_as_the_formula() -> None:
         assert np.all(np.abs(value - 0.5 / np.pi) <= 1e-16)
     assert Half().eval(up, up).dtype == np.float32
     assert go.Mix(a=Half(), b=Half()).eval(up, up, precision="float64")[0, 0] == 0.5 / np.pi
+
+
+def test_what_the_caller_holds_is_not_looked_into() -> None:
+    round_and_round: list[object] = []
+    round_and_round.append(round_and_round)  # as a notebook's history may
+    assert record(lambda a: ops.sqrt(a), a="float").evaluate(a=4.0) == 2.0
