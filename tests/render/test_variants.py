@@ -202,6 +202,12 @@ def test_a_metal_without_a_measured_spectrum_goes_through_its_three_values() -> 
     assert weight == pytest.approx([*titanium, titanium[0]], rel=1e-5)
 
 
+def test_negative_fitted_figures_are_one_clear_error_in_spectral_variants() -> None:
+    mi.set_variant("llvm_ad_spectral")
+    with pytest.raises(RuntimeError, match="no spectrum of a negative colour"):
+        mi.load_dict({"type": "gonio_shifted_gamma", "preset": "brass"})
+
+
 def test_a_colour_in_mono_is_its_luminance() -> None:
     mi.set_variant("llvm_ad_mono")
     bsdf = mi.load_dict({"type": "gonio_lambert", "albedo": rgb(0.2, 0.9, 0.4)})

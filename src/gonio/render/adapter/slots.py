@@ -71,6 +71,9 @@ class Slot:
         value = preset.values.get(name, parameter.default)
         if np.ndim(value) == 0 or not variant.spectral:
             return self._constant(name, value)
+        if np.min(value) < 0.0:
+            what = f"{np.min(value):g} given, and spectral variants have no spectrum of a negative colour"
+            raise InputError(what, self.where, "render it in an RGB variant, such as llvm_ad_rgb")
         measured = variant.measured(preset.name, name) if name in preset.values else None
         self.textures[name] = variant.through_rgb(value) if measured is None else measured
         return value
