@@ -12,6 +12,7 @@ import drjit as dr
 from ...errors import InputError, did_you_mean
 from ...members import Family, subclasses_of
 from .. import sampler
+from ..surfaces import Surfaces
 from ..types import Colour, Float, Hit, Mask, Point, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
 from .sums import Sums
 
@@ -94,6 +95,7 @@ class Integrator:
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         self.mi, self.scene, self.sensor, self.settings, self.aovs = mi, scene, sensor, settings, aovs
         self.pair = sampler.PAIRS[sampler.DEFAULT if settings.sampler == "default" else settings.sampler]
+        self.surfaces = Surfaces(mi, scene)
         size = sensor.film().crop_size()
         self.width = dr.opaque(mi.UInt32, int(size[0]))
         self.inverse_size = (dr.opaque(mi.Float, 1 / size[0]), dr.opaque(mi.Float, 1 / size[1]))
@@ -110,7 +112,7 @@ class Integrator:
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
         """[r, g, b] of a sample; with `aovs` also albedo and normal of what it sees first, three numbers each."""
         ray, _, hit = self.first_hit(pixel, key, index)
-        si = hit.compute_surface_interaction(ray)
+        si = self.surfaces.interaction(hit, ray)
         features = (0, 0, 0, *si.sh_frame.n) if self.aovs else ()
         return [dr.select(si.is_valid(), v, 0) for v in (*self.show(si, key, index), *features)]
 

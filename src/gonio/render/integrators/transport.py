@@ -215,7 +215,7 @@ class Transport(Integrator):
         dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
         last = depth + 2 >= self.max_depth
 
-        si = path.hit.compute_surface_interaction(ray, mi.RayFlags.All, active)
+        si = self.surfaces.interaction(path.hit, ray, active)
         emitted = lights.emitted(si, active)
         if self.samples_lights and not first:
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)

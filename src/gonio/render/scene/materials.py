@@ -179,14 +179,20 @@ class MaterialPart(Part):
             warnings.simplefilter("ignore", GonioWarning)  # `reader` has its own, with their place in the file
             return self.model(**values)
 
+    @classmethod
+    @functools.cache
+    def _spellings(cls) -> dict[str, list[str]]:
+        """Parameter name -> the keys that set it."""
+        spellings: dict[str, list[str]] = {}
+        for key, parameter in cls.declared.items():
+            spellings.setdefault(parameter.name, []).append(key)
+        for dial, width in cls.dials.items():
+            spellings.setdefault(width, []).append(dial)
+        return spellings
+
     @model_validator(mode="after")
     def _one_spelling(self) -> MaterialPart:
-        spellings: dict[str, list[str]] = {}
-        for key, parameter in self.declared.items():
-            spellings.setdefault(parameter.name, []).append(key)
-        for dial, width in self.dials.items():
-            spellings.setdefault(width, []).append(dial)
-        for name, keys in spellings.items():
+        for name, keys in self._spellings().items():
             given = [key for key in keys if self.get(key) is not None]
             if len(given) > 1:
                 raise invalid(

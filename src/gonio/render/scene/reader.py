@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import json
 from collections.abc import Iterator, Mapping
@@ -50,11 +51,14 @@ def read(
     description._allow_outside = allow_outside
     description._raw = raw
     _check_output(description)
+    seen: dict[MaterialPart, list[tuple[str, str]]] = {}
     for where, part in parts(description):
         if (name := getattr(part, "file", None)) is not None:
             description.locate(name, f"{where}/file")
         if isinstance(part, MaterialPart):
-            _check_material(description, where, part)
+            if part not in seen:
+                seen[part] = _check_material(description, where, part)
+            description._warnings += [f"{description.where(where + key)}: {text}" for key, text in seen[part]]
     return description
 
 
@@ -89,36 +93,45 @@ def _check_output(description: SceneDescription) -> None:
         )
 
 
-def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> None:
+def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> list[tuple[str, str]]:
+    """What to warn of, as (pointer from the material on, text). Raises InputError for one that cannot be."""
+    warnings = []
     for name, (value, key, _) in material.arguments().items():
         parameter = material.model.parameters()[name]
         if parameter.numeric and any(number > parameter.high for number in numbers_in(value)):
-            description._warnings.append(
-                f"{description.where(f'{where}/{key}')}: {name} over {parameter.high:g}: "
-                "the material gives back more light than it receives"
-            )
+            told = f"{name} over {parameter.high:g}: the material gives back more light than it receives"
+            warnings.append((f"/{key}", told))
     for key in material.lab.ignored if material.lab else ():
         if material.get(key) is not None:
-            place = description.where(f"{where}/{key}")
-            description._warnings.append(f"{place}: ignored, as in the lab; 'gonio-{material.model.name}' uses it")
+            warnings.append((f"/{key}", f"ignored, as in the lab; 'gonio-{material.model.name}' uses it"))
     try:
         outside.probe(material.instance(description.locate, where))
     except InputError as error:
         raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
+    return warnings
 
 
-def parts(part: Part, steps: str = "") -> Iterator[tuple[str, Part]]:
-    """Every object of a scene with its JSON pointer, parents first."""
-    yield steps, part
-    for name, field in type(part).model_fields.items():
-        value = getattr(part, name)
-        here = steps + pointer(field.alias or name)
-        if isinstance(value, Part):
-            yield from parts(value, here)
-        elif isinstance(value, (list, tuple)):
-            for index, item in enumerate(value):
-                if isinstance(item, Part):
-                    yield from parts(item, here + pointer(index))
+def parts(part: Part) -> Iterator[tuple[str, Part]]:
+    """Every object of a scene with its JSON pointer, parents first, in the order of the file's keys."""
+    todo = [("", part)]
+    while todo:
+        steps, part = todo.pop()
+        yield steps, part
+        below: list[tuple[str, Part]] = []
+        for name, value in part.__dict__.items():
+            if isinstance(value, Part):
+                below.append((steps + _key(type(part), name), value))
+            elif isinstance(value, (list, tuple)):
+                for index, item in enumerate(value):
+                    if isinstance(item, Part):
+                        below.append((f"{steps}{_key(type(part), name)}/{index}", item))
+        todo += reversed(below)
+
+
+@functools.cache
+def _key(part: type[Part], field: str) -> str:
+    """The key of a field as a step of a pointer."""
+    return pointer(part.model_fields[field].alias or field)
 
 
 def sources(description: SceneDescription) -> tuple[str, dict[str, Path]]:
