@@ -50,8 +50,7 @@ class Foreground(Render):
     def image(self) -> NDArray[np.float32]:
         """(height, width, 4) float32: linear RGB, averaged over the whole pixel, and coverage; row 0 on top."""
         sums = self._sums
-        nothing = [np.zeros(1)]
-        return self._mean([*sums.near[0:3], sums.near[3]], [*sums.far, *nothing])
+        return self._mean([*sums.near[0:3], sums.near[3]], [*sums.far, self.mi.Float64(0)])
 
 
 class _Surfaces(Transport):

@@ -30,6 +30,10 @@ TILE = 4
 
 LANES = "lanes"  # in a state: samples of each lane
 
+# Before the first pass all lanes read one zero. To write a zero for each would take a large film as long as its first
+# sample. More than one are kept, since Dr.Jit makes another kernel of what reads an array of one.
+NOTHING = 16
+
 
 class Render:
     """A picture in the making: call `advance` until there are enough samples, look at `image` at any time.
@@ -56,8 +60,8 @@ class Render:
         self._lanes: UInt | None = None  # samples of each lane, where some are ahead of `done`
         self._order = _tiles(self.width, self.height)
         self._pixel = mi.UInt32(self._order)
-        self._sums = Sums.zeros(mi, self.width * self.height, 6 if aovs else self.features)
-        dr.make_opaque(self._pixel, self._sums)  # zeros as data: else the first pass would be a kernel of its own
+        dr.make_opaque(self._pixel)
+        self._sums = Sums.zeros(mi, NOTHING, 6 if aovs else self.features)
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
@@ -82,15 +86,23 @@ class Render:
             if self._lanes is not None:  # some lanes are ahead, and go on or wait
                 first, last = self._lanes, dr.maximum(self._lanes, last)
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
-            sums = self._integrator.accumulate(self._pixel, key, first, last, self._sums)
+            lane = dr.arange(mi.UInt32, len(self._pixel)) * dr.opaque(mi.UInt32, self._begun)
+            sums = self._integrator.accumulate(self._pixel, key, first, last, self._sums.at(lane))
             dr.eval(sums)
             dr.sync_thread()
         self._sums = sums
         self.done += count
         self._lanes = None
 
+    @property
+    def _begun(self) -> bool:
+        """Whether the sums have an entry for every lane."""
+        return self.done > 0 or self._lanes is not None
+
     def state(self) -> dict[str, NDArray[Any]]:
         """The sums so far, as arrays of one entry a lane that stay as they are while more is rendered."""
+        if not self._begun:
+            return Sums.zeros(self.mi, len(self._pixel), len(self._sums.near) - 3).arrays()
         ahead = {} if self._lanes is None else {LANES: np.asarray(self._lanes)}
         return {**self._sums.arrays(), **ahead}
 
@@ -105,8 +117,8 @@ class Render:
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
         self._pixel = self.mi.UInt32(np.array(self._order[lanes]))
-        self._sums = Sums.zeros(self.mi, len(self._pixel), len(self._sums.near) - 3)
-        dr.make_opaque(self._pixel, self._sums)
+        dr.make_opaque(self._pixel)
+        self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.near) - 3)
         self.done, self._lanes = 0, None
 
     def image(self) -> NDArray[np.float32]:
@@ -129,15 +141,18 @@ class Render:
         return int(dr.sum(self._sums.invalid)[0])
 
     def _mean(self, *sums: Sequence[Float]) -> NDArray[np.float32]:
-        channels = list(zip(*sums, strict=True))
-        pixels = np.empty((self.height * self.width, len(channels)), np.float32)
-        done = np.maximum(self.done if self._lanes is None else np.asarray(self._lanes), 1)
-        for number, (first, *others) in enumerate(channels):  # one at a time: a large film fills the memory
-            total = np.array(first)
-            for part in others:
-                total += np.asarray(part)
-            pixels[self._order, number] = total / done
-        return pixels.reshape(self.height, self.width, len(channels))
+        """Each channel's sums, added up and divided by the samples, at their pixels."""
+        mi, channels = self.mi, list(zip(*sums, strict=True))
+        shape = (self.height, self.width, len(channels))
+        if not self._begun:
+            return np.zeros(shape, np.float32)
+        done = dr.opaque(mi.UInt32, self.done) if self._lanes is None else self._lanes
+        done = mi.Float64(dr.maximum(done, 1))
+        pixels = dr.empty(mi.Float, self.width * self.height * len(channels))
+        for number, parts in enumerate(channels):
+            value = mi.Float(sum(parts[1:], parts[0]) / done)
+            dr.scatter(pixels, value, self._pixel * len(channels) + number)
+        return np.array(pixels, np.float32).reshape(shape)
 
 
 def _tiles(width: int, height: int) -> NDArray[np.uint32]:

@@ -28,7 +28,14 @@ class Sums:
     @staticmethod
     def zeros(mi: ModuleType, lanes: int, features: int) -> Sums:
         near = [dr.zeros(mi.Float64, lanes) for _ in range(3 + features)]
-        return Sums(near, [dr.zeros(mi.Float64, lanes) for _ in range(3)], dr.zeros(mi.UInt32, lanes))
+        sums = Sums(near, [dr.zeros(mi.Float64, lanes) for _ in range(3)], dr.zeros(mi.UInt32, lanes))
+        dr.make_opaque(sums)  # zeros as data: else the first pass would be a kernel of its own
+        return sums
+
+    def at(self, lane: UInt) -> Sums:
+        """Those of the lanes with these numbers."""
+        near, far = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.near, self.far))
+        return Sums(near, far, dr.gather(type(self.invalid), self.invalid, lane))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Each sum by its name; a view where the device is the CPU."""
