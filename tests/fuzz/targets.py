@@ -13,7 +13,7 @@ import io
 import json
 import shlex
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -309,6 +309,98 @@ def npz(data: bytes, folder: Path) -> object:
     return images.read(saved(folder / "a.npz", data))
 
 
+# ---------------------------------------------------------------------- measured materials
+
+SMALL = (5, 4)  # cells of MERL files here: those of the format, 35 MB each, would be read at three a second
+
+
+@contextlib.contextmanager
+def _small_merl() -> Iterator[None]:
+    from gonio.measure.formats import merl, networks
+
+    kept = merl.CELLS, networks.CELLS
+    merl.CELLS, networks.CELLS = SMALL, (*SMALL, 6)
+    try:
+        yield
+    finally:
+        merl.CELLS, networks.CELLS = kept
+
+
+# Of each axis of an array, how many entries a seed keeps: files of the usual size hold a million numbers.
+KEPT = {
+    "rgl": {"theta_i": (3,), "ndf": (2, 4), "sigma": (2, 4), "vndf": (1, 3, 5, 4), "luminance": (1, 3, 4, 4),
+            "values": (1, 3, 3, 4, 4)},
+    "zemax": {"theta_i": (3,), "azimuth": (5,), "radial": (6,), "values": (3, 5, 6, 3)},
+    "cornell": {"directions": (12, 4), "values": (12, 3)},
+}  # fmt: skip
+
+
+@functools.cache
+def _measured(name: str) -> tuple[bytes, ...]:
+    """Small files of a format, of several kinds of tables where it has them."""
+    import gonio as go
+    from gonio.measure.formats.base import Format
+    from gonio.measure.tables import angles, half_difference
+
+    one, paint = Format.family.get(name), go.Conductor.preset("Cu", alpha=0.4)
+
+    def value(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        return np.asarray(paint.eval(wo, wi))
+
+    def cut(kind: str, source: object) -> object:
+        table = Format.family.get(kind).resampled(source)
+        kept = {name: tuple(slice(size) for size in sides) for name, sides in KEPT[kind].items()}
+        return type(table).from_arrays({name: a[kept.get(name, ())] for name, a in table.arrays().items()})
+
+    grid, half = angles.sampled(value, 4, 5), half_difference.sampled(value, (4, 3, 6))
+    tables = [cut(name, grid)] if name in KEPT else [grid]
+    if name == "gonio":
+        tables += [half, *(cut(kind, grid) for kind in KEPT)]
+    with _small_merl():
+        return tuple(one.write(one.resampled(table)) for table in tables)
+
+
+def _measurement(name: str, tokens: Sequence[bytes] = ()) -> None:
+    @target(name, lambda: _measured(name), tokens)
+    def read(data: bytes, folder: Path) -> object:
+        from gonio import measure
+        from gonio.measure.formats.base import Format
+
+        path = saved(folder / f"a{Format.family.get(name).suffixes[0]}", data)
+        with _small_merl():
+            table = measure.read(path)
+        wo, wi = np.array([[0.6, 0.0, 0.8], [0.0, 0.0, 1.0]]), np.array([[0.0, -0.28, 0.96], [0.8, 0.0, 0.6]])
+        return table.rgb(wo, wi), table.flaws, table.range, table.reciprocal
+
+
+_measurement(
+    "merl", [struct.pack("<3i", *SMALL, 180), struct.pack("<3i", *SMALL, 360), struct.pack("<d", float("nan"))]
+)
+_measurement("rgl", [b"tensor_file\0", b"\x0a", struct.pack("<Q", 1 << 60), b"theta_i", b"vndf", b"luminance"])
+_measurement("cornell", [b"1e999", b"nan", b"-1", b" "])
+_measurement("astm", [b"VARS theta_i,phi_i,theta_s,phi_s,BRDF\n", b"1e999", b"nan", b",", b"\n"])
+_measurement("zemax", [b"AngleOfIncidence", b"DataBegin", b"DataEnd", b"TIS ", b"1e999", b"nan", b"180"])
+_measurement("gonio", [b"manifest", b"values", b"'|O'", b"(1000000000,)", b"PK\x01\x02"])
+
+
+@functools.cache
+def _networks() -> tuple[bytes, ...]:
+    from gonio.measure.formats import networks
+
+    rng, stream = np.random.default_rng(2), io.BytesIO()
+    shapes = networks.SHAPES
+    np.savez(stream, **{f"a/{key}": rng.normal(0, 0.3, shape).astype(np.float32) for key, shape in shapes.items()})
+    return (stream.getvalue(),)
+
+
+@target("networks", _networks, [b"PK\x01\x02", b"(6, 21)", b"'|O'", b"a/b1"])
+def trained(data: bytes, folder: Path) -> object:
+    from gonio import measure
+
+    with _small_merl():
+        return measure.read(f"{saved(folder / 'a.npz', data)}:a").range
+
+
 # ---------------------------------------------------------------------- tables, notation, messages, options
 
 
@@ -330,7 +422,7 @@ def tables(data: bytes, folder: Path) -> object:
 @target("notation", lambda: [
     b"conductor", b"conductor(alpha=.3,preset=Au)", b"kulla-conty(base=conductor(alpha=.3,preset=Au))",
     b"mix(a=lambert(albedo=.9,.8,.7),b=phong,weight=.2)", b'{"type": "conductor", "alpha": [0.1, 0.4]}',
-    b"two-sided(base=oren-nayar(sigma=.4))",
+    b"two-sided(base=oren-nayar(sigma=.4))", b"alum-bronze", b"chrome:low2012/lowsmooth_E2", b"a.binary",
 ], [b"(", b")", b"=", b",", b"base=", b"alpha=", b"1e999", b"nan", b"preset=", b".py:X"])  # fmt: skip
 def material_notation(data: bytes, folder: Path) -> object:
     from gonio.models import notation

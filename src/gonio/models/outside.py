@@ -63,7 +63,10 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> type:
     match = _CODE.fullmatch(text.strip())
     if match is None:
         raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
-    path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
+    try:
+        path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
+        raise InputError(f"'{match['file']}' is no path of a file: {error}", where, "FILE.py:CLASS") from None
     module, name = module_of(path, where), match["name"]
     named = vars(module).get(name)
     if not isinstance(named, type):

@@ -14,7 +14,6 @@ from .npz import arrays
 
 SHAPES = {"kernel0": (6, 21), "bias0": (21,), "kernel1": (21, 21), "bias1": (21,), "kernel2": (21, 3), "bias2": (3,)}
 CELLS = (90, 90, 180)
-PART = 90 * 180  # cells that are computed at a time
 
 
 class Networks(Format):
@@ -75,8 +74,8 @@ def tabulated(weights: dict[str, NDArray[np.float32]]) -> tuple[NDArray[np.float
     parts = (np.sin(theta_d) * np.cos(phi_d), np.sin(theta_d) * np.sin(phi_d), np.cos(theta_d) + 0.0 * phi_d)
     difference = np.stack([part.ravel() for part in parts], -1)
     from_difference = (difference @ weights["kernel0"][3:] + weights["bias0"]).astype(np.float32)
-    values = np.empty((n, PART, 3))
-    lit = np.empty((n, PART), bool)
+    values = np.empty((n, m * count, 3))
+    lit = np.empty((n, m * count), bool)
     with np.errstate(over="ignore", invalid="ignore"):
         for row, angle in enumerate(theta_h):
             half = np.array([np.sin(angle), 0.0, np.cos(angle)], np.float32)

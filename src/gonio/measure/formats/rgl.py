@@ -52,7 +52,8 @@ class Rgl(Format):
         wavelengths = fields["wavelengths"].astype(np.float64).ravel() if spectral else None
         if wavelengths is not None and (not np.all(np.isfinite(wavelengths)) or np.any(np.diff(wavelengths) <= 0.0)):
             raise InputError("the wavelengths do not increase", where)
-        jacobian = bool(fields["jacobian"].ravel()[0]) if fields.get("jacobian", np.ones(1)).size else True
+        flag = fields.get("jacobian", np.ones(1)).ravel()
+        jacobian = bool(flag[0]) if flag.size else True
         text = fields.get("description", np.zeros(0, np.uint8))
         title = text.tobytes().decode("utf-8", "replace").strip("\0 \n") if text.dtype == np.uint8 else ""
         parts = {**{name: fields[name] for name in names[:-1]}, "values": fields[names[-1]]}
