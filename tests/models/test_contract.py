@@ -9,6 +9,7 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.errors import InputError
 from gonio.ops import backend
 
 from materials import SMALL
@@ -259,3 +260,27 @@ def test_material_inside_a_material_may_be_ones_own() -> None:
     mixed = go.mix(Velvet(0.4), go.Lambert(0.2), 0.5).eval(WO, WI, precision="float64")
     expected = 0.5 * (Velvet(0.4).eval(WO, WI, precision="float64") + go.Lambert(0.2).eval(WO, WI, precision="float64"))
     np.testing.assert_allclose(mixed, expected, rtol=1e-13)
+
+
+def test_directions_go_by_name_too() -> None:
+    m = go.Conductor(alpha=0.3)
+    np.testing.assert_array_equal(m.eval(wi=WI, wo=WO), m.eval(WO, WI))
+    np.testing.assert_array_equal(m.pdf(WO, wi=WI), m.pdf(WO, WI))
+    np.testing.assert_array_equal(m.sample(WO, u=U).wi, m.sample(WO, U).wi)
+    with pytest.raises(TypeError, match=r"Conductor.eval misses its argument 'wi'"):
+        m.eval(WO)  # type: ignore[call-overload]
+    with pytest.raises(TypeError, match=r"Conductor.eval has no argument 'wr'"):
+        m.eval(WO, wr=WI)  # type: ignore[call-overload]
+
+
+def test_a_tree_of_materials_has_a_bound() -> None:
+    m: go.BSDF = go.Lambert(0.5)
+    with pytest.raises(InputError, match="inside each other, 64 at most are expected"):
+        for _ in range(300):
+            m = go.mix(m, go.Lambert(0.2), 0.5)
+
+
+def test_compensation_is_measured_once_and_not_around_itself() -> None:
+    once = go.KullaConty(go.mix(go.Conductor(alpha=0.3), go.Lambert(0.5), 0.5))
+    with pytest.raises(InputError, match="not again around it"):
+        go.KullaConty(go.KullaConty(once))

@@ -274,6 +274,7 @@ def _error(plugin: dict) -> str:
     ({"type": "gonio_mix", "a": {"type": "gonio_lambert"}}, ["gonio_mix", "no material 'b'"]),
     ({"type": "gonio_mix", "a": {"type": "gonio_lambert"}, "b": 3.0}, ["gonio_mix", "no material 'b'"]),
     ({"type": "gonio_two_sided", "base": {"type": "gonio_dielectric"}}, ["transmits"]),
+    ({"type": "gonio_lambert", "two_sided": "false"}, ["'false' given, true or false expected"]),
     ({"type": "gonio_dielectric", "transmission": "no"}, ["gonio_dielectric.transmission", "True or False"]),
 ], ids=str)  # fmt: skip
 def test_bad_properties_are_named_in_one_clear_message(plugin: dict, texts: list[str]) -> None:

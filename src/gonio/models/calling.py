@@ -95,11 +95,22 @@ def method(formula: Callable[..., object], /) -> object:
         return formula
     inner = ops.function(formula)
     takes_mode = "mode" in inspect.signature(formula).parameters
+    second = "u" if formula.__name__ == "sample" else "wi"
 
     @functools.wraps(formula)
     def enter(
-        self: Material, wo: Given, other: Given, mode: Mode = "radiance", precision: Precision | None = None
+        self: Material,
+        wo: Given,
+        other: Given | None = None,
+        mode: Mode = "radiance",
+        precision: Precision | None = None,
+        **named: Given,
     ) -> object:
+        if other is None:
+            other = named.pop(second, None)
+        if other is None or named:
+            what = f"has no argument '{next(iter(named))}'" if named else f"misses its argument '{second}'"
+            raise TypeError(f"{type(self).__name__}.{formula.__name__} {what}: wo, {second}, precision and mode")
         args = (mode,) if takes_mode else ()
         if self.is_bound:
             with backend.formula_of(wo):
