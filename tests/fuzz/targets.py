@@ -13,6 +13,7 @@ import io
 import json
 import shlex
 import struct
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -198,6 +199,53 @@ def xml_obj(data: bytes, folder: Path) -> object:
 def xml_ply(data: bytes, folder: Path) -> object:
     saved(folder / "a.ply", data)
     return _load_xml(saved(folder / "scene.xml", NAMED % (b"ply", b"ply")))
+
+
+def _serialized() -> list[bytes]:
+    """Mitsuba's own mesh format: a head, zlib of flags, name, counts and arrays, and where each mesh begins."""
+    found = []
+    for flags, real in ((0x1000, "<f4"), (0x2000 | 0x1 | 0x2, "<f8")):
+        vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], real)
+        arrays = [vertices, *([np.tile([0, 0, 1], (3, 1)).astype(real), vertices[:, :2]] if flags & 1 else [])]
+        body = struct.pack("<I", flags) + b"a\0" + struct.pack("<QQ", 3, 1)
+        body += b"".join(array.tobytes() for array in arrays) + np.arange(3, dtype="<u4").tobytes()
+        mesh = struct.pack("<HH", 0x041C, 4) + zlib.compress(body)
+        found.append(mesh + struct.pack("<QI", 0, 1))
+    return found
+
+
+@target("xml-serialized", _serialized, [struct.pack("<HH", 0x041C, 3), struct.pack("<QI", 0, 1), b"\xff" * 8])
+def xml_serialized(data: bytes, folder: Path) -> object:
+    saved(folder / "a.serialized", data)
+    return _load_xml(saved(folder / "scene.xml", NAMED % (b"serialized", b"serialized")))
+
+
+SPECTRUM = XML % (
+    b'<shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename="a.spd"/></bsdf></shape>'
+)
+
+
+@target("xml-spd", lambda: [b"# green\n400 .1\n500 .2\n700 .4\n"], [b"1e999", b"nan", b" ", b"\n", b"-1"])
+def xml_spd(data: bytes, folder: Path) -> object:
+    saved(folder / "a.spd", data)
+    return _load_xml(saved(folder / "scene.xml", SPECTRUM))
+
+
+VOLUME = XML % (
+    b'<medium type="heterogeneous" name="m"><volume type="gridvolume" name="albedo">'
+    b'<string name="filename" value="a.vol"/></volume></medium>'
+)
+
+
+def _volumes() -> list[bytes]:
+    head = struct.pack("<3sBiiiii6f", b"VOL", 3, 1, 3, 2, 2, 1, 0, 0, 0, 1, 1, 1)
+    return [head + np.full(12, 0.5, "<f4").tobytes()]
+
+
+@target("xml-vol", _volumes, [b"VOL\3", struct.pack("<i", 1 << 30), struct.pack("<i", -1)])
+def xml_vol(data: bytes, folder: Path) -> object:
+    saved(folder / "a.vol", data)
+    return _load_xml(saved(folder / "scene.xml", VOLUME))
 
 
 # ---------------------------------------------------------------------- pictures

@@ -1,4 +1,4 @@
-"""Bytes of a picture that nobody vouches for, to numbers.
+"""Bytes of a picture that nobody vouches for, to numbers; and what else Mitsuba reads, held against its header.
 
 What stands in a file's header is held against the file before a library in C++ sees a byte of it: sizes, chunks,
 attributes. Radiance is read here altogether, since Mitsuba's reader writes past its buffer where run lengths are wrong.
@@ -9,8 +9,10 @@ attributes. Radiance is read here altogether, since Mitsuba's reader writes past
 
 from __future__ import annotations
 
+import itertools
 import re
 import struct
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -104,7 +106,7 @@ def mitsuba_path(path: Path) -> str:
 
 
 def check_file(path: Path) -> None:
-    """Raise Unreadable for a file that Mitsuba will open by itself, where it is a picture of a kind known here."""
+    """Raise Unreadable for a file that Mitsuba will open by itself, where it is of a kind known here."""
     if path.stat().st_size > MOST_BYTES:
         raise Unreadable(f"it is larger than {MOST_BYTES >> 20} MiB")
     mitsuba_path(path)
@@ -326,10 +328,90 @@ def _tga(content: bytes) -> None:
     _fits(content, 18 + text, width * height * depth // 8)
 
 
+# Flags of a serialized mesh: what stands beside the vertices, numbers of each; and that numbers have 64 bits
+_BESIDE = {0x1: 3, 0x2: 2, 0x8: 3}
+_DOUBLE = 0x2000
+_LONGEST_NAME = 1 << 16
+_CHUNK = 1 << 20
+
+
+def _serialized(content: bytes) -> None:
+    """Mitsuba's own meshes, each an unpacked head and zlib's stream; where they begin stands at the end."""
+    version = struct.unpack_from("<H", content, 2)[0]
+    if version not in (3, 4):
+        raise Unreadable(f"it is of version {version}, 3 or 4 expected")
+    count = struct.unpack_from("<I", content, len(content) - 4)[0]
+    wide = 8 if version == 4 else 4
+    end = len(content) - 4 - wide * count
+    if count == 0 or end < 8:
+        raise Unreadable(f"it claims to hold {count} meshes")
+    begins = np.frombuffer(content, f"<u{wide}", count, end).tolist()
+    if begins[0] != 0 or any(a >= b for a, b in itertools.pairwise([*begins, end])):
+        raise Unreadable("where its meshes begin is damaged")
+    for begin, after in itertools.pairwise([*begins, end]):
+        if content[begin : begin + 4] != content[:4]:
+            raise Unreadable(f"no mesh begins at byte {begin}")
+        _serialized_mesh(content[begin + 4 : after], named=version == 4)
+
+
+def _serialized_mesh(packed: bytes, named: bool) -> None:
+    stream = _Inflated(packed)
+    flags = struct.unpack("<I", stream.take(4))[0]
+    if named:
+        for _ in range(_LONGEST_NAME):
+            if stream.take(1) == b"\0":
+                break
+        else:
+            raise Unreadable("the name of a mesh does not end")
+    vertices, faces = struct.unpack("<QQ", stream.take(16))
+    if not 0 < vertices < 1 << 32 or not 0 < faces < 1 << 32:
+        raise Unreadable(f"a mesh claims {vertices} vertices and {faces} faces")
+    numbers = 3 + sum(each for flag, each in _BESIDE.items() if flags & flag)
+    stream.skip(vertices * numbers * (8 if flags & _DOUBLE else 4))
+    for first in range(0, faces, _CHUNK):
+        corners = np.frombuffer(stream.take(12 * min(_CHUNK, faces - first)), "<u4")
+        if corners.max() >= vertices:
+            raise Unreadable(f"a face names vertex {corners.max()} of {vertices}")
+
+
+class _Inflated:
+    """What zlib makes of some bytes, a piece at a time, so that a claim is not believed before it is met."""
+
+    def __init__(self, packed: bytes) -> None:
+        self.zlib, self.packed, self.ready = zlib.decompressobj(), packed, b""
+
+    def take(self, count: int) -> bytes:
+        while len(self.ready) < count:
+            try:
+                more = self.zlib.decompress(self.packed, max(count - len(self.ready), 4096))
+            except zlib.error as error:
+                raise Unreadable(f"it cannot be unpacked: {error}") from None
+            self.packed = self.zlib.unconsumed_tail
+            if not more:
+                raise Unreadable("it claims more vertices or faces than it holds")
+            self.ready += more
+        found, self.ready = self.ready[:count], self.ready[count:]
+        return found
+
+    def skip(self, count: int) -> None:
+        while count > 0:
+            count -= len(self.take(min(count, _CHUNK)))
+
+
+def _volume(content: bytes) -> None:
+    """A grid of float32 values."""
+    version, kind, x, y, z, channels = struct.unpack_from("<Biiiii", content, 3)
+    if version != 3 or kind != 1 or min(x, y, z) <= 0 or channels not in (1, 3, 6):
+        raise Unreadable("it is no grid of 32-bit values with 1, 3 or 6 channels")
+    _fits(content, 48, 4 * x * y * z * channels)
+
+
 # how each begins, and what is asked of it
 _PLAIN: tuple[tuple[Callable[[Path, bytes], bool], Callable[[bytes], None]], ...] = (
     (lambda path, content: content[:2] in (b"P6", b"PF", b"Pf"), _plain_text),
     (lambda path, content: content[:2] == b"BM", _bmp),
+    (lambda path, content: content[:2] == b"\x1c\x04", _serialized),
+    (lambda path, content: content[:3] == b"VOL", _volume),
     (lambda path, content: path.suffix.lower() == ".tga" or content[-18:-2] == b"TRUEVISION-XFILE", _tga),
 )
 

@@ -146,8 +146,8 @@ def check_files(file: Path, parameters: Mapping[str, object], allow_outside: boo
             raise InputError(what, str(current), "copy it there, or use --allow-outside")
         try:
             formats.check_file(target)
-            if target.suffix.lower() == ".ply":  # Mitsuba's reader believes its counts and indices
-                meshes.read_mesh(target, str(current))
+            if target.suffix.lower() == ".ply" or meshes.is_ply(target):  # Mitsuba's reader believes counts and indices
+                meshes.read_mesh(target, str(current), ".ply")
         except formats.Unreadable as error:
             raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
         except OSError as error:

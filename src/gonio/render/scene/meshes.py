@@ -9,6 +9,7 @@ up to half a segment, 1/2048, near the centre of a disk and the apex of a cone.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -158,10 +159,20 @@ def cube() -> Triangles:
 # ---------------------------------------------------------------------- files
 
 
-def read_mesh(path: Path, where: str) -> Triangles:
-    """The triangles of an .obj or .ply file. Raises InputError, with the line of the file where that helps."""
+def is_ply(path: Path) -> bool:
+    """Whether a file begins as a .ply does, whatever its name."""
+    with open(path, "rb") as file:
+        return re.fullmatch(rb"ply[\r\n]", file.read(4)) is not None
+
+
+def read_mesh(path: Path, where: str, kind: str = "") -> Triangles:
+    """The triangles of an .obj or .ply file. Raises InputError, with the line of the file where that helps.
+
+    kind  its suffix, where the name has another
+    """
     readers = {".obj": read_obj, ".ply": read_ply}
-    if path.suffix.lower() not in readers:
+    kind = kind or path.suffix.lower()
+    if kind not in readers:
         raise InputError(f"'{path.name}' is no known kind of mesh", where, "use .obj or .ply")
     size = path.stat().st_size
     if size > MAX_BYTES:
@@ -172,7 +183,7 @@ def read_mesh(path: Path, where: str) -> Triangles:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"'{path.name}' cannot be read: {error.strerror or error}", where, "check the file") from None
-    mesh = readers[path.suffix.lower()](data, path, where)
+    mesh = readers[kind](data, path, where)
     return _sound(mesh, path, where)
 
 
