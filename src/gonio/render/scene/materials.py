@@ -305,7 +305,10 @@ def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> 
         doc = f'Named values in place of the numbers, e.g. "{next(iter(model.presets()))}".'
         fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
     title = "".join(word.capitalize() for word in names[0].split("-"))
-    cls = create_model(title, __base__=MaterialPart, __doc__=lab.doc if lab else _summary(model), **fields)
+    doc = lab.doc if lab else _summary(model)
+    # pydantic would look for the source of a class that has none, in every module that is loaded
+    made = {"use_attribute_docstrings": False}
+    cls = create_model(title, __base__=MaterialPart, __doc__=doc, __cls_kwargs__=made, **fields)
     cls.model, cls.declared, cls.dials, cls.lab = model, declared, dials, lab
     return cls
 
