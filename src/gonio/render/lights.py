@@ -17,6 +17,7 @@ from types import ModuleType
 import drjit as dr
 
 from ..errors import InputError
+from .surfaces import Surfaces
 from .types import (
     DirectionSample,
     Emitter,
@@ -282,8 +283,9 @@ class Lights:
     several is chosen with a probability half uniform, half proportional to the light it sends into the scene.
     """
 
-    def __init__(self, mi: ModuleType, scene: Scene):
+    def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None):
         self.mi, self.scene = mi, scene
+        self.surfaces = Surfaces(mi, scene) if surfaces is None else surfaces
         found = scene.emitters()
         # Mitsuba merges the shapes of a file in an order of chance, and that of their lights must not follow it
         order = sorted(range(len(found)), key=lambda index: _order(found[index]))
@@ -395,7 +397,8 @@ class Lights:
         """
         mi = self.mi
         if self.rectangle is None:
-            si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+            hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+            si = self.surfaces.interaction(hit, ray, active)
             radiance = self.emitted(si, active)
             return weigh(radiance, self.pdf(ray.o, solid_angle, si, active & dr.any(radiance != 0)))
         distance, uv, hit = self.rectangle.hit(ray.o, ray.d)

@@ -110,7 +110,7 @@ class Transport(Integrator):
         super().__init__(mi, scene, sensor, settings, aovs)
         self.Waiting = _waiting_type(mi.variant())
         self.context = mi.BSDFContext()
-        self.lights = Lights(mi, scene)
+        self.lights = Lights(mi, scene, self.surfaces)
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
