@@ -78,11 +78,35 @@ def test_sobol_error_falls_faster_than_one_over_n() -> None:
     assert error("sobol", 48) < error("independent", 48) / 5  # no power of two: still far better
 
 
+@pytest.mark.parametrize("block", [0, 1, 5])
+@pytest.mark.parametrize("m", [3, 6, 9])
+def test_every_aligned_block_of_lattice_points_is_a_lattice(m: int, block: int) -> None:
+    """The difference of any two of 2^m points is a multiple of (1, slope) / 2^m, in both coordinates mod 1."""
+    u = points("lattice", 2**m, first=block * 2**m)
+    steps = (u - u[0]) * 2**m
+    k = np.rint(steps[:, 0]).astype(int) % 2**m
+    assert sorted(k) == list(range(2**m))
+    np.testing.assert_allclose(steps[:, 0] - np.rint(steps[:, 0]), 0.0, atol=2**m * 2.0**-23)
+    off = (steps[:, 1] - k * (sampler.SLOPE % 2**m)) / 2**m
+    np.testing.assert_allclose(off - np.rint(off), 0.0, atol=2.0**-22)
+
+
+@pytest.mark.parametrize("n", [16, 24, 64, 100])
+def test_lattices_err_least_for_what_is_smooth_all_round(n: int) -> None:
+    def error(name: str) -> float:
+        u = np.array([points(name, n, pixel=p) for p in range(60)])
+        values = np.exp(np.cos(2 * np.pi * u[..., 0]) + np.sin(2 * np.pi * u[..., 1])).mean(axis=1)
+        return float(np.mean((values - np.i0(1.0) ** 2) ** 2))
+
+    assert error("lattice") < error("sobol") / 2
+
+
 def test_the_callers_arrays_are_left_alone() -> None:
     key, index = mi.UInt32([1, 2]), mi.UInt32([5, 6])
     sampler.sobol_pair(key, index, 3)
+    sampler.lattice_pair(key, index, 3)
     assert list(key) == [1, 2] and list(index) == [5, 6]
 
 
 def test_every_sampler_is_documented() -> None:
-    assert set(sampler.SAMPLERS) == set(sampler.PAIRS) and sampler.DEFAULT in sampler.PAIRS
+    assert set(sampler.SAMPLERS) == set(sampler.PAIRS) and set(sampler.DEFAULT) <= set(sampler.PAIRS)

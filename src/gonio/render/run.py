@@ -161,7 +161,7 @@ def _own(settings: Settings) -> dict[str, images.Value]:
 
     found: dict[str, images.Value] = {
         "integrator": settings.integrator,
-        "sampler": sampler.DEFAULT if settings.sampler == "default" else settings.sampler,
+        "sampler": " and ".join(sampler.DEFAULT) if settings.sampler == "default" else settings.sampler,
         "seed": settings.seed,
     }
     return found | ({"max_depth": settings.max_depth} if settings.program.takes_depth else {})

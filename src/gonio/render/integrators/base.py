@@ -24,7 +24,7 @@ PIXEL, TIME, APERTURE, FIRST_FREE = 0, 1, 2, 3
 CIE_Y_INTEGRAL = 106.7502593994140625
 
 SAMPLERS: dict[str, str] = {
-    "default": f"what measures best: {sampler.DEFAULT}, for every integrator",
+    "default": f"what measures best: {sampler.DEFAULT[0]} for pixels and lamps, {sampler.DEFAULT[1]} for directions",
     **sampler.SAMPLERS,
 }
 
@@ -94,7 +94,8 @@ class Integrator:
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         self.mi, self.scene, self.sensor, self.settings, self.aovs = mi, scene, sensor, settings, aovs
-        self.pair = sampler.PAIRS[sampler.DEFAULT if settings.sampler == "default" else settings.sampler]
+        names = sampler.DEFAULT if settings.sampler == "default" else [settings.sampler] * 2
+        self.pair, self.direction_pair = (sampler.PAIRS[name] for name in names)
         self.surfaces = Surfaces(mi, scene)
         size = sensor.film().crop_size()
         self.width = dr.opaque(mi.UInt32, int(size[0]))
@@ -105,7 +106,8 @@ class Integrator:
     def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Colour:
         """The colour (r, g, b) of the surface that a sample sees; where it sees none, what is returned is left out.
 
-        key, index  of the pixel and of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in [0, 1)
+        key, index  of the pixel and of its sample: `self.pair(key, index, FIRST_FREE)` gives two numbers in [0, 1), and
+                    `self.direction_pair(...)` two for a direction
         """
         raise NotImplementedError(f"{type(self).__name__} has neither show nor sample")
 

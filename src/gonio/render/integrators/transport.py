@@ -265,10 +265,11 @@ class Transport(Integrator):
         """
         mi, lights, context = self.mi, self.lights, self.context
         lobe, pick = self.pair(key, index, dimension + CHOICE)
-        u = mi.Point2f(*self.pair(key, index, dimension + LOBE))
+        u = mi.Point2f(*self.direction_pair(key, index, dimension + LOBE))
         if not self.samples_lights or lights.count == 0:
             return mi.Spectrum(0), mi.Float(0), *bsdf.sample(context, si, lobe, u, active)
-        light = lights.sample(si, mi.Point2f(*self.pair(key, index, dimension + LIGHT)), pick, active)
+        pair = self.direction_pair if lights.has_environment else self.pair
+        light = lights.sample(si, mi.Point2f(*pair(key, index, dimension + LIGHT)), pick, active)
         toward = si.to_local(light.ds.d)
         if self.samples_lobes or self.follows_delta or self.aovs:
             value, pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
