@@ -117,7 +117,8 @@ def _mitsuba_text(error: Exception) -> str:
     ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
     text = lines[0] if lines else type(error).__name__
     if ours:  # an error of a Gonio material, raised within Mitsuba's parser
-        text = re.sub(r"Traceback \(most recent call last\):$", ours[-1].split(": ", 1)[1], text)
+        text = text.removesuffix("Traceback (most recent call last):")
+        text += ours[-1].split(": ", 1)[1] if text != lines[0] else ""
     elif len(lines) > 1:
         text += " " + "; ".join(lines[1:4])
     return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)

@@ -12,9 +12,9 @@ The indices of one (key, dimension) form a sequence: for Sobol points every alig
 *first n* samples are as even as n allows. Different dimensions are padded (Burley2020): each has its own shuffle of
 the indices, so that decisions are independent of each other while each is stratified.
 
-Nets suit what has edges: a pixel, a lamp. Directions are periodic, and mostly smooth: there a lattice, shifted by chance,
-errs far less (Sloan1994), by a factor of 3 to 100 for smooth functions at 16 to 64 points, and it takes half the
-arithmetic. `default` takes each where it is better.
+Nets suit what has edges: a pixel, a lamp. Directions are periodic, and mostly smooth: there a lattice, shifted by
+chance, errs far less (Sloan1994), by a factor of 3 to 100 for smooth functions at 16 to 64 points, and it takes half
+the arithmetic. `default` takes each where it is better.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ SAMPLERS: dict[str, str] = {
     "lattice": "lattices shifted by chance, shuffled per pixel and dimension; any number of samples",
     "independent": "independent pseudo-random numbers: the textbook's sampler, the most noise",
 }
+
 
 def mix(a: UInt, b: UInt) -> UInt:
     """Hash two 32-bit words into one (the `lowbias32` finaliser of C. Wellons: bias 0.17 bits of 32 after mixing).
@@ -96,13 +97,13 @@ def independent_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
     return unit(mix(word, type(key)(0x51633E2D))), unit(mix(word, type(key)(0x68BC21EB)))
 
 
-# y over x of a lattice: of all 32-bit words whose lattices of 2, 4, ... 2^20 points all have a shortest dual vector of at
-# least .66 of the hexagonal one's (a search bit by bit, keeping the best 400), the first. At 16 points it has .74, at 64 .89.
+# y over x of a lattice: of the 32-bit words whose lattices of 2, 4, ... 2^20 points all have a shortest dual vector of
+# at least .66 of the hexagonal one's (found bit by bit, keeping the best 400), the first. 16 points have .74, 64 .89.
 SLOPE = 1030637
 
 
 def lattice_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
-    """Point `index` of a lattice of rank 1, extensible in base 2 (Hickernell2000), shifted; its order shuffled as above.
+    """Point `index` of a lattice of rank 1, extensible in base 2 (Hickernell2000), shifted, its order shuffled.
 
     Every aligned block of 2^m indices is a lattice of 2^m points, moved as a whole.
     """
