@@ -1,0 +1,31 @@
+"""RGL tables without what follows from the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from ..tables.adaptive import Adaptive
+from ..tables.base import Measurement
+from ..tables.rebuilt import Rebuilt, normals_of
+from .base import Method
+
+
+class Rgl(Method):
+    """rgl: an adaptive table without `vndf`, which is rebuilt from the distribution of normals; of a fixed size."""
+
+    name: ClassVar[str] = "rgl"
+
+    def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
+        found: list[Measurement] = []
+        for table in tables:
+            if not isinstance(table, Adaptive):
+                what = f"a table of kind {table.name}, an adaptive one expected"
+                raise InputError(what, "FILE", "gonio convert IN OUT.bsdf makes one")
+            kept = {**table.arrays(), "normals": normals_of(table), "shape": np.array(table.vndf.shape[2:], np.int32)}
+            about = {"title": table.title, "source": table.source, "wavelengths": table.wavelengths}
+            found.append(Rebuilt(kept, **about))
+        return found
