@@ -142,8 +142,8 @@ __all__ = [
     "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty",
     "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
     "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
-    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "compress", "emit",
-    "file", "fit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model", "models", "never",
-    "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
+    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "compress",
+    "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model", "models",
+    "never", "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
     "verify", "view", "width",
 ]  # fmt: skip

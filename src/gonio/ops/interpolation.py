@@ -52,7 +52,7 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
     return tuple(result)
 
 
-def fetch(table: Table, *places: Scalar) -> tuple[Scalar, ...]:
+def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
     """Every channel of the texel at whole-numbered places, one an axis; outside the table the nearest is taken.
 
     For grids whose axes are no plain [0, 1]: angles that wrap, nodes at uneven steps, cumulative sums to search in.
@@ -65,7 +65,8 @@ def fetch(table: Table, *places: Scalar) -> tuple[Scalar, ...]:
         return tuple(symbols)
     if not any(is_drjit(x) for x in places):
         values = fetch_in_numpy(table, *places)
-        return tuple(float(value) if value.ndim == 0 else value for value in values)
+        constants: list[Array] = [float(value) if value.ndim == 0 else value for value in values]
+        return tuple(constants)
     dr = drjit()
     kind = types_like(type(next(x for x in places if is_drjit(x))))
     UInt = kind.module.UInt32

@@ -25,7 +25,7 @@ def compress(
     """Write measured materials in fewer bytes, and say how far off that is.
 
     log keeps logarithms as rounded cosines, lowrank factors of low rank that several materials share, rgl an RGL table
-    without its visible normals, network 675 weights that are trained here. What comes out can stand wherever a file can.
+    without its visible normals, network 675 weights that are trained here. The result stands wherever a file can.
 
     \b
     Examples:

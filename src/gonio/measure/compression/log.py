@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..formats.own import Own
+from ..tables.adaptive import Adaptive
 from ..tables.base import Floats, Measurement, in_rgb
 from ..tables.half_difference import HalfDifference
+from ..tables.log_adaptive import LogAdaptive, turned
 from ..tables.log_table import COLOURS, LogTable, Shape, above, from_cosines, packed, to_cosines
+from ..tables.low_rank import LowRank
+from ..tables.rebuilt import Rebuilt, rebuilding
 from .base import Method, over_half_vectors
 
 OFFSET = 0.05  # of the median of f: darker cells are known less well relatively
@@ -21,6 +25,8 @@ STEPS = (1e-3, 300.0)  # between which the step is looked for
 HALVINGS = 12
 
 Stored = Mapping[str, NDArray[np.generic]]
+T = TypeVar("T", LogTable, LowRank)
+C = TypeVar("C", LogTable, LowRank, LogAdaptive)
 
 
 class Log(Method):
@@ -31,9 +37,22 @@ class Log(Method):
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
         found: list[Measurement] = []
         for table in tables:
+            if isinstance(table, Adaptive) and table.wavelengths is None and table.jacobian:
+                found.append(_adaptive(table, size))
+                continue
             logs = Logs(over_half_vectors(table))
             found.append(coded(LogTable, logs, to_cosines(logs.values), {}, size))
         return found
+
+
+def _adaptive(table: Adaptive, size: int) -> Measurement:
+    """An adaptive table stays one: its lobes would be lost on another grid."""
+    offset = float(np.float32(OFFSET * max(float(np.median(np.abs(table.values))), 1e-9)))
+    numbers = to_cosines(turned(table.values, offset))
+    kept = Rebuilt({**table.arrays(), **rebuilding(table)}).arrays()
+    stored = {name: array for name, array in kept.items() if name not in ("luminance", "values")}
+    stored["cells"] = np.array(numbers.shape[:3], np.int32)
+    return rounded(LogAdaptive, table, numbers, stored, (1.0, offset), size)
 
 
 class Logs:
@@ -57,36 +76,41 @@ class Logs:
     def stored(self) -> dict[str, NDArray[np.generic]]:
         return {"cells": np.array(self.shape, np.int32)}
 
-    def scale(self, step: float) -> Floats:
-        return np.array([self.table.turn, step, self.offset])
-
     @property
     def lit(self) -> NDArray[np.bool_]:
         return above(self.shape, self.table.turn) & self.table.valid
 
 
-def coded(cls: type[LogTable], logs: Logs, numbers: Floats, more: Stored, size: int, shared: int = 0) -> LogTable:
-    """A table of numbers by frequency, rounded as little as fits into a file of `size` bytes.
+def coded(cls: type[T], logs: Logs, numbers: Floats, more: Stored, size: int, shared: int = 0) -> T:
+    """A table over half vectors, of numbers by frequency; of the bytes of `more` so many are `shared`."""
+    return rounded(cls, logs.table, numbers, {**logs.stored, **more}, (logs.table.turn, logs.offset), size, shared)
 
-    more    arrays of the file besides; of these `shared` bytes are not counted
+
+def rounded(
+    cls: type[C], source: Measurement, numbers: Floats, stored: Stored, scale: tuple[float, float], size: int,
+    shared: int = 0,
+) -> C:  # fmt: skip
+    """A table whose numbers are rounded as little as fits into a file of `size` bytes.
+
+    stored  its other arrays; of their bytes `shared` are not counted
+    scale   turn and offset, the step stands between them
     """
     own = Own()
-    blank = {**logs.stored, **more, "scale": logs.scale(1.0)}
-    about = {"title": logs.table.title, "source": logs.table.source}
+    about = {"title": source.title, "source": source.source}
 
-    def stored(step: float) -> dict[str, NDArray[np.generic]]:
-        return {**blank, "scale": logs.scale(step), "codes": packed(np.round(numbers / step).astype(np.int64))}
+    def with_codes(step: float, codes: NDArray[np.generic]) -> dict[str, NDArray[np.generic]]:
+        return {**stored, "scale": np.array([scale[0], step, scale[1]]), "codes": codes}
 
-    head = len(own.file_of(cls, {**blank, "codes": np.zeros(0, np.uint8)}, about)) - shared
+    def codes(step: float) -> NDArray[np.uint8]:
+        return packed(np.round(numbers / step).astype(np.int64))
 
-    def bytes_of(step: float) -> int:
-        return head + len(stored(step)["codes"])
-
+    taken = len(own.file_of(cls, with_codes(1.0, np.zeros(0, np.uint8)), about)) - shared
     finest = max(STEPS[0], float(np.abs(numbers).max()) / 2.0**22)  # what three bytes hold
-    step = least(lambda x: bytes_of(x) <= size, finest, STEPS[1])
+    step = least(lambda x: taken + len(codes(x)) <= size, finest, STEPS[1])
     if step is None:
-        raise InputError(f"{size} bytes, a table takes {bytes_of(STEPS[1])} at least", "bytes", "allow more")
-    return cls(stored(step), **about)
+        what = f"{size} bytes, a table takes {taken + len(codes(STEPS[1]))} at least"
+        raise InputError(what, "bytes", "allow more")
+    return cls(with_codes(step, codes(step)), title=source.title, source=source.source)
 
 
 def least(fits: Callable[[float], bool], low: float, high: float) -> float | None:

@@ -54,7 +54,8 @@ class Lowrank(Method):
 
 def _vectors(every: list[Floats], axis: int) -> Floats:
     """The singular vectors of the slices along an axis, of all materials together, largest first."""
-    gram = 0.0
+    count = every[0].shape[axis]
+    gram = np.zeros((count, count))
     for logs in every:
         flat = np.moveaxis(logs, axis, 0).reshape(logs.shape[axis], -1)
         gram = gram + flat @ flat.T

@@ -37,7 +37,7 @@ class NetworkMethod(Method):
 def trained(table: Measurement, seed: int = 1) -> Network:
     """The network of a table, found in about half a minute: by Adam in Dr.Jit, then by Levenberg and Marquardt.
 
-    What is made small is |log(f + c) - log(f' + c)|, c a share of the median, over the cells of a half-difference table.
+    What is made small is |log(f + c) - log(f' + c)|, c a share of the median, over a half-difference table's cells.
     """
     data = Data.of(over_half_vectors(table))
     rng = np.random.default_rng([seed, 97])
@@ -150,8 +150,8 @@ def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
     said = _units(weights, data.inputs)[2]
     f = np.expm1(said)
     lit = f > 0.0
-    log = np.where(lit, np.log(np.maximum(f, 0.0) + data.offset), np.log(data.offset) + f / data.offset)
-    return log - data.logs, (f + 1.0) / np.where(lit, f + data.offset, data.offset)
+    log = np.where(lit, np.log(np.maximum(f, 0.0) + data.offset), float(np.log(data.offset)) + f / data.offset)
+    return log - data.logs, ((f + 1.0) / np.where(lit, f + data.offset, data.offset)).astype(np.float32)
 
 
 def _normal_equations(weights: Weights, data: Data) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:

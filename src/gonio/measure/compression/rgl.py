@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-import numpy as np
-
 from ...errors import InputError
 from ..tables.adaptive import Adaptive
 from ..tables.base import Measurement
-from ..tables.rebuilt import Rebuilt, normals_of
+from ..tables.rebuilt import Rebuilt, rebuilding
 from .base import Method
 
 
@@ -25,7 +23,6 @@ class Rgl(Method):
             if not isinstance(table, Adaptive):
                 what = f"a table of kind {table.name}, an adaptive one expected"
                 raise InputError(what, "FILE", "gonio convert IN OUT.bsdf makes one")
-            kept = {**table.arrays(), "normals": normals_of(table), "shape": np.array(table.vndf.shape[2:], np.int32)}
-            about = {"title": table.title, "source": table.source, "wavelengths": table.wavelengths}
-            found.append(Rebuilt(kept, **about))
+            kept = {**table.arrays(), **rebuilding(table)}
+            found.append(Rebuilt(kept, title=table.title, source=table.source, wavelengths=table.wavelengths))
         return found

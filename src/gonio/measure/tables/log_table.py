@@ -30,8 +30,8 @@ class LogTable(HalfDifference):
     """A table of log(f + offset) as cosines, each rounded to a multiple of `step`.
 
     The discrete cosine transform over (theta_h, theta_d, phi_d) gathers what is smooth in few numbers; of the rest most
-    become 0. Rounding errs by about as much everywhere of a logarithm, so relatively of f. Cells whose middle lies below
-    the surface are invalid again; others that were invalid hold what the cosines say of them.
+    become 0. Rounding errs by about as much everywhere of a logarithm, so relatively of f. Cells whose middle lies
+    below the surface are invalid again; others that were invalid hold what the cosines say of them.
     """
 
     name = "log-table"

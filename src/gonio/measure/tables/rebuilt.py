@@ -96,5 +96,10 @@ def normals_of(table: Adaptive) -> Floats:
     return np.maximum(normals, 0.0)
 
 
+def rebuilding(table: Adaptive) -> dict[str, NDArray[np.generic]]:
+    """What `Rebuilt` asks for in the place of `vndf`."""
+    return {"normals": normals_of(table), "shape": np.array(table.vndf.shape[2:], np.int32)}
+
+
 def _places(count: int) -> Floats:
     return np.linspace(0.0, 1.0, count)
