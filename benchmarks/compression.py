@@ -1,6 +1,6 @@
 """The bars of compression: bytes and errors of each method, networks against the published ones, time in a render.
 
-python benchmarks/compression.py [curve|network|render ...]  --data FOLDER (../shared/data)  --figure FILE.png
+python benchmarks/compression.py [curve|network|other|render ...]  --data FOLDER (../shared/data)  --figure FILE.png
 
 Errors are those of a sphere under a lamp and a sky (`measure/compression/sphere.py`): the mean over pixels and channels
 of |new - old| / (|old| + 1 % of the mean). "Rebuilt" tables are those of Bagher's fits of the same materials.
@@ -113,29 +113,30 @@ def draw(found: dict[str, list[tuple[float, float]]], path: Path) -> None:
 
 
 def network() -> None:
-    print("error on a sphere of 675 weights: trained here and published, on the published networks' own tables, and on")
-    print("tables rebuilt from Bagher's fits; seconds by the clock (and of both cores)")
-    own, given = [], published()
-    ratios, errors = [], []
-    for name, table in networks().items():
+    print("error on a sphere of 675 weights on the published networks' tables: trained here, published; seconds by the")
+    print("clock (and of the cores)")
+    against({name: (table, published()[name]) for name, table in networks().items()})
+
+
+def other() -> None:
+    print("the same on tables rebuilt from Bagher's fits of these materials, which neither was made from")
+    against({name: (rebuilt(name), given) for name, given in published().items()})
+
+
+def against(pairs: dict[str, tuple[Measurement, Measurement]]) -> None:
+    """Train on tables, and print the errors beside those of others."""
+    errors, seconds = [], []
+    for name, (table, given) in pairs.items():
         start, spent = time.perf_counter(), time.process_time()
         made = trained(table)
-        seconds, cores = time.perf_counter() - start, time.process_time() - spent
-        mine, theirs = error(table, made), error(table, given[name])
-        other = rebuilt(name)
-        again, far = error(other, trained(other)), error(other, given[name])
-        own.append(seconds)
-        errors.append((mine, theirs))
-        ratios.append((again, far))
+        seconds.append(time.perf_counter() - start)
+        cores = time.process_time() - spent
+        errors.append((error(table, made), error(table, given)))
         print(
-            f"  {name:24} {mine:7.2%} {theirs:7.2%}   rebuilt {again:7.2%} {far:7.2%}",
-            f"  {seconds:5.1f} s ({cores:.0f} s)",
-            flush=True,
+            f"  {name:24} {errors[-1][0]:7.2%} {errors[-1][1]:7.2%}  {seconds[-1]:5.1f} s ({cores:.0f} s)", flush=True
         )
-    for title, pairs in (("own tables", errors), ("rebuilt", ratios)):
-        here, there = (statistics.median(column) for column in zip(*pairs, strict=True))
-        print(f"  {title}: median {here:.2%} here, {there:.2%} published, ratio {here / there:.3g}")
-    print(f"  longest {max(own):.1f} s")
+    here, there = (statistics.median(column) for column in zip(*errors, strict=True))
+    print(f"  median {here:.2%} here, {there:.2%} published, ratio {here / there:.3g}; longest {max(seconds):.1f} s")
 
 
 def render() -> None:
@@ -188,7 +189,7 @@ def main() -> None:
             else:
                 FIGURE = Path(words[at + 1])
             del words[at : at + 2]
-    known = {"curve": curve, "network": network, "render": render}
+    known = {"curve": curve, "network": network, "other": other, "render": render}
     for name in words or known:
         known[name]()
 

@@ -14,7 +14,7 @@ from ..tables.low_rank import BASES, LowRank, projected
 from .base import Method, over_half_vectors
 from .log import Logs, coded
 
-RANKS = (6, 9, 13, 18, 24, 32, 44)  # tried, alike along all axes
+RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # tried, alike along all axes
 
 
 class Lowrank(Method):
@@ -34,21 +34,25 @@ class Lowrank(Method):
             bases = [v[:, :rank].astype(np.float16) for v in vectors]
             stored = dict(zip(BASES, bases, strict=True))
             spent = sum(basis.nbytes for basis in bases)
-            if spent / len(every) > 0.7 * size:
+            if best is not None and spent / len(every) > 0.7 * size:
                 break
             found: list[Measurement] = []
             missed = 0.0
             for one in every:
                 core = projected(one.values, [basis.astype(float) for basis in bases])
                 share = spent - spent // len(every)
-                made = coded(LowRank, one, core, stored, size, share)
+                try:
+                    made = coded(LowRank, one, core, stored, size, share)
+                except InputError:
+                    if best is not None:
+                        return best[1]
+                    raise
                 missed += _missed(one, made)
                 found.append(made)
             if best is not None and missed > best[0]:
                 break
             best = missed, found
-        if best is None:
-            raise InputError(f"{size} bytes hold no bases", "bytes", "allow more")
+        assert best is not None, "a rank that does not fit has raised"
         return best[1]
 
 
