@@ -311,6 +311,8 @@ gold_table = go.Measured("gold.binary")
 fitted = go.fit("gold.binary", "lambert+ggx", metric="log")
 assert_type(fitted.material, go.BSDF)
 print(fitted.interval[0, 1], fitted.text, fitted.notes)
+for row in go.compress(["gold.binary", "silk.bsdf"], "both.gonio", method="lowrank", bytes=8192):
+    print(row.path, row.size, row.error, row.sphere)
 
 # ---------------------------------------------------------------------- long jobs
 

@@ -37,20 +37,35 @@ def half_difference(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scala
     sin theta_d = |wi - wo| / 2 and cos theta_d = |wi + wo| / 2, which no cancellation touches. Turned so that the half
     vector lies above x, half the difference wi - wo is the direction that phi_d is the azimuth of.
     """
+    flat, length, along, side = _half_frame(wo, wi)
+    theta_h = ops.atan2(flat, wo.z + wi.z)
+    d = wi - wo
+    theta_d = ops.atan2(ops.safe_sqrt(dot(d, d)), length)
+    none = (along == 0.0) & (side == 0.0)
+    return theta_h, theta_d, where(none, 0.0, ops.atan2(side, where(none, 1.0, along)))
+
+
+@function
+def half_difference_vectors(wo: Direction, wi: Direction) -> tuple[Direction, Direction]:
+    """The half vector, turned above x, and wi as seen from there: unit vectors of the angles of `half_difference`."""
+    flat, length, along, side = _half_frame(wo, wi)
+    scale = 1.0 / where(length == 0.0, 1.0, length)
+    return vec3(flat * scale, 0.0 * flat, (wo.z + wi.z) * scale), vec3(0.5 * along, 0.5 * side, 0.5 * length)
+
+
+@function
+def _half_frame(wo: Direction, wi: Direction) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """Of h = wo + wi the length along the surface and the whole; of wi - wo the parts along the first two axes of the
+    frame of h, (cos theta_h c, cos theta_h s, -sin theta_h) and (-s, c, 0)."""
     h, d = wo + wi, wi - wo
     flat = ops.safe_sqrt(sqr(h.x) + sqr(h.y))
     length = ops.safe_sqrt(dot(h, h))
-    theta_h = ops.atan2(flat, h.z)
-    theta_d = ops.atan2(ops.safe_sqrt(dot(d, d)), length)
     pole = flat == 0.0
     across = where(pole, 1.0, flat)
     c, s = where(pole, 1.0, h.x / across), where(pole, 0.0, h.y / across)
     some = where(length == 0.0, 1.0, length)
-    # d in the frame of h: the first axis is (cos theta_h c, cos theta_h s, -sin theta_h), the second (-s, c, 0)
     along = (h.z * (c * d.x + s * d.y) - flat * d.z) / some
-    side = c * d.y - s * d.x
-    none = (along == 0.0) & (side == 0.0)
-    return theta_h, theta_d, where(none, 0.0, ops.atan2(side, where(none, 1.0, along)))
+    return flat, length, along, c * d.y - s * d.x
 
 
 def direction(theta: Scalar, phi: Scalar) -> Direction:

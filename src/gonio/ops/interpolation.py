@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 from . import graph
-from .backend import Array, drjit, is_drjit, types_like
+from .backend import Array, drjit, in_formula, is_drjit, types_like
 from .table import Table, fetch_in_numpy, read_in_numpy
 from .types import Scalar
 
@@ -52,17 +52,21 @@ def lookup(table: Table, *coordinates: Scalar) -> tuple[Scalar, ...]:
     return tuple(result)
 
 
-def fetch(table: Table, *places: Scalar) -> tuple[Scalar, ...]:
+def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
     """Every channel of the texel at whole-numbered places, one an axis; outside the table the nearest is taken.
 
     For grids whose axes are no plain [0, 1]: angles that wrap, nodes at uneven steps, cumulative sums to search in.
+    Places that are plain numbers are the same for every ray, such as a weight of a network: constants in a shader.
     """
+    if not any(isinstance(x, graph.Node) for x in places):
+        places = tuple(in_formula(x) if isinstance(x, float) else x for x in places)
     if any(isinstance(x, graph.Node) for x in places):
         symbols: list[Array] = [graph.emit("fetch", "float", *places, static=(table, c)) for c in range(table.channels)]
         return tuple(symbols)
     if not any(is_drjit(x) for x in places):
         values = fetch_in_numpy(table, *places)
-        return tuple(values[c] for c in range(table.channels))
+        constants: list[Array] = [float(value) if value.ndim == 0 else value for value in values]
+        return tuple(constants)
     dr = drjit()
     kind = types_like(type(next(x for x in places if is_drjit(x))))
     UInt = kind.module.UInt32

@@ -3,43 +3,62 @@
 from __future__ import annotations
 
 import json
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, did_you_mean
 from ..tables.base import Measurement
 from .base import Format
 from .npz import arrays, written
 
-VERSION = 1
+VERSION = 1  # of a file with one material
+SEVERAL = 2  # of a file with several
 MANIFEST = "manifest"
+
+Arrays = Mapping[str, NDArray[np.generic]]
 
 
 class Own(Format):
     """Gonio table: a .npz of plain arrays and a manifest in JSON (version, kind, title, source, axes with units).
 
     Values are f in 1/sr (of adaptive tables what the RGL's format means by them), angles are radians, wavelengths nm.
-    Nothing is compressed and nothing is pickled. Every kind of table is kept as it is.
+    No array is compressed and nothing is pickled. Every kind of table is kept as it is.
+
+    A file of version 2 holds several materials: its manifest has that of each under its name, their arrays are
+    NAME/ARRAY, and those without a name before them belong to all.
     """
 
     name: ClassVar[str] = "gonio"
     suffixes: ClassVar[tuple[str, ...]] = (".gonio",)
     writes: ClassVar[str] = "any"
 
+    def items(self, data: bytes, where: str) -> list[str]:
+        return list(self._parts(data, where)[1])
+
     def read(self, data: bytes, where: str, item: str = "") -> Measurement:
-        parts = arrays(data, where)
+        parts, several = self._parts(data, where)
+        manifest = several.get(item)
+        if several and manifest is None:
+            what = f"no material '{item}' in it" if item else f"{len(several)} materials in it, one expected"
+            names = list(several)
+            hint = did_you_mean(item, names) if item else f"give {where}:{names[0]}, or another of " + ", ".join(names)
+            raise InputError(what, where, hint)
+        if manifest is not None:
+            own = {name.removeprefix(f"{item}/"): part for name, part in parts.items() if name.startswith(f"{item}/")}
+            parts = {**{name: part for name, part in parts.items() if "/" not in name}, **own}
+        elif item:
+            raise InputError(f"no material '{item}' in it", where, "it holds one alone, give no name")
+        else:
+            manifest = self._manifest(parts, where)
+        parts.pop(MANIFEST)
         try:
-            manifest = json.loads(parts.pop(MANIFEST).astype(np.uint8).tobytes().decode())
-            version, kind = int(manifest["version"]), str(manifest["kind"])
-            title = str(manifest.get("title", ""))
+            kind, title = str(manifest["kind"]), str(manifest.get("title", ""))
             source = {str(key): str(value) for key, value in dict(manifest.get("source", {})).items()}
         except Exception:  # JSON of any shape
-            raise InputError(
-                "no manifest of a Gonio table in it", where, "gonio convert IN OUT.gonio writes one"
-            ) from None
-        if version != VERSION:
-            raise InputError(f"version {version} of Gonio's tables, {VERSION} expected", where, "is Gonio up to date?")
+            raise _no_manifest(where) from None
         cls = Measurement.family.get(kind, where)
         nm = parts.pop("wavelengths", None)
         try:
@@ -51,19 +70,79 @@ class Own(Format):
             what = f"its arrays are not those of a {kind} table: {type(error).__name__}: {str(error)[:100]}"
             raise InputError(what, where, "the file is damaged") from None
 
+    def _parts(self, data: bytes, where: str) -> tuple[dict[str, NDArray[np.generic]], dict[str, Any]]:
+        """The arrays, and of a file with several materials the manifest of each."""
+        parts = arrays(data, where)
+        manifest = self._manifest(parts, where)
+        if manifest["version"] != SEVERAL:
+            return parts, {}
+        several = manifest.get("materials")
+        if not isinstance(several, dict) or not several or not all(isinstance(one, dict) for one in several.values()):
+            raise _no_manifest(where)
+        return parts, several
+
+    def _manifest(self, parts: Arrays, where: str) -> dict[str, Any]:
+        try:
+            manifest = json.loads(parts[MANIFEST].astype(np.uint8).tobytes().decode())
+            version = manifest["version"] = int(manifest["version"])
+        except Exception:  # JSON of any shape
+            raise _no_manifest(where) from None
+        if version not in (VERSION, SEVERAL):
+            what = f"version {version} of Gonio's tables, {VERSION} or {SEVERAL} expected"
+            raise InputError(what, where, "is Gonio up to date?")
+        found: dict[str, Any] = manifest
+        return found
+
     def write(self, table: Measurement) -> bytes:
-        manifest = {
-            "version": VERSION,
-            "kind": table.name,
-            "title": table.title,
-            "source": table.source,
-            "axes": dict(table.axes),
-            "units": "radians, nm; values in 1/sr",
+        about = {"title": table.title, "source": table.source, "wavelengths": table.wavelengths}
+        return self.file_of(type(table), table.arrays(), about)
+
+    def file_of(self, kind: type[Measurement], parts: Arrays, about: Mapping[str, Any]) -> bytes:
+        """The file of a table of a kind, by its arrays and what is known of it: title, source, wavelengths."""
+        nm = about.get("wavelengths")
+        more = {} if nm is None else {"wavelengths": nm}
+        return written({MANIFEST: _text({"version": VERSION, **_about(kind, about)}), **parts, **more})
+
+    def write_several(self, tables: Mapping[str, Measurement]) -> bytes:
+        """The file of several tables, by name; an array that all have is held once."""
+        manifests = {
+            name: _about(type(table), {"title": table.title, "source": table.source}) for name, table in tables.items()
         }
-        text = np.frombuffer(json.dumps(manifest, indent=1).encode(), np.uint8)
-        nm = {} if table.wavelengths is None else {"wavelengths": table.wavelengths}
-        return written({MANIFEST: text, **table.arrays(), **nm})
+        each = {
+            name: {
+                **table.arrays(),
+                **({} if table.wavelengths is None else {"wavelengths": np.asarray(table.wavelengths)}),
+            }
+            for name, table in tables.items()
+        }
+        first = next(iter(each.values()))
+        common = {key for key in first if all(one.get(key) is first[key] for one in each.values()) and len(each) > 1}
+        parts: dict[str, NDArray[np.generic]] = {
+            MANIFEST: _text({"version": SEVERAL, "materials": manifests}),
+            **{key: array for key, array in first.items() if key in common},
+        }
+        for name, own in each.items():
+            parts |= {f"{name}/{key}": array for key, array in own.items() if key not in common}
+        return written(parts)
 
     def resampled(self, source: Measurement) -> Measurement:
         """The table itself."""
         return source
+
+
+def _about(kind: type[Measurement], about: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "kind": kind.name,
+        "title": about.get("title", ""),
+        "source": about.get("source", {}),
+        "axes": dict(kind.axes),
+        "units": "radians, nm; values in 1/sr",
+    }
+
+
+def _text(manifest: Mapping[str, Any]) -> NDArray[np.uint8]:
+    return np.frombuffer(json.dumps(manifest, indent=1).encode(), np.uint8)
+
+
+def _no_manifest(where: str) -> InputError:
+    return InputError("no manifest of a Gonio table in it", where, "gonio convert IN OUT.gonio writes one")

@@ -1,0 +1,182 @@
+"""Networks of 675 weights, trained on tables."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...ops import backend
+from ..tables.base import Measurement, in_rgb
+from ..tables.half_difference import HalfDifference
+from ..tables.network import SHAPES, Network
+from .base import Method, over_half_vectors
+
+Floats32 = NDArray[np.float32]
+
+OFFSET = 0.3  # of the median of f: below it differences are differences, above it ratios
+LOWEST = 0.01  # cosine of both directions of what is learnt from: within .6 degrees of the horizon little is seen
+STEPS, BATCH, RATE = 9000, 2048, 1e-2  # of Adam; the rate falls to 0 linearly
+ROUNDS, PAIRS = 40, 5000  # of Gauss and Newton, with as many pairs each
+LARGEST = 60.0  # of log(1 + f), which exp can still take in float32
+
+
+class NetworkMethod(Method):
+    """network: 675 weights a material, 6 -> 21 -> 21 -> 3 (Sztrajman2021), trained here; of a fixed size."""
+
+    name: ClassVar[str] = "network"
+
+    def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
+        return [trained(table) for table in tables]
+
+
+def trained(table: Measurement, seed: int = 1) -> Network:
+    """The network of a table, found in about half a minute: by Adam in Dr.Jit, then by Levenberg and Marquardt.
+
+    What is made small is |log(f + c) - log(f' + c)|, c a share of the median, over a half-difference table's cells.
+    """
+    data = Data.of(over_half_vectors(table))
+    rng = np.random.default_rng([seed, 97])
+    weights = _refined(_descended(_started(data, rng), data, rng), data, rng)
+    return Network(
+        {name: array.T if name.startswith("kernel") else array[:, 0] for name, array in weights.items()},
+        title=table.title,
+        source=table.source,
+    )
+
+
+@dataclass(frozen=True)
+class Data:
+    """What is learnt: (hx, hy, hz, dx, dy, dz) of pairs, (6, N), log(f + offset), (3, N), and the offset."""
+
+    inputs: Floats32
+    logs: Floats32
+    offset: float
+
+    @classmethod
+    def of(cls, table: HalfDifference) -> Data:
+        n, m, count = table.values.shape[:3]
+        theta_h = ((np.arange(n) + 0.5) / n) ** 2 * (0.5 * np.pi)
+        theta_d = (np.arange(m) + 0.5) / m * (0.5 * np.pi)
+        phi_d = (np.arange(count) + 0.5) / count * table.turn
+        h, d, p = (a.ravel() for a in np.meshgrid(theta_h, theta_d, phi_d, indexing="ij"))
+        along, side = np.sin(d) * np.cos(p), np.sin(d) * np.sin(p)
+        flip = np.where(side < 0.0, -1.0, 1.0)  # a whole turn is learnt as one half: exchanging changes nothing
+        both = np.stack([np.sin(h), 0.0 * h, np.cos(h), along * flip, side * flip, np.cos(d)]).astype(np.float32)
+        lowest = np.cos(d) * np.cos(h) - np.abs(np.sin(h) * along)
+        kept = table.valid.ravel() & (lowest > LOWEST)
+        f = in_rgb(table.values, table.wavelengths).reshape(-1, 3)[kept]
+        offset = OFFSET * max(float(np.median(f)), 1e-6)
+        return cls(both[:, kept], np.log(np.maximum(f, 0.0) + offset).T.astype(np.float32), offset)
+
+
+Weights = dict[str, Floats32]
+
+
+def _started(data: Data, rng: np.random.Generator) -> Weights:
+    """Uniform numbers (Glorot2010), and the median colour."""
+    found: Weights = {}
+    for name, shape in SHAPES.items():
+        if name.startswith("kernel"):
+            reach = np.sqrt(6.0 / sum(shape))
+            found[name] = rng.uniform(-reach, reach, shape[::-1]).astype(np.float32)
+        else:
+            found[name] = np.zeros((*shape, 1), np.float32)
+    median = np.exp(np.median(data.logs, axis=1)) - data.offset
+    found["bias2"] = np.log1p(np.maximum(median, 0.0))[:, None].astype(np.float32)
+    return found
+
+
+def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
+    """By Adam, on batches of pairs."""
+    dr, types = backend.drjit(), backend.types("float32")
+    Tensor = types.module.TensorXf
+    opt = importlib.import_module("drjit.opt").Adam(lr=RATE, params={n: Tensor(w) for n, w in weights.items()})
+    mixed = rng.permutation(data.inputs.shape[1])
+    count = max(len(mixed) // BATCH, 1)
+    batches = [mixed[i * BATCH : (i + 1) * BATCH] for i in range(count)]
+    inputs = [Tensor(np.ascontiguousarray(data.inputs[:, batch])) for batch in batches]
+    wanted = [Tensor(np.ascontiguousarray(data.logs[:, batch])) for batch in batches]
+    dr.eval(inputs, wanted)
+    for step in range(STEPS):
+        opt.set_learning_rate(RATE * max(1.0 - step / STEPS, 1e-3))
+        one = int(rng.integers(count))
+        units = dr.maximum(opt["kernel0"] @ inputs[one] + opt["bias0"], 0.0)
+        units = dr.maximum(opt["kernel1"] @ units + opt["bias1"], 0.0)
+        f = dr.exp(opt["kernel2"] @ units + opt["bias2"]) - 1.0
+        # below 0 straight on, so that a network that says too little is told so
+        log = dr.select(
+            f > 0.0, dr.log(dr.maximum(f, 0.0) + data.offset), f * (1.0 / data.offset) + float(np.log(data.offset))
+        )
+        dr.backward(dr.mean(dr.abs(log - wanted[one]), axis=None))
+        opt.step()
+    return {name: np.array(opt[name]) for name in weights}
+
+
+def _refined(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:
+    """By Levenberg and Marquardt on the squares: with 675 weights the normal equations are small."""
+    damping = 1e-2
+    for _ in range(ROUNDS):
+        pick = rng.choice(data.inputs.shape[1], min(PAIRS, data.inputs.shape[1]), replace=False)
+        part = Data(data.inputs[:, pick], data.logs[:, pick], data.offset)
+        normal, slope, before = _normal_equations(weights, part)
+        diagonal = np.diag(normal)
+        diagonal = np.maximum(diagonal, 1e-6 * diagonal.max())
+        for _ in range(6):
+            step = np.linalg.solve(normal + np.diag(damping * diagonal), -slope).astype(np.float32)
+            tried, at = {}, 0
+            for name, array in weights.items():
+                tried[name] = array + step[at : at + array.size].reshape(array.shape)
+                at += array.size
+            if np.mean(_differences(tried, part)[0] ** 2) < before:
+                weights, damping = tried, max(damping / 3.0, 1e-7)
+                break
+            damping *= 4.0
+    return weights
+
+
+def _units(weights: Weights, inputs: Floats32) -> tuple[Floats32, Floats32, Floats32]:
+    first = np.maximum(weights["kernel0"] @ inputs + weights["bias0"], 0.0)
+    second = np.maximum(weights["kernel1"] @ first + weights["bias1"], 0.0)
+    return first, second, np.minimum(weights["kernel2"] @ second + weights["bias2"], LARGEST)
+
+
+def _differences(weights: Weights, data: Data) -> tuple[Floats32, Floats32]:
+    """Of the logarithms, (3, N), and their derivatives by what the network says."""
+    said = _units(weights, data.inputs)[2]
+    f = np.expm1(said)
+    lit = f > 0.0
+    log = np.where(lit, np.log(np.maximum(f, 0.0) + data.offset), float(np.log(data.offset)) + f / data.offset)
+    return log - data.logs, ((f + 1.0) / np.where(lit, f + data.offset, data.offset)).astype(np.float32)
+
+
+def _normal_equations(weights: Weights, data: Data) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """J J^T, J r and the mean of r^2, r the differences: back-propagation of each channel, written out."""
+    first, second, _ = _units(weights, data.inputs)
+    rest, derivative = _differences(weights, data)
+    sizes = [weights[name].size for name in SHAPES]
+    inner, pairs = sum(sizes[:4]), data.inputs.shape[1]
+    normal, slope = np.zeros((sum(sizes), sum(sizes))), np.zeros(sum(sizes))
+    for channel in range(3):
+        through = weights["kernel2"][channel][:, None] * (second > 0.0) * derivative[channel]
+        under = (weights["kernel1"].T @ through) * (first > 0.0)
+        rows = np.concatenate([
+            (under[:, None] * data.inputs).reshape(-1, pairs),
+            under,
+            (through[:, None] * first).reshape(-1, pairs),
+            through,
+            second * derivative[channel],
+            derivative[channel][None],
+        ]).astype(np.float32)  # fmt: skip
+        units = len(second)
+        own = np.concatenate(
+            [np.arange(inner + units * channel, inner + units * (channel + 1)), [len(slope) - 3 + channel]]
+        )
+        at = np.concatenate([np.arange(inner), own])
+        normal[np.ix_(at, at)] += rows @ rows.T
+        slope[at] += rows @ rest[channel]
+    return normal, slope, float(np.mean(rest**2))

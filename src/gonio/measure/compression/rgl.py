@@ -1,0 +1,28 @@
+"""RGL tables without what follows from the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from ...errors import InputError
+from ..tables.adaptive import Adaptive
+from ..tables.base import Measurement
+from ..tables.rebuilt import Rebuilt, rebuilding
+from .base import Method
+
+
+class Rgl(Method):
+    """rgl: an adaptive table without `vndf`, which is rebuilt from the distribution of normals; of a fixed size."""
+
+    name: ClassVar[str] = "rgl"
+
+    def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
+        found: list[Measurement] = []
+        for table in tables:
+            if not isinstance(table, Adaptive):
+                what = f"a table of kind {table.name}, an adaptive one expected"
+                raise InputError(what, "FILE", "gonio convert IN OUT.bsdf makes one")
+            kept = {**table.arrays(), **rebuilding(table)}
+            found.append(Rebuilt(kept, title=table.title, source=table.source, wavelengths=table.wavelengths))
+        return found

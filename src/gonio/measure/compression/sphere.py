@@ -1,0 +1,53 @@
+"""A sphere under a lamp and a sky, computed pair by pair: what an error of a table does to a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..tables.base import Floats
+
+SIZE = 64  # pixels across
+LAMP = np.array([-0.5, 0.6, 0.62])  # toward it; as bright as all of the sky
+SKY = 256  # directions that the sky is made of, evenly spread
+DARK = 0.01  # of the picture's mean: what a pixel's difference is at least held against
+
+Rgb = Callable[[Floats, Floats], Floats]
+
+
+def frame() -> tuple[Floats, Floats, Floats]:
+    """(normals, tangents, bitangents) of the pixels, (P, 3), in a parallel view along -z."""
+    x, y = np.meshgrid(*[(np.arange(SIZE) + 0.5) / SIZE * 2.0 - 1.0] * 2)
+    inside = x * x + y * y < 1.0
+    x, y = x[inside], y[inside]
+    n = np.stack([x, y, np.sqrt(1.0 - x * x - y * y)], -1)
+    t = np.cross(np.array([0.3, 1.0, 0.2]), n)
+    t /= np.linalg.norm(t, axis=1, keepdims=True)
+    return n, t, np.cross(n, t)
+
+
+def lights() -> tuple[Floats, Floats]:
+    """Directions toward the lights, (L, 3), and the irradiance of each: a spiral of equal steps, and the lamp."""
+    z = 1.0 - (2.0 * np.arange(SKY) + 1.0) / SKY
+    phi = np.arange(SKY) * (np.pi * (3.0 - np.sqrt(5.0)))
+    r = np.sqrt(1.0 - z * z)
+    sky = np.stack([r * np.cos(phi), r * np.sin(phi), z], -1)
+    return np.vstack([sky, LAMP / np.linalg.norm(LAMP)]), np.append(np.full(SKY, 4.0 * np.pi / SKY), np.pi)
+
+
+def picture(rgb: Rgb) -> Floats:
+    """The pixels of the sphere's disc, (P, 3), of f cos theta_i (wo, wi) -> (N, 3)."""
+    n, t, b = frame()
+    wo = np.stack([t[:, 2], b[:, 2], n[:, 2]], -1)  # the view, (0, 0, 1), in each pixel's frame
+    found = np.zeros_like(n)
+    for light, irradiance in zip(*lights(), strict=True):
+        wi = np.stack([t @ light, b @ light, n @ light], -1)
+        lit = wi[:, 2] > 0.0
+        found[lit] += irradiance * rgb(wo[lit], wi[lit])
+    return found
+
+
+def error(old: Floats, new: Floats) -> float:
+    """The mean over pixels and channels of |new - old| / (|old| + a hundredth of the mean)."""
+    return float(np.mean(np.abs(new - old) / (np.abs(old) + DARK * np.abs(old).mean())))
