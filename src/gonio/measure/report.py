@@ -11,7 +11,7 @@ import numpy as np
 from . import SAMPLE, format_of, parted, read
 from .compare import asymmetry
 from .formats.base import contents
-from .tables.base import ANGLES
+from .tables.base import ANGLES, Measurement
 
 
 def describe(file: str | os.PathLike[str]) -> dict[str, Any]:

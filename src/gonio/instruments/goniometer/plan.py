@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ...measure.tables.samples import Samples
 
 Floats = NDArray[np.float64]
 MOST_CELLS = 1 << 24
+MOST_ANGLES = 1 << 16
 
 
 class Plan:
@@ -32,13 +34,17 @@ class Plan:
         where = str(output or "go.measure")
         self.file = Format.family.get("gonio") if output is None else format_of(output)
         if not self.file.writes:
-            raise InputError(f"{self.file.name} files cannot be written", where, "choose another suffix, such as .gonio")
+            raise InputError(
+                f"{self.file.name} files cannot be written", where, "choose another suffix, such as .gonio"
+            )
         own = self.file.writes
         kinds = ["angles", *sorted({one.writes for one in Format.family.all().values()} - {"", "any"})]
         if kind and kind not in kinds:
             raise InputError(f"unknown kind of table '{kind}'", "--kind", did_you_mean(kind, kinds))
         if kind and own not in ("any", kind):
-            raise InputError(f"{self.file.name} files hold tables of kind {own}", "--kind", "leave it out, or use .gonio")
+            raise InputError(
+                f"{self.file.name} files hold tables of kind {own}", "--kind", "leave it out, or use .gonio"
+            )
         self.kind = kind or ("angles" if own == "any" else own)
         self._grid = grid
         if grid is not None and (own not in ("any", "samples") or self.kind not in ("angles", "samples")):
@@ -47,7 +53,7 @@ class Plan:
 
     def table(self, source: Measurement) -> Measurement:
         """A table of what `source.rgb` gives at its directions."""
-        about = {"title": source.title, "source": source.source}
+        about: dict[str, Any] = {"title": source.title, "source": source.source}
         if self._grid is not None:
             wo, wi = angles.pairs(*self._grid)
             f = source.rgb(wo, wi) / wi[:, 2:]
@@ -59,6 +65,32 @@ class Plan:
             return angles.sampled(source.rgb, **about)
         writers = [self.file, *Format.family.all().values()]
         return next(one for one in writers if one.writes == self.kind).resampled(source)
+
+
+def axis_of(text: str | None, name: str) -> list[float] | None:
+    """Angles from "0,30,60", or "0:85:5" for every fifth degree up to 85; None where none are given."""
+    if text is None:
+        return None
+    where = f"--{name.replace('_', '-')}"
+    found: list[float] = []
+    for part in filter(None, map(str.strip, text.split(","))):
+        try:
+            numbers = [float(word) for word in part.split(":")]
+        except ValueError:
+            numbers = []
+        if len(numbers) == 1:
+            found += numbers
+        elif (
+            len(numbers) == 3
+            and np.all(np.isfinite(numbers))
+            and numbers[2] > 0.0
+            and numbers[1] - numbers[0] < 1e5 * numbers[2]
+        ):
+            first, last, step = numbers
+            found += list(first + step * np.arange(int(np.floor((last - first) / step + 1e-9)) + 1))
+        else:
+            raise InputError(f"'{part}' given, angles expected", where, "such as 0,30,60 or 0:85:5")
+    return found
 
 
 def angles_of(values: Sequence[float] | None, default: Floats, name: str, most: float) -> Floats:
@@ -143,5 +175,3 @@ def beside_lamp(wo: Floats, wi: Floats, blocked: float) -> Floats:
     moved = wo.copy()
     moved[hidden] = rim
     return moved
-
-

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...models import BSDF, guide_search
 from ...ops import backend
-from ...render.types import Scene
 from ...render import engine
+from ...render.types import Scene
 from ..surfaces.base import Patch
 
 Floats = NDArray[np.float64]
@@ -47,13 +47,23 @@ def ground(patch: Patch) -> Ground:
     parameters["faces"] = mi.UInt32(patch.faces.ravel().astype(np.uint32))
     parameters.update()
     extent = max(*patch.size, float(np.abs(patch.vertices).max()))
-    return Ground(mi.load_dict({"type": "scene", "patch": mesh}), patch.size, patch.top + 1e-4 * extent, OFFSET * extent)
+    return Ground(
+        mi.load_dict({"type": "scene", "patch": mesh}), patch.size, patch.top + 1e-4 * extent, OFFSET * extent
+    )
 
 
 class Left(NamedTuple):
-    """How each ray left: its direction, weight (a colour), how many facets it met, and whether it is known to have
-    left (else it was absorbed, or lost)."""
+    """How each ray left.
 
+    angle      of incidence, by its number
+    direction  turned so that its light lay above x
+    weight     what is left of it, a colour
+    bounces    facets that it met
+    escaped    whether it left at all
+    lost       whether rounding brought it below the surface; what did neither was absorbed
+    """
+
+    angle: Kernel
     direction: Kernel
     weight: Kernel
     bounces: Kernel
@@ -61,14 +71,13 @@ class Left(NamedTuple):
     lost: Kernel
 
 
-def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count: int, seed: int) -> tuple[Left, Kernel]:
-    """Send rays down to the surface, and follow them until they leave; also returns the angle that each belongs to.
+def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count: int, seed: int) -> Left:
+    """Send rays down to the surface, and follow them until they leave.
 
     facet    bound to the variant's types
     cosines  of the angles of incidence; azimuths are even over the turn, and places over the period
     each     rays of one angle; all rays are numbered angle by angle
     first    the number of the first ray that is sent now, of `count`
-    Directions are turned back so that the light lies above x.
     """
     mi = engine.load()
     number = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, first)
@@ -129,7 +138,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
         start, lambda *now: now[5] == UNDERWAY, step, labels=labels, label="goniometer"
     )
     turned = mi.Vector3f(along.x * cos_phi + along.y * sin_phi, along.y * cos_phi - along.x * sin_phi, along.z)
-    return Left(turned, weight, bounces, state == AWAY, state == LOST), angle
+    return Left(angle, turned, weight, bounces, state == AWAY, state == LOST)
 
 
 UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3

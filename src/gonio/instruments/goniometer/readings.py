@@ -2,8 +2,8 @@
 
 A map is a grid over the disk of equal area, (x, y) = sqrt(1 - cos theta) (cos phi, sin phi), the light above x. The
 surface turns under the light, so y and -y are the same and half the disk is kept. The detector's opening is a cone; in
-the maps it is the squares whose centres lie in it, between the four centres around its axis. What it collects is divided
-by the projected solid angle of those same squares above the horizon, so that f is an average over them.
+the maps it is the squares whose centres lie in it, between the four centres around its axis. What it collects is
+divided by the projected solid angle of those same squares above the horizon, so that f is an average over them.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ class Rough(Specimen):
     # ------------------------------------------------------------------ measuring
 
     def prepare(self, theta_i: Floats) -> None:
-        wanted = np.unique(np.round(np.minimum(theta_i, np.radians(STEEPEST)), 9))
+        wanted: Floats = np.unique(np.round(np.minimum(theta_i, np.radians(STEEPEST)), 9))
         if len(wanted) > MOST_LIGHTS:
             count = int(np.ceil(np.radians(STEEPEST) / self.half_angle)) + 1
             wanted = np.linspace(0.0, np.radians(STEEPEST), count)
-        self.lights = wanted
+        self.lights: Floats = wanted
         self._shoot()
 
     def _shoot(self) -> None:
@@ -101,7 +101,7 @@ class Rough(Specimen):
         cosines = mi.Float(np.cos(self.lights).astype(np.float32))
         side = dr.opaque(mi.Float, float(self.side))
         sums = np.zeros((GROUPS, size), np.float32)
-        lost = np.zeros(lights)
+        lost: Floats = np.zeros(lights)
         ground = None
         for patch in range(self.patches):
             if ground is None or self.surface.random:
@@ -109,7 +109,7 @@ class Rough(Specimen):
             maps, gone = dr.zeros(mi.Float, size), dr.zeros(mi.Float, lights)
             for start in range(0, total, rays.LANES):
                 count = min(rays.LANES, total - start)
-                left, angle = rays.shoot(ground, facet, cosines, each, start, count, self.seed * 1_000_003 + patch)
+                left = rays.shoot(ground, facet, cosines, each, start, count, self.seed * 1_000_003 + patch)
                 w = left.direction
                 shrink = side * dr.rsqrt(1.0 + dr.maximum(w.z, 0.0))
                 column = dr.minimum(mi.UInt32(dr.maximum(w.x * shrink + side, 0.0)), 2 * self.side - 1)
@@ -117,9 +117,9 @@ class Rough(Specimen):
                 place = row * (2 * self.side) + column
                 order = dr.select(left.bounces == 1, mi.UInt32(0), mi.UInt32(1))
                 for channel in range(channels):
-                    index = ((order * lights + angle) * channels + channel) * squares + place
+                    index = ((order * lights + left.angle) * channels + channel) * squares + place
                     dr.scatter_reduce(dr.ReduceOp.Add, maps, left.weight[channel], index, left.escaped)
-                dr.scatter_reduce(dr.ReduceOp.Add, gone, mi.Float(1.0), angle, left.lost)
+                dr.scatter_reduce(dr.ReduceOp.Add, gone, mi.Float(1.0), left.angle, left.lost)
                 dr.eval(maps, gone)
                 self.sent += count
                 self._progress(self.sent, total * self.patches)
@@ -138,7 +138,8 @@ class Rough(Specimen):
         for group, one in enumerate(sums):
             seen, self._solid = gathered(one, solid, self.half_angle)
             flat = seen.reshape(orders, lights, channels, -1)
-            self._seen[group] = np.moveaxis(flat, 2, 3) / np.float32(sent)  # channels last: looked up together
+            # half of what came down to y and -y together; channels last, as they are looked up together
+            self._seen[group] = np.moveaxis(flat, 2, 3) * np.float32(0.5 / sent)
         self._seen[groups] = self._seen[:groups].mean(axis=0)
 
     # ------------------------------------------------------------------ reading
@@ -148,7 +149,7 @@ class Rough(Specimen):
         maps = {"first": group[0], "later": group[1]}.get(bounces)
         maps = group[0] + group[1] if maps is None else maps
         places, weights = self._places(wo, wi)
-        solid = sum(weight * self._solid[place] for place, weight in zip(places, weights, strict=True))
+        solid = np.sum([weight * self._solid[place] for place, weight in zip(places, weights, strict=True)], axis=0)
         at = np.interp(np.arctan2(np.hypot(wi[:, 0], wi[:, 1]), wi[:, 2]), self.lights, np.arange(len(self.lights)))
         low = np.minimum(at.astype(np.int64), max(len(self.lights) - 2, 0))
         rest = (at - low)[:, None]

@@ -39,8 +39,10 @@ class Readout:
     cells      how many values it holds
     blocked    share of its cells that could not be measured
     error      median standard error as a share of the value; None where values are exact
-    incidence  angles of incidence that rays were sent at, degrees; empty of a material, as are
-    first, later, lost  shares of that light which leave after one facet, after more (luminance), and are lost to rounding
+    incidence  angles of incidence that rays were sent at, degrees; empty of a material, as are the next three
+    first      share of that light which leaves after one facet, luminance
+    later      after two facets or more
+    lost       share of the rays that rounding lost
     rays       sent
     seconds    it took
     notes      what there is to know
@@ -80,7 +82,9 @@ class _Pass(Measurement):
 
     def of(self, part: int | None, bounces: str = "") -> _Pass:
         """The same questions, to a part of the measurement or to other bounces."""
-        other = _Pass(self._specimen, bounces or self._bounces, self._blocked, 0.0 if bounces else self._noise, self._seed)
+        other = _Pass(
+            self._specimen, bounces or self._bounces, self._blocked, 0.0 if bounces else self._noise, self._seed
+        )
         other._part, other._retro = part, self._retro
         return other
 
@@ -146,7 +150,8 @@ def measure(
                  facets are smooth (alpha = 0) where nothing else is said
     kind         of table in .gonio files: angles, half-difference, adaptive, specular, samples
     theta_i, theta_r, phi  angles of one's own, degrees (of light, of view, between them), for .gonio, .astm and .brdf
-    solid_angle  of the detector, sr: each value is the mean over that cone. None: a point for materials, .006 for surfaces
+    solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, .006 for
+                 surfaces
     noise        standard deviation of a reading, as a share of it
     blocked      degrees about the lamp where the detector cannot stand. MERL's cells are invalid there, samples left
                  out; other tables hold the value at the rim
@@ -173,7 +178,11 @@ def measure(
             raise InputError(f"{value:g} given, 0 to {high:g} expected", f"--{name}")
     if solid_angle is not None and not 0.0 < solid_angle < np.pi:
         raise InputError(f"{solid_angle:g} sr given, more than 0 and less than pi expected", "--solid-angle")
-    for name, count, low, most in (("rays", rays, 1000, 1 << 40), ("patches", patches, 1, 4096), ("seed", seed, 0, 1 << 31)):
+    for name, count, low, most in (
+        ("rays", rays, 1000, 1 << 40),
+        ("patches", patches, 1, 4096),
+        ("seed", seed, 0, 1 << 31),
+    ):
         if not low <= count <= most:
             raise InputError(f"{count} given, {low} to {most} expected", f"--{name}")
     target = None if output is None else files.check_file(output)
@@ -245,10 +254,14 @@ def _filled(
     return table, hidden, notes
 
 
-def surface_of(text: str) -> Surface:
-    """A surface from text: "gaussian", "gaussian:alpha=.3,length=4", "gaussian(alpha=.3)" or a file of heights."""
+def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> Surface:
+    """A surface from text: "gaussian", "gaussian:alpha=.3,length=4", "gaussian(alpha=.3)" or a file of heights; its
+    parameters also as "name=value" each."""
+    if preset:
+        raise InputError("surfaces have no presets", "--preset", "such as --facet conductor:Au")
     head, rest = _parted(text)
-    return surfaces.named(head, dict(notation.assignment(part, "--surface") for part in rest.split(",") if part))
+    own = dict(notation.assignment(part, "--surface") for part in rest.split(",") if part.strip())
+    return surfaces.named(head, {**own, **dict(map(notation.assignment, assignments))})
 
 
 def facet_of(text: str) -> BSDF:
@@ -260,10 +273,11 @@ def facet_of(text: str) -> BSDF:
     if not is_model(head):
         return notation.named(text)[0]
     kind = model(head)
-    parts = [part if "=" in part else f"preset={part}" for part in re.split(r",(?=\s*[A-Za-z_]\w*\s*(?:=|$))", rest) if part]
-    if "alpha" in kind.parameters() and not any(part.replace(" ", "").startswith("alpha=") for part in parts):
+    given = [part.strip() for part in re.split(r",(?=\s*[A-Za-z_]\w*\s*=)", rest) if part.strip()]
+    parts = [part if "=" in part else f"preset={part}" for part in given]
+    if "alpha" in kind.parameters() and not any(re.match(r"alpha\s*=", part) for part in parts):
         parts.append("alpha=0")
-    return notation.named(head, [part for part in parts if part])[0]
+    return notation.named(head, parts)[0]
 
 
 def _parted(text: str) -> tuple[str, str]:

@@ -32,7 +32,7 @@ class Spheres(Surface):
         centres = (places[:, None] + shifts).reshape(-1, 2)
         start = 4
         for x, y in centres[np.abs(centres).max(axis=1) < 0.5 * SIDE + 1.0]:
-            vertices.append(ball + [x, y, 0.0])
+            vertices.append(ball + np.array([x, y, 0.0]))
             faces.append(triangles + start)
             start += len(ball)
         top = 1.0 if len(places) else 0.0

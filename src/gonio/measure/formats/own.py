@@ -57,7 +57,7 @@ class Own(Format):
         for name, array in beside.items():
             if array.shape != shape:
                 raise InputError(f"{name} has shape {array.shape}, the values have {shape}", where)
-        table.beside = beside
+        table.beside.update(beside)
         return table
 
     def write(self, table: Measurement) -> bytes:
