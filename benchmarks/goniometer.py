@@ -37,9 +37,16 @@ PLANE = (0.0, 180.0)  # of incidence: on the light's side, and across from it
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def measured(surface: str, facet: str, rays: int, patches: int = 16, azimuths: Floats = AZIMUTHS) -> Readout:
+def measured(surface: str, facet: str, rays: int, patches: int = 16, bounces: str = "all") -> Readout:
     found = go.measure(
-        surface=surface, facet=facet, theta_i=LIGHTS, theta_r=VIEWS, phi=azimuths, rays=rays, patches=patches
+        surface=surface,
+        facet=facet,
+        theta_i=LIGHTS,
+        theta_r=VIEWS,
+        phi=AZIMUTHS,
+        rays=rays,
+        patches=patches,
+        bounces=bounces,
     )
     rate = found.rays / found.seconds / 1e6
     print(f"{surface} of {facet}: {found.rays / 1e6:.0f} M rays, {found.seconds:.0f} s, {rate:.2f} M rays/s")
@@ -51,9 +58,9 @@ def intensity(values: Floats) -> Floats:
     return values * np.cos(np.radians(VIEWS))[None, :, None, None]
 
 
-def of_model(model: go.BSDF, azimuths: Floats = AZIMUTHS) -> Floats:
+def of_model(model: go.BSDF) -> Floats:
     """A model's f at the same angles, seen by the same detector."""
-    axes = [np.radians(axis) for axis in (LIGHTS, VIEWS, azimuths)]
+    axes = [np.radians(axis) for axis in (LIGHTS, VIEWS, AZIMUTHS)]
     return Model(model, DETECTOR).f(*pairs(*axes)).reshape(*map(len, axes), 3)
 
 
@@ -100,10 +107,11 @@ def gaussian(folder: Path | None) -> None:
         for light, a, b, s in zip(LIGHTS, first, theory[masking], error, strict=True):
             off = np.abs(a - b)
             row, column = np.unravel_index(off[..., 0].argmax(), off.shape[:2])
+            peak, place = b.max() / 100.0, f"view {VIEWS[row]:g}, azimuth {AZIMUTHS[column]:g}"
             print(
-                f"    light {light:2.0f}: worst {100.0 * off.max() / b.max():.2f} % of the peak, at view {VIEWS[row]:g}, "
-                f"azimuth {AZIMUTHS[column]:g}; rms {100.0 * np.sqrt(np.mean(off**2)) / b.max():.2f} %; standard error "
-                f"there {100.0 * s[row, column, 0] / b.max():.2f} %, at the peak {100.0 * s.max() / b.max():.2f} %"
+                f"    light {light:2.0f}: worst {off.max() / peak:.2f} % of the peak, at {place}; rms "
+                f"{np.sqrt(np.mean(off**2)) / peak:.2f} %; standard error there {s[row, column, 0] / peak:.2f} %, at the "
+                f"peak {s.max() / peak:.2f} %"
             )
     for light, one, later, lost in zip(LIGHTS, found.first, found.later, found.lost, strict=True):
         print(f"    light {light:2.0f}: energy of all bounces {one + later:.6f}, first {one:.5f}, lost {lost:.1e}")
@@ -145,8 +153,8 @@ def grooves(folder: Path | None) -> None:
     seen = VIEWS <= 75.0
 
     def off(a: Floats, b: Floats, k: int) -> str:
-        part = (a - b)[k, seen]
-        return f"mean {100.0 * part.mean() / lambert:+.1f} %, rms {100.0 * np.sqrt(np.mean(part**2)) / lambert:.1f} %, worst {100.0 * np.abs(part).max() / lambert:.1f} %"
+        part = (a - b)[k, seen] / (0.01 * lambert)
+        return f"mean {part.mean():+.1f} %, rms {np.sqrt(np.mean(part**2)):.1f} %, worst {np.abs(part).max():.1f} %"
 
     print(f"  sigma {sigma}, albedo {albedo}; measured - theory as shares of albedo / pi, views to 75 degrees")
     for k, light in enumerate(LIGHTS):
@@ -179,63 +187,58 @@ def grooves(folder: Path | None) -> None:
         save(figure, folder, "goniometer-grooves.png")
 
 
+def energy(f: Floats) -> Floats:
+    """Shares of light by channel, (theta_i, 3): int f cos theta_r dw over the views that were measured."""
+    weight = (np.cos(np.radians(VIEWS)) * np.sin(np.radians(VIEWS)))[None, :, None, None]
+    step = np.radians(VIEWS[1] - VIEWS[0])
+    return 2.0 * np.pi * step * np.sum(np.mean(f, axis=2, keepdims=True) * weight, axis=(1, 2))
+
+
 def later(folder: Path | None) -> None:
     alpha = 1.0
     gold = go.Conductor.preset("Au", alpha=alpha, ndf="beckmann")
     white = go.Conductor(alpha=alpha, ndf="beckmann", fresnel="one")
-    found = {
-        name: measured(f"gaussian:alpha={alpha}", facet, 4_000_000, 64)
-        for name, facet in (("white", "mirror"), ("gold", "conductor:Au"))
+    facets = {"white": "mirror", "gold": "conductor:Au"}
+    found = {name: measured(f"gaussian:alpha={alpha}", facet, 4_000_000, 64, "later") for name, facet in facets.items()}
+    rest = {name: one.table.values for name, one in found.items()}  # type: ignore[attr-defined]
+    added = {
+        "white": of_model(go.KullaConty(white)) - of_model(white),
+        "bounce": of_model(go.KullaConty(gold, color="bounce")) - of_model(gold),
+        "sheet": of_model(go.KullaConty(gold, color="sheet")) - of_model(gold),
     }
-    rest = {name: one.table.values - one.table.beside["first"] for name, one in found.items()}  # type: ignore[attr-defined]
-    print(f"  alpha {alpha}; energy of later bounces, luminance: measured, Kulla-Conty")
-    lost = go.albedo(white, mu=np.cos(np.radians(LIGHTS))).value
+    print(f"  alpha {alpha}; energy of later bounces of mirrors, and 1 - E, which Kulla-Conty adds")
+    albedo = np.asarray(go.albedo(white, mu=np.cos(np.radians(LIGHTS))).value).reshape(len(LIGHTS), -1)[:, 0]
     for k, light in enumerate(LIGHTS):
-        print(
-            f"    light {light:2.0f}: mirrors {found['white'].later[k]:.4f}, 1 - E of Smith {float(1.0 - np.ravel(lost)[k] if np.ndim(lost) == 1 else 1.0 - lost[k, 0]):.4f}"
-        )
-    added = {}
-    for colour in ("bounce", "sheet"):
-        model = go.KullaConty(gold, color=colour)
-        added[colour] = of_model(model) - of_model(gold)
-    added["white"] = of_model(go.KullaConty(white)) - of_model(white)
-    weight = (np.cos(np.radians(VIEWS)) * np.sin(np.radians(VIEWS)))[None, :, None, None]
-
-    def energy(f: Floats) -> Floats:
-        """Shares of light by channel, (theta_i, 3): int f cos dw over the views that were measured."""
-        return 2.0 * np.pi * np.sum(np.mean(f, axis=2, keepdims=True) * weight, axis=(1, 2)) * np.radians(VIEWS[1])
-
-    print("  colour of later bounces: gold over mirrors, red green blue, at each angle of light; and what f_add is")
+        print(f"    light {light:2.0f}: {found['white'].later[k]:.4f}, {1.0 - albedo[k]:.4f}")
+    print("  colour: later bounces of gold over those of mirrors, red green blue; and f_add")
+    ratio = energy(rest["gold"]) / energy(rest["white"])
+    own = {name: energy(added[name]) / energy(added["white"]) for name in ("bounce", "sheet")}
     for k, light in enumerate(LIGHTS):
-        ratio = energy(rest["gold"])[k] / energy(rest["white"])[k]
-        own = {c: energy(added[c])[k] / energy(added["white"])[k] for c in ("bounce", "sheet")}
-        print(
-            f"    light {light:2.0f}: measured {np.round(ratio, 3)}, bounce {np.round(own['bounce'], 3)}, sheet {np.round(own['sheet'], 3)}"
-        )
-    print("  shape: rms of measured - Kulla-Conty, both of energy 1, as a share of the mean; retro and forward at 60")
+        words = ", ".join(f"{name} {np.round(values[k], 3)}" for name, values in own.items())
+        print(f"    light {light:2.0f}: measured {np.round(ratio[k], 3)}, {words}")
+    print("  shape, both of energy 1: rms of measured - Kulla-Conty as a share of the mean; f cos theta_r at view 60")
+    across = int(np.argmin(np.abs(VIEWS - 60.0)))
     for k, light in enumerate(LIGHTS):
         a, b = (intensity(f)[k, ..., 0] / energy(f)[k, 0] for f in (rest["white"], added["white"]))
+        rms = 100.0 * np.sqrt(np.mean((a - b) ** 2)) / b.mean()
+        back, ahead = a[across, 0], a[across, -1]
         print(
-            f"    light {light:2.0f}: rms {100.0 * np.sqrt(np.mean((a - b) ** 2)) / b.mean():.0f} %, at view 60: on the light's side {a[24, 0]:.3f}, across {a[24, -1]:.3f}, Kulla-Conty {b[24, 0]:.3f}"
+            f"    light {light:2.0f}: rms {rms:.0f} %; on the light's side {back:.3f}, across {ahead:.3f}, Kulla-Conty "
+            f"{b[across, 0]:.3f} on both"
         )
     with matplotlib.rc_context(figures.STYLE):
         figure, axes = sheet(4)
         x, points = slices(intensity(rest["gold"]))
         _, spread = slices(intensity(found["gold"].table.beside["error"]))
+        spread = 2.0 * spread
         _, theory = slices(intensity(added["bounce"]))
         for k, axis in enumerate(axes[:3]):
             for channel, colour in enumerate(figures.CHANNELS):
-                axis.plot(x, theory[k, :, channel], color=colour, lw=1.5, label="Kulla-Conty" if channel == 0 else None)
-                axis.errorbar(
-                    x,
-                    points[k, :, channel],
-                    2.0 * spread[k, :, channel],
-                    fmt="o",
-                    ms=2.4,
-                    lw=0.7,
-                    color=colour,
-                    label="measured" if channel == 0 else None,
-                )
+                label = {"label": "Kulla-Conty"} if channel == 0 else {}
+                axis.plot(x, theory[k, :, channel], color=colour, lw=1.5, **label)
+                label = {"label": "measured"} if channel == 0 else {}
+                points_, bars = points[k, :, channel], spread[k, :, channel]
+                axis.errorbar(x, points_, bars, fmt="o", ms=2.4, lw=0.7, color=colour, **label)
             axis.set_title(f"light at {LIGHTS[k]:g} degrees", fontsize=10)
             axis.set_xlabel("angle of view [degrees]")
             axis.set_xlim(-90.0, 90.0)
@@ -244,30 +247,11 @@ def later(folder: Path | None) -> None:
         axes[0].set_ylabel("f cos theta_r of later bounces [1/sr]")
         axes[0].legend(fontsize=7)
         names = ("measured", "Kulla-Conty, bounce", "Kulla-Conty, sheet")
-        shares = [
-            energy(rest["gold"])[0] / energy(rest["white"])[0],
-            *(energy(added[c])[0] / energy(added["white"])[0] for c in ("bounce", "sheet")),
-        ]
-        for row, values in enumerate(shares):
-            axes[3].bar(
-                np.arange(3) + 0.27 * (row - 1),
-                values,
-                0.24,
-                color=figures.CHANNELS,
-                alpha=(1.0, 0.65, 0.35)[row],
-                edgecolor=figures.INK,
-                lw=0.6,
-            )
-            for channel, value in enumerate(values):
-                axes[3].text(
-                    channel + 0.27 * (row - 1),
-                    value + 0.01,
-                    names[row] if channel == 2 else "",
-                    rotation=90,
-                    ha="center",
-                    va="bottom",
-                    fontsize=7,
-                )
+        for row, values in enumerate((ratio[0], own["bounce"][0], own["sheet"][0])):
+            x_ = np.arange(3) + 0.27 * (row - 1)
+            shade = (1.0, 0.65, 0.35)[row]
+            axes[3].bar(x_, values, 0.24, color=figures.CHANNELS, alpha=shade, edgecolor=figures.INK, lw=0.6)
+            axes[3].text(x_[2], values[2] + 0.02, names[row], rotation=90, ha="center", va="bottom", fontsize=7)
         axes[3].set_xticks(range(3), ["red", "green", "blue"])
         axes[3].set_ylim(0.0, 1.0)
         axes[3].set_title("gold over mirrors, light at 0", fontsize=10)
@@ -281,8 +265,9 @@ def speed(folder: Path | None) -> None:
             found = go.measure(surface=surface, facet=facet, output=f"{place}/a.binary")
             error = f"standard error {100.0 * found.error:.2g} % in the median" if found.error else ""
             print(
-                f"  {surface} of {facet} as MERL, {found.cells} cells from {len(found.incidence)} angles of light: {found.rays / 1e6:.0f} M rays, "
-                f"{found.seconds:.0f} s, {found.rays / found.seconds / 1e6:.2f} M rays/s; {error}"
+                f"  {surface} of {facet} as MERL, {found.cells} cells, {len(found.incidence)} angles of light: "
+                f"{found.rays / 1e6:.0f} M rays, {found.seconds:.0f} s, {found.rays / found.seconds / 1e6:.2f} M rays/s; "
+                f"{error}"
             )
 
 

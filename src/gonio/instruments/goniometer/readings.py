@@ -9,7 +9,6 @@ divided by the projected solid angle of those same squares above the horizon, so
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +36,6 @@ class Rough(Specimen):
     lights, first, later, lost  after `prepare`: angles of incidence [rad], (N,); shares of the light that leave after
                                 one facet, and after more, (N, 3); share of rays lost to rounding, (N,)
     """
-
-    has_orders: ClassVar[bool] = True
 
     def __init__(
         self,

@@ -72,37 +72,44 @@ class Readout:
 class _Pass(Measurement):
     """What a format asks for its values: each answer is a measurement."""
 
-    def __init__(self, specimen: Specimen, bounces: str, blocked: float, noise: float, seed: int) -> None:
+    def __init__(
+        self,
+        specimen: Specimen,
+        bounces: str,
+        blocked: float,
+        noise: float,
+        seed: int,
+        part: int | None = None,
+        known: dict[int, Floats] | None = None,
+    ) -> None:
+        """known: answers by the number of the question, f without noise, that are the same in all parts"""
         super().__init__(specimen.title, specimen.about)
         self._specimen, self._bounces, self._blocked, self._noise, self._seed = specimen, bounces, blocked, noise, seed
-        self._part: int | None = None
-        self._calls = 0
-        self._asked: list[Floats] = []
-        self._retro: dict[int, Floats] = {}
+        self._part, self._known = part, {} if known is None else known
+        self._asked = 0
 
-    def of(self, part: int | None, bounces: str = "") -> _Pass:
-        """The same questions, to a part of the measurement or to other bounces."""
-        other = _Pass(
-            self._specimen, bounces or self._bounces, self._blocked, 0.0 if bounces else self._noise, self._seed
-        )
-        other._part, other._retro = part, self._retro
-        return other
+    def part(self, part: int) -> _Pass:
+        """The same questions, to a part of the measurement."""
+        made = self._specimen, self._bounces, self._blocked, self._noise, self._seed
+        return _Pass(*made, part, self._known)
+
+    def first(self) -> _Pass:
+        """The same questions about the first bounce alone, without noise."""
+        return _Pass(self._specimen, "first", self._blocked, 0.0, self._seed, None, self._known)
 
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
-        self._calls += 1
-        # an adaptive table takes its coordinates from retro-reflection: one set serves all parts
-        if wo is wi and self._calls in self._retro:
-            return self._retro[self._calls]
-        f = self._specimen.f(beside_lamp(wo, wi, self._blocked), wi, self._part, self._bounces)
+        self._asked += 1
+        f = self._known.get(self._asked)
+        if f is None:
+            f = self._specimen.f(beside_lamp(wo, wi, self._blocked), wi, self._part, self._bounces)
+            if self._specimen.exact or wo is wi:
+                self._known[self._asked] = f
         if self._noise > 0.0:
-            part = GROUPS if self._part is None else self._part
-            spread = self._noise * (1.0 if self._part is None else np.sqrt(GROUPS))
-            rng = np.random.default_rng([self._seed, 92, part, self._calls])
-            f = f * (1.0 + spread * rng.standard_normal(f.shape))
-        value = f * wi[:, 2:]
-        if wo is wi:
-            self._retro[self._calls] = value
-        return value
+            # an adaptive table takes its coordinates from retro-reflection: one set, noise and all, serves all parts
+            whole = self._part is None or wo is wi
+            rng = np.random.default_rng([self._seed, 92, GROUPS if whole else self._part or 0, self._asked])
+            f = f * (1.0 + self._noise * (1.0 if whole else np.sqrt(GROUPS)) * rng.standard_normal(f.shape))
+        return f * wi[:, 2:]
 
 
 class _Scout(Measurement):
@@ -205,7 +212,7 @@ def measure(
             raise InputError(f"{bounces} bounces of a material asked for", "--bounces", "that is for --surface")
         named = notation.named(material)[0] if isinstance(material, str) else material
         specimen, rough = Model(named, solid_angle), None
-    table, hidden, notes = _filled(plan, specimen, rough is not None, np.radians(blocked), noise, bounces, seed)
+    table, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
     error = table.beside.get("error")
     values = vars(table)["values"]
     typical = None if error is None or not np.any(values > 0.0) else error[values > 0.0] / values[values > 0.0]
@@ -231,22 +238,22 @@ def measure(
 
 
 def _filled(
-    plan: Plan, specimen: Specimen, surface: bool, blocked: float, noise: float, bounces: str, seed: int
+    plan: Plan, specimen: Specimen, blocked: float, noise: float, bounces: str, seed: int
 ) -> tuple[Measurement, float, list[str]]:
     """The table with what stands beside its values, the share of blocked cells, and notes."""
     asked = _Pass(specimen, bounces, blocked, noise, seed)
     table = plan.table(asked)
     values = vars(table)["values"]
-    if surface or noise > 0.0:
+    if noise > 0.0 or not specimen.exact:
         total, square = np.zeros_like(values), np.zeros_like(values)
         for part in range(GROUPS):
-            off = vars(plan.table(asked.of(part)))["values"] - values
+            off = vars(plan.table(asked.part(part)))["values"] - values
             total += off
             square += off * off
         variance = np.maximum(square - total * total / GROUPS, 0.0) / (GROUPS - 1.0)
         table.beside["error"] = np.sqrt(variance / GROUPS)
-    if surface and bounces == "all":
-        table.beside["first"] = vars(plan.table(asked.of(None, "first")))["values"]
+    if bounces == "all" and not specimen.exact:
+        table.beside["first"] = vars(plan.table(asked.first()))["values"]
     table, hidden, left_out = without(table, blocked)
     notes = []
     if blocked > 0.0 and not left_out:

@@ -23,11 +23,12 @@ class Specimen:
 
     title  what it is
     about  how it was measured, for the file
+    exact  whether all parts of a measurement agree, and there are no bounces to tell apart
     """
 
     title: str
     about: dict[str, str]
-    has_orders: ClassVar[bool] = False  # whether the first bounce is known by itself
+    exact: ClassVar[bool] = False
 
     def prepare(self, theta_i: Floats) -> None:
         """Get ready for light at these angles [rad]: `f` is asked for no others."""
@@ -42,7 +43,9 @@ class Specimen:
 
 
 class Model(Specimen):
-    """A material's formulas: exact, but for the detector's opening."""
+    """A material's formulas."""
+
+    exact: ClassVar[bool] = True
 
     def __init__(self, material: BSDF, solid_angle: float | None) -> None:
         if not material.isotropic:

@@ -25,7 +25,7 @@ class Gaussian(Surface):
 
     alpha: float = parameter(0.3, "width of Beckmann's distribution, sqrt(2) times the rms slope", 0.0, 3.0)
     length: float = parameter(3.0, "length over which heights are correlated, in squares of the grid", 1.5, 64.0)
-    squares: int = parameter(512, "squares of the grid along each side of the period", 16, 4096)
+    squares: int = parameter(512, "squares of the grid along each side of the period", 16, 2048)
 
     def patch(self, rng: np.random.Generator) -> Patch:
         heights = heights_of(rng.standard_normal((self.squares, self.squares)), self.length)

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...render import images
 from .base import Floats, Patch, Surface, of_heights, parameter
 
-LEAST, MOST = 4, 4096  # pixels along a side
+LEAST, MOST = 4, 1024  # pixels along a side
 SEAM = 2.0  # how many times its usual step a map may jump from its last row to its first, and count as periodic
 
 
