@@ -110,8 +110,8 @@ def gaussian(folder: Path | None) -> None:
             peak, place = b.max() / 100.0, f"view {VIEWS[row]:g}, azimuth {AZIMUTHS[column]:g}"
             print(
                 f"    light {light:2.0f}: worst {off.max() / peak:.2f} % of the peak, at {place}; rms "
-                f"{np.sqrt(np.mean(off**2)) / peak:.2f} %; standard error there {s[row, column, 0] / peak:.2f} %, at the "
-                f"peak {s.max() / peak:.2f} %"
+                f"{np.sqrt(np.mean(off**2)) / peak:.2f} %; standard error there {s[row, column, 0] / peak:.2f} %, at "
+                f"the peak {s.max() / peak:.2f} %"
             )
     for light, one, later, lost in zip(LIGHTS, found.first, found.later, found.lost, strict=True):
         print(f"    light {light:2.0f}: energy of all bounces {one + later:.6f}, first {one:.5f}, lost {lost:.1e}")
@@ -234,7 +234,7 @@ def later(folder: Path | None) -> None:
         _, theory = slices(intensity(added["bounce"]))
         for k, axis in enumerate(axes[:3]):
             for channel, colour in enumerate(figures.CHANNELS):
-                label = {"label": "Kulla-Conty"} if channel == 0 else {}
+                label = {"label": "Kulla-Conty, bounce"} if channel == 0 else {}
                 axis.plot(x, theory[k, :, channel], color=colour, lw=1.5, **label)
                 label = {"label": "measured"} if channel == 0 else {}
                 points_, bars = points[k, :, channel], spread[k, :, channel]
@@ -266,7 +266,7 @@ def speed(folder: Path | None) -> None:
             error = f"standard error {100.0 * found.error:.2g} % in the median" if found.error else ""
             print(
                 f"  {surface} of {facet} as MERL, {found.cells} cells, {len(found.incidence)} angles of light: "
-                f"{found.rays / 1e6:.0f} M rays, {found.seconds:.0f} s, {found.rays / found.seconds / 1e6:.2f} M rays/s; "
+                f"{found.rays / 1e6:.0f} M rays, {found.seconds:.0f} s, {found.rays / found.seconds / 1e6:.2f} M/s; "
                 f"{error}"
             )
 
