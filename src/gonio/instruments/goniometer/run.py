@@ -15,7 +15,7 @@ from ... import files
 from ...errors import InputError
 from ...measure import colours
 from ...measure.tables.base import Measurement
-from ...models import BSDF, is_model, model, notation
+from ...models import BSDF, is_model, notation
 from ...owner import public
 from ..surfaces import base as surfaces
 from ..surfaces.base import Surface
@@ -276,15 +276,16 @@ def facet_of(text: str) -> BSDF:
 
     What has a width is smooth, alpha = 0, where no alpha is given.
     """
-    head, rest = _parted(text)
-    if not is_model(head):
-        return notation.named(text)[0]
-    kind = model(head)
-    given = [part.strip() for part in re.split(r",(?=\s*[A-Za-z_]\w*\s*=)", rest) if part.strip()]
-    parts = [part if "=" in part else f"preset={part}" for part in given]
-    if "alpha" in kind.parameters() and not any(re.match(r"alpha\s*=", part) for part in parts):
-        parts.append("alpha=0")
-    return notation.named(head, parts)[0]
+    head, colon, rest = text.strip().partition(":")
+    if colon and is_model(head):
+        first, comma, more = rest.partition(",")
+        text = f"{head}({first if '=' in first else 'preset=' + first}{comma}{more})"
+    smooth: list[str] = []
+    if is_model(text.partition("(")[0].strip()):
+        kind, given = notation.taken_apart(text, "--facet")
+        if "alpha" in kind.parameters() and "alpha" not in given:
+            smooth = ["alpha=0"]
+    return notation.named(text, smooth)[0]
 
 
 def _parted(text: str) -> tuple[str, str]:
