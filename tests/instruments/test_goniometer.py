@@ -354,6 +354,8 @@ def test_the_command_measures_and_says_so_in_json(tmp_path: Path, capsys: pytest
         ({"surface": SMALL, "facet": "dielectric"}, "lets light through"),
         ({"surface": SMALL, "facet": "conductor(alpha=(.1,.4))"}, "anisotropic"),
         ({"surface": SMALL, "rays": 1}, "1000 to"),
+        ({"surface": SMALL, "rays": 1 << 30, "theta_i": [0.0]}, "67108864 rays on each patch"),
+        ({"surface": 5}, "a surface expected"),
         ({"surface": SMALL, "seed": -1}, "0 to"),
         ({"surface": SMALL, "bounces": "third"}, "all, first, later expected"),
     ],

@@ -17,6 +17,7 @@ from ...errors import InputError
 from ...models import BSDF
 from ...models.notation import written
 from ...render import engine
+from ...work import garbage
 from ..surfaces.base import Surface
 from . import rays
 from .specimen import GROUPS, Floats, Specimen, half_angle
@@ -26,7 +27,7 @@ SMALLEST = 0.25  # degrees of a detector's half angle
 MOST_LIGHTS = 64  # different angles of incidence that are each measured; of more, a grid is, and is linear between
 STEEPEST = 89.0  # degrees of incidence; beyond it values are held
 PARTS = 8  # per side of a square, to find how much of it is above the horizon
-MOST_RAYS = 1 << 31  # of one patch
+MOST_EACH = 1 << 24  # rays of one patch and angle: sums in float32 hold no more
 MOST_BYTES = 4 << 30  # of the maps
 
 
@@ -79,7 +80,8 @@ class Rough(Specimen):
             count = int(np.ceil(np.radians(STEEPEST) / self.half_angle)) + 1
             wanted = np.linspace(0.0, np.radians(STEEPEST), count)
         self.lights: Floats = wanted
-        self._shoot()
+        with garbage.kept():
+            self._shoot()
 
     def _shoot(self) -> None:
         mi = engine.load(self.device)
@@ -90,8 +92,9 @@ class Rough(Specimen):
         channels = 1 if grey(self.facet) else 3
         lights, squares = len(self.lights), 2 * self.side * self.side
         total, size = lights * each, 2 * lights * channels * squares
-        if total > MOST_RAYS:
-            raise InputError(f"{total * self.patches} rays asked for", "--rays", "give fewer")
+        if each > MOST_EACH or total >= 1 << 32:
+            what = f"{each} rays on each patch, at each of {lights} angles of incidence"
+            raise InputError(what, "--rays", "give more patches, or fewer rays")
         if 4 * size * (GROUPS + 3) > MOST_BYTES:
             what = f"maps of {lights} angles of incidence would take {4e-9 * size * (GROUPS + 3):.0f} GB"
             raise InputError(what, "--solid-angle", "give a larger one, or fewer angles")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import files
+from ...arguments import shown
 from ...errors import InputError
 from ...measure import colours
 from ...measure.tables.base import Measurement
@@ -200,6 +201,8 @@ def measure(
             raise InputError("a material and a surface given", "MODEL", "name what facets are made of by --facet")
         detector = DETECTOR if solid_angle is None else solid_angle
         built = surface_of(surface) if isinstance(surface, str) else surface
+        if not isinstance(built, Surface):
+            raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=.3"')
         made = facet_of(facet) if isinstance(facet, str) else facet
         specimen = rough = Rough(built, made, detector, rays, patches, seed, device, progress)
         scout = _Scout()
