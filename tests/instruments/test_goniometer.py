@@ -384,6 +384,7 @@ def test_facets_are_smooth_where_nothing_else_is_said() -> None:
     assert facet_of("lambert:albedo=.8") == go.Lambert(0.8)
     assert facet_of("lambert:albedo=.8,.5,.2") == go.Lambert((0.8, 0.5, 0.2))
     assert facet_of("mirror") == go.Mirror()
+    assert facet_of("ward").alpha == go.models()["ward"]().alpha  # which cannot be smooth
     compensated = facet_of("kulla-conty(base=conductor(alpha=.2,preset=Au))")
     assert compensated == go.KullaConty(go.Conductor.preset("Au", alpha=0.2))
     assert facet_of("alum-bronze") == go.material("alum-bronze")

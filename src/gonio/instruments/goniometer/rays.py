@@ -20,6 +20,7 @@ Kernel: TypeAlias = Any  # a value inside a kernel
 MOST_BOUNCES = 256
 MOST_STEPS = 4096  # bounces and crossings of a wall together
 OFFSET = 1e-6  # of the period's extent, by which a ray starts above its facet: some roundings of a position in float32
+UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3  # a ray's state: DARK is absorbed, LOST below the surface by rounding
 LANES = 1 << 21  # rays at a time: memory stays flat
 
 
@@ -100,6 +101,7 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     def step(
         place: Kernel, along: Kernel, weight: Kernel, bounces: Kernel, steps: Kernel, state: Kernel, rng: Kernel
     ) -> tuple[Kernel, ...]:
+        # on its way to a facet it may come to a wall of the period, or to the roof
         wall_x = dr.select(along.x == 0.0, dr.inf, (dr.select(along.x > 0.0, half_x, -half_x) - place.x) / along.x)
         wall_y = dr.select(along.y == 0.0, dr.inf, (dr.select(along.y > 0.0, half_y, -half_y) - place.y) / along.y)
         wall = dr.maximum(dr.minimum(wall_x, wall_y), 0.0)
@@ -108,6 +110,9 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
         ray.maxt = dr.minimum(wall, roof)
         hit = on.scene.ray_intersect_preliminary(ray, False, True)
         met = hit.is_valid()
+        away = ~met & (roof <= wall)
+        through = ~met & ~away
+        # at a facet it turns
         si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, met)
         frame = mi.Frame3f(si.n)
         back = frame.to_local(-along)
@@ -119,18 +124,17 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
         dark = kept & ~((drawn.pdf > 0.0) & (onward.z > 0.0))
         weight = dr.select(kept, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
         bounces = dr.select(kept, bounces + 1, bounces)
-        away = ~met & (roof <= wall)
-        through = ~met & ~away
+        along_next = dr.select(kept, dr.normalize(frame.to_world(onward)), along)
+        # through a wall it comes in again across from there
         beyond = place + along * wall
         is_x = wall_x <= wall_y
         beyond.x = dr.select(is_x, dr.select(along.x > 0.0, -half_x, half_x), beyond.x)
         beyond.y = dr.select(is_x, beyond.y, dr.select(along.y > 0.0, -half_y, half_y))
         place = dr.select(kept, si.p + si.n * offset, dr.select(through, beyond, place))
-        along = dr.select(kept, dr.normalize(frame.to_world(onward)), along)
         steps = steps + 1
         over = (bounces >= MOST_BOUNCES) | (steps >= MOST_STEPS)
         state = dr.select(behind | (over & ~away), LOST, dr.select(dark, DARK, dr.select(away, AWAY, state)))
-        return place, along, weight, bounces, steps, mi.UInt32(state), rng
+        return place, along_next, weight, bounces, steps, mi.UInt32(state), rng
 
     start = (place, along, mi.Color3f(1.0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(UNDERWAY), rng)
     labels = ("place", "along", "weight", "bounces", "steps", "state", "rng")
@@ -139,9 +143,6 @@ def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count
     )
     turned = mi.Vector3f(along.x * cos_phi + along.y * sin_phi, along.y * cos_phi - along.x * sin_phi, along.z)
     return Left(angle, turned, weight, bounces, state == AWAY, state == LOST)
-
-
-UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3
 
 
 def _every_other(bits: Kernel) -> Kernel:

@@ -277,7 +277,7 @@ def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> 
 def facet_of(text: str) -> BSDF:
     """A facet's material from text: as anywhere, or "conductor:Au" and "lambert:albedo=.8" for short.
 
-    What has a width is smooth, alpha = 0, where no alpha is given.
+    What may be smooth is, alpha = 0, where no alpha is given.
     """
     head, colon, rest = text.strip().partition(":")
     if colon and is_model(head):
@@ -286,7 +286,8 @@ def facet_of(text: str) -> BSDF:
     smooth: list[str] = []
     if is_model(text.partition("(")[0].strip()):
         kind, given = notation.taken_apart(text, "--facet")
-        if "alpha" in kind.parameters() and "alpha" not in given:
+        width = kind.parameters().get("alpha")
+        if width is not None and getattr(width, "low", None) == 0.0 and "alpha" not in given:
             smooth = ["alpha=0"]
     return notation.named(text, smooth)[0]
 
