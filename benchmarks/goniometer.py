@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -262,11 +263,13 @@ def later(folder: Path | None) -> None:
 def speed(folder: Path | None) -> None:
     with tempfile.TemporaryDirectory() as place:
         for surface, facet in (("gaussian", "mirror"), ("vgroove", "lambert"), ("spheres", "conductor:Au")):
+            begun = time.process_time()
             found = go.measure(surface=surface, facet=facet, output=f"{place}/a.binary")
+            busy = time.process_time() - begun
             error = f"standard error {100.0 * found.error:.2g} % in the median" if found.error else ""
             print(
                 f"  {surface} of {facet} as MERL, {found.cells} cells, {len(found.incidence)} angles of light: "
-                f"{found.rays / 1e6:.0f} M rays, {found.seconds:.0f} s, {found.rays / found.seconds / 1e6:.2f} M/s; "
+                f"{found.rays / 1e6:.0f} M rays, {found.seconds:.0f} s, {busy:.0f} s of a core; "
                 f"{error}"
             )
 
