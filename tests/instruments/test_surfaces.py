@@ -153,6 +153,44 @@ def test_a_surface_is_named_with_its_parameters() -> None:
     assert str(Gaussian(alpha=0.5)) == "gaussian(alpha=0.5)" and str(VGroove()) == "vgroove"
 
 
+OWN = """
+from dataclasses import dataclass
+import numpy as np
+from gonio.instruments.surfaces.base import Surface, of_heights, parameter
+
+@dataclass(frozen=True)
+class Waves(Surface):
+    name = "waves"
+    height: float = parameter(1.0, "of a wave", 0.0, 2.0)
+
+    def patch(self, rng):
+        return of_heights(self.height * np.sin(np.arange(16) * np.pi / 8.0) * np.ones((16, 1)))
+"""
+
+
+def test_a_surface_in_a_file_is_named_by_it(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    try:
+        surface = surface_of(f"{tmp_path / 'own.py'}:Waves", ["height=.5"])
+        assert str(surface) == "waves(height=0.5)" and surface.patch(np.random.default_rng(1)).top == pytest.approx(0.5)
+        with pytest.raises(InputError, match="from 0 to 2 expected"):
+            surface_of(f"{tmp_path / 'own.py'}:Waves", ["height=3"])
+    finally:
+        Surface.family.remove("waves")
+
+
+def test_a_patch_that_is_none_is_refused() -> None:
+    good = of_heights(np.zeros((4, 4)))
+    for vertices, faces, size in (
+        (good.vertices[:5], good.faces, good.size),
+        (good.vertices * np.nan, good.faces, good.size),
+        (good.vertices, good.faces[:0], good.size),
+        (good.vertices, good.faces, (0.0, 1.0)),
+    ):
+        with pytest.raises(InputError, match="are no patch"):
+            Patch(vertices, faces, size, 0.0)
+
+
 def test_a_surface_of_one_s_own_is_measured_by_its_name() -> None:
     @dataclass(frozen=True)
     class Steps(Surface):

@@ -41,14 +41,16 @@ class Detector:
 def measure(
     model: Annotated[
         str | None,
-        Argument(metavar="[MODEL]", help="A material; none with --surface.", autocompletion=completion.materials),
+        Argument(metavar="MODEL", help="A material; none with --surface.", autocompletion=completion.materials),
     ] = None,
     *,
     output: Annotated[Path, Option("-o", "--output", metavar="FILE", help="The suffix names the format.")],
     surface: Annotated[
         str | None,
         Option(
-            metavar="NAME", help="gaussian, vgroove, spheres or a file of heights (.exr); --param sets its parameters."
+            metavar="NAME",
+            help="gaussian, vgroove, spheres or a file of heights (.exr); --param sets its parameters.",
+            autocompletion=completion.surfaces,
         ),
     ] = None,
     facet: Annotated[str, Option(metavar="MODEL", help="mirror, lambert:albedo=.8, conductor:Au, ...")] = "mirror",

@@ -16,7 +16,7 @@ from ...arguments import shown
 from ...errors import InputError
 from ...measure import colours
 from ...measure.tables.base import Measurement
-from ...models import BSDF, is_model, notation
+from ...models import BSDF, is_model, notation, outside
 from ...owner import public
 from ..surfaces import base as surfaces
 from ..surfaces.base import Surface
@@ -153,7 +153,7 @@ def measure(
 
     material     what is evaluated, as text or object; None where a surface is measured
     output       the file, its suffix names the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None writes none
-    surface      gaussian, vgroove, spheres, a file of heights, or one of your own; with parameters behind a colon
+    surface      gaussian, vgroove, spheres, with parameters behind a colon; a file of heights; or one of your own
     facet        what its facets are made of, as text or object: "mirror", "lambert:albedo=.8", "conductor:Au"; as text,
                  facets are smooth (alpha = 0) where nothing else is said
     kind         of table in .gonio files: angles, half-difference, adaptive, specular, samples
@@ -265,11 +265,14 @@ def _filled(
 
 
 def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> Surface:
-    """A surface from text: "gaussian", "gaussian:alpha=.3,length=4", "gaussian(alpha=.3)" or a file of heights; its
-    parameters also as "name=value" each."""
+    """A surface from text: "gaussian", "gaussian:alpha=.3,length=4", "gaussian(alpha=.3)", a file of heights, or
+    FILE.py:CLASS; its parameters also as "name=value" each."""
     if preset:
         raise InputError("surfaces have no presets", "--preset", "such as --facet conductor:Au")
-    head, rest = _parted(text)
+    if outside.names_code(text):
+        head, rest = outside.member(text, where="--surface"), ""
+    else:
+        head, rest = _parted(text)
     own = dict(notation.assignment(part, "--surface") for part in rest.split(",") if part.strip())
     return surfaces.named(head, {**own, **dict(map(notation.assignment, assignments))})
 

@@ -34,6 +34,13 @@ class Patch:
     size: tuple[float, float]
     top: float
 
+    def __post_init__(self) -> None:
+        points, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        fits = points.ndim == faces.ndim == 2 and points.shape[1] == faces.shape[1] == 3 and len(faces) > 0
+        if not fits or faces.max() >= len(points) or not np.all(np.isfinite(points)) or not min(self.size) > 0.0:
+            what = f"vertices {points.shape}, faces {faces.shape} and size {self.size}"
+            raise InputError(f"{what} are no patch", "Patch", "finite vertices (N, 3), faces (M, 3) of their numbers")
+
 
 class Surface:
     """A kind of rough surface: a frozen dataclass of its parameters (`parameter`), with `patch`.
