@@ -320,7 +320,8 @@ def test_the_command_measures_and_says_so_in_json(tmp_path: Path, capsys: pytest
     assert (
         about["output"] == str(out) and about["kind"] == "angles" and about["incidence"] == pytest.approx([0.0, 30.0])
     )
-    assert about["title"].startswith("gaussian(alpha=0.2,squares=32) of conductor(")
+    assert about["title"] == "gaussian(alpha=0.2,squares=32) of conductor:Au"
+    assert read(out).source["facet"].startswith("conductor(eta=")
     assert read(out).shape["theta_i"] == 2
 
 

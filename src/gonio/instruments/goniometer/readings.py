@@ -48,6 +48,7 @@ class Rough(Specimen):
         seed: int,
         device: str = "cpu",
         progress: Callable[[int, int], None] | None = None,
+        facet_name: str = "",
     ) -> None:
         """rays_each: of one angle of incidence, over all patches; patches: rounded up to a multiple of `GROUPS`"""
         check_facet(facet)
@@ -60,8 +61,9 @@ class Rough(Specimen):
         self.rays_each, self.patches = rays_each, -(-patches // GROUPS) * GROUPS
         self._progress = progress or (lambda done, total: None)
         self.side = int(np.ceil(SQUARES * np.sqrt(2.0) / self.half_angle))  # squares over the radius of the disk
-        self.title = f"{surface} of {written(facet)}"
+        self.title = f"{surface} of {facet_name or written(facet)}"
         self.about = {
+            "format": "gonio",
             "instrument": "virtual gonioreflectometer",
             "surface": str(surface),
             "facet": written(facet),

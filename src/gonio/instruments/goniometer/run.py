@@ -204,7 +204,9 @@ def measure(
         if not isinstance(built, Surface):
             raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=.3"')
         made = facet_of(facet) if isinstance(facet, str) else facet
-        specimen = rough = Rough(built, made, detector, rays, patches, seed, device, progress)
+        specimen = rough = Rough(
+            built, made, detector, rays, patches, seed, device, progress, facet if isinstance(facet, str) else ""
+        )
         scout = _Scout()
         plan.table(scout)
         specimen.prepare(np.unique(np.concatenate(scout.theta_i)))
@@ -214,7 +216,7 @@ def measure(
         if bounces != "all":
             raise InputError(f"{bounces} bounces of a material asked for", "--bounces", "that is for --surface")
         named = notation.named(material)[0] if isinstance(material, str) else material
-        specimen, rough = Model(named, solid_angle), None
+        specimen, rough = Model(named, solid_angle, material if isinstance(material, str) else ""), None
     table, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
     error = table.beside.get("error")
     values = vars(table)["values"]

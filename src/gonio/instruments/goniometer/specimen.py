@@ -47,16 +47,17 @@ class Model(Specimen):
 
     exact: ClassVar[bool] = True
 
-    def __init__(self, material: BSDF, solid_angle: float | None) -> None:
+    def __init__(self, material: BSDF, solid_angle: float | None, title: str = "") -> None:
         if not material.isotropic:
             raise InputError("this material is anisotropic", material.name, "files of measurements hold isotropic ones")
         if material.delta != "never":
             what = f"{material.name} is a mirror here: a delta lobe has no value in any direction"
             raise InputError(what, "MODEL", "give it some roughness, such as --param alpha=.05")
-        self.material, self.title = material, written(material)
+        self.material, self.title = material, title or written(material)
         self._opening = opening(solid_angle)
         size = "a point" if solid_angle is None else f"{solid_angle:g} sr"
-        self.about = {"instrument": "a model, evaluated", "detector": size}
+        about = {"instrument": "a model, evaluated", "material": written(material), "detector": size}
+        self.about = {"format": "gonio", **about}
 
     def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
         total, weight = np.zeros((len(wo), 3)), np.zeros((len(wo), 1))
