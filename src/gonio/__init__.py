@@ -51,7 +51,13 @@ _PLACES = {
     "work.cluster": ("Cluster",),
 }
 _FLAT = {name: place for place, names in _PLACES.items() for name in names}
-_CALLABLE = ("emit", "models", "render", "verify")  # packages that can be called: go.models(), go.render(scene)
+_CALLABLE = (
+    "emit",
+    "measure",
+    "models",
+    "render",
+    "verify",
+)  # packages that can be called: go.models()
 _ALIASES = {"cluster": "Cluster", "mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
@@ -63,6 +69,7 @@ if TYPE_CHECKING:
     from .energy.materials.random_walk import RandomWalk
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
+    from .instruments.goniometer.run import measure
     from .measure.compression.compress import compress
     from .measure.fitting.fit import fit
     from .measure.materials.measured import Measured
@@ -143,7 +150,8 @@ __all__ = [
     "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
     "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
     "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "compress",
-    "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model", "models",
+    "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "measure", "method", "mix",
+    "model", "models",
     "never", "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
     "verify", "view", "width",
 ]  # fmt: skip

@@ -41,7 +41,7 @@ def test_modules_and_names_that_a_page_names_are_there(page: Path) -> None:
 
 # groups of entry points, and a function of the page's script
 NO_MODULES = re.compile(
-    r"gonio\.(models|distributions|maskings|fresnels|integrators|laws|languages|panels|verbs|formats|tables|addPanel)"
+    r"gonio\.(models|distributions|maskings|fresnels|integrators|laws|languages|panels|verbs|formats|tables|surfaces|addPanel)"
 )
 
 

@@ -314,6 +314,10 @@ print(fitted.interval[0, 1], fitted.text, fitted.notes)
 for row in go.compress(["gold.binary", "silk.bsdf"], "both.gonio", method="lowrank", bytes=8192):
     print(row.path, row.size, row.error, row.sphere)
 
+readout = go.measure(surface="gaussian:alpha=.3", facet=go.Mirror(), output="rough.gonio", theta_i=[0.0, 30.0])
+print(readout.table.beside["error"], readout.first, readout.later, readout.error)
+go.measure(gold, "gold.binary", noise=0.02, blocked=5.0, solid_angle=0.002)
+
 # ---------------------------------------------------------------------- long jobs
 
 again = go.resume("ball.exr.checkpoint", spp=64)

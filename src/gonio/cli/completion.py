@@ -27,6 +27,12 @@ def languages(incomplete: str) -> Offers:
     return _starting(incomplete, {name: language.title for name, language in languages().items()})
 
 
+def surfaces(incomplete: str) -> Offers:
+    from ..instruments.surfaces.base import Surface
+
+    return _starting(incomplete, Surface.family.titles())
+
+
 def laws(incomplete: str) -> Offers:
     from ..verify.laws import laws
 

@@ -6,10 +6,12 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from . import SAMPLE, format_of, parted, read
 from .compare import asymmetry
 from .formats.base import contents
-from .tables.base import ANGLES
+from .tables.base import ANGLES, Measurement
 
 
 def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
@@ -38,6 +40,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
         "wavelengths": None if table.wavelengths is None else [float(nm) for nm in table.wavelengths],
         "range": [low, high],
         "flaws": table.flaws,
+        "error": _typical_error(table),
         "albedo": {
             "angles": [float(angle) for angle in ANGLES],
             "rgb": [[float(x) for x in row] for row in albedo],
@@ -46,6 +49,14 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
         "reciprocity": asymmetry(table),
         "source": {key: value for key, value in table.source.items() if key != "format"},
     }
+
+
+def _typical_error(table: Measurement) -> float | None:
+    """The median of the standard errors, as shares of their values; None where none are known."""
+    error, values = table.beside.get("error"), vars(table).get("values")
+    if error is None or values is None or not np.any(values > 0.0):
+        return None
+    return float(np.median(error[values > 0.0] / values[values > 0.0]))
 
 
 def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
@@ -63,6 +74,8 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
         ("directions", "isotropic" if about["isotropic"] else "anisotropic"),
         ("values", f"{low:.5g} to {high:.5g}"),
     ]
+    if about["error"] is not None:
+        found.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
     for flaw, share in about["flaws"].items():
         found.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
     for angle, row in zip(about["albedo"]["angles"], about["albedo"]["rgb"], strict=True):

@@ -32,9 +32,9 @@ def convert(
       gonio convert ball.exr ball.hdr
       gonio convert gold.binary gold.bsdf
     """
-    from ... import measure
+    from ...measure import names_table
 
-    if measure.names_table(source):
+    if names_table(source):
         from ...measure import compare
 
         made = compare.convert(source, output)

@@ -28,9 +28,9 @@ def info(
       gonio info merl.npz:chrome
       gonio info tables
     """
-    from ... import measure
+    from ...measure import SAMPLE, names_table
 
-    if path == measure.SAMPLE or measure.names_table(path) or (path.lower().endswith(".npz") and not _is_baked(path)):
+    if path == SAMPLE or names_table(path) or (path.lower().endswith(".npz") and not _is_baked(path)):
         from ...measure import report
 
         about = report.describe(path)

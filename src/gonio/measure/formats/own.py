@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, did_you_mean
-from ..tables.base import Measurement
+from ..tables.base import Measurement, finite
 from .base import Format
 from .npz import arrays, written
 
 VERSION = 1  # of a file with one material
 SEVERAL = 2  # of a file with several
 MANIFEST = "manifest"
+BESIDE = ("error", "first")  # of `Measurement.beside`
 
 Arrays = Mapping[str, NDArray[np.generic]]
 
@@ -25,7 +26,8 @@ class Own(Format):
     """Gonio table: a .npz of plain arrays and a manifest in JSON (version, kind, title, source, axes with units).
 
     Values are f in 1/sr (of adaptive tables what the RGL's format means by them), angles are radians, wavelengths nm.
-    No array is compressed and nothing is pickled. Every kind of table is kept as it is.
+    No array is compressed and nothing is pickled. Every kind of table is kept as it is, with the standard error of each
+    value (`error`) and its part of one bounce (`first`) where an instrument found them.
 
     A file of version 2 holds several materials: its manifest has that of each under its name, their arrays are
     NAME/ARRAY, and those without a name before them belong to all.
@@ -61,14 +63,21 @@ class Own(Format):
             raise _no_manifest(where) from None
         cls = Measurement.family.get(kind, where)
         nm = parts.pop("wavelengths", None)
+        beside = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
         try:
             about = {"where": where, "title": title, "source": source, "wavelengths": nm}
-            return cls.from_arrays(parts, **about)
+            table = cls.from_arrays(parts, **about)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
             what = f"its arrays are not those of a {kind} table: {type(error).__name__}: {str(error)[:100]}"
             raise InputError(what, where, "the file is damaged") from None
+        shape = tuple(table.shape.values())
+        for name, array in beside.items():
+            if array.shape != shape:
+                raise InputError(f"{name} has shape {array.shape}, the values have {shape}", where)
+        table.beside.update(beside)
+        return table
 
     def _parts(self, data: bytes, where: str) -> tuple[dict[str, NDArray[np.generic]], dict[str, Any]]:
         """The arrays, and of a file with several materials the manifest of each."""
@@ -95,7 +104,8 @@ class Own(Format):
 
     def write(self, table: Measurement) -> bytes:
         about = {"title": table.title, "source": table.source, "wavelengths": table.wavelengths}
-        return self.file_of(type(table), table.arrays(), about)
+        beside = {name: np.asarray(array, np.float32) for name, array in table.beside.items()}
+        return self.file_of(type(table), {**table.arrays(), **beside}, about)
 
     def file_of(self, kind: type[Measurement], parts: Arrays, about: Mapping[str, Any]) -> bytes:
         """The file of a table of a kind, by its arrays and what is known of it: title, source, wavelengths."""

@@ -25,6 +25,8 @@ class Measurement:
     title        what was measured, as the file says
     source       where it comes from: format, and what else the file tells
     wavelengths  nm, one a channel; None where the channels are red, green and blue, or one grey
+    beside       arrays of the values' shape that an instrument found too, and `.gonio` files keep: "error", the
+                 standard error of each value, and "first", its part that met one facet only
 
     A kind gives `value`, `pdf` and `sample` in the words of `gonio.ops`, so that it runs in a render and in a shader.
     """
@@ -38,6 +40,7 @@ class Measurement:
     ) -> None:
         self.title, self.source = title, dict(source or {})
         self.wavelengths = None if wavelengths is None else np.asarray(wavelengths, np.float64)
+        self.beside: dict[str, NDArray[np.generic]] = {}
 
     # ------------------------------------------------------------------ as formulas
 

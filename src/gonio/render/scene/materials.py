@@ -44,8 +44,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from ... import measure
 from ...errors import GonioWarning, InputError
+from ...measure import SAMPLE, parted
 from ...models import BSDF, Parameter, library, models, outside
 from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
 
@@ -149,8 +149,8 @@ class MaterialPart(Part):
 
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
         """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""
-        path, item = measure.parted(file)
-        if not self._given and locate is not None and path != measure.SAMPLE:
+        path, item = parted(file)
+        if not self._given and locate is not None and path != SAMPLE:
             path = str(locate(path, pointer))
         return f"{path}:{item}" if item else path
 

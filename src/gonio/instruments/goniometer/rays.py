@@ -1,0 +1,159 @@
+"""Rays through a patch of surface without end: Mitsuba finds the facets, Dr.Jit follows the bounces."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from ...models import BSDF, guide_search
+from ...ops import backend
+from ...render import engine
+from ...render.types import Scene
+from ..surfaces.base import Patch
+
+Floats = NDArray[np.float64]
+Kernel: TypeAlias = Any  # a value inside a kernel
+
+MOST_BOUNCES = 256
+MOST_STEPS = 4096  # bounces and crossings of a wall together
+OFFSET = 1e-6  # of the period's extent, by which a ray starts above its facet: some roundings of a position in float32
+UNDERWAY, AWAY, DARK, LOST = 0, 1, 2, 3  # a ray's state: DARK is absorbed, LOST below the surface by rounding
+LANES = 1 << 21  # rays at a time: memory stays flat
+
+
+class Ground(NamedTuple):
+    """A patch in Mitsuba's hands.
+
+    scene   its triangles
+    size    of the period, x and y
+    top     height at which rays start, and have left
+    offset  by which a ray starts above its facet
+    """
+
+    scene: Scene
+    size: tuple[float, float]
+    top: float
+    offset: float
+
+
+def ground(patch: Patch) -> Ground:
+    """Build the acceleration structure of a patch."""
+    mi = engine.load()
+    mesh = mi.Mesh("patch", len(patch.vertices), len(patch.faces))
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(patch.vertices.ravel().astype(np.float32))
+    parameters["faces"] = mi.UInt32(patch.faces.ravel().astype(np.uint32))
+    parameters.update()
+    extent = max(*patch.size, float(np.abs(patch.vertices).max()))
+    return Ground(
+        mi.load_dict({"type": "scene", "patch": mesh}), patch.size, patch.top + 1e-4 * extent, OFFSET * extent
+    )
+
+
+class Left(NamedTuple):
+    """How each ray left.
+
+    angle      of incidence, by its number
+    direction  turned so that its light lay above x
+    weight     what is left of it, a colour
+    bounces    facets that it met
+    escaped    whether it left at all
+    lost       whether rounding brought it below the surface; what did neither was absorbed
+    """
+
+    angle: Kernel
+    direction: Kernel
+    weight: Kernel
+    bounces: Kernel
+    escaped: Kernel
+    lost: Kernel
+
+
+def shoot(on: Ground, facet: BSDF, cosines: Kernel, each: int, first: int, count: int, seed: int) -> Left:
+    """Send rays down to the surface, and follow them until they leave.
+
+    facet    bound to the variant's types
+    cosines  of the angles of incidence; azimuths are even over the turn, and places over the period
+    each     rays of one angle; all rays are numbered angle by angle
+    first    the number of the first ray that is sent now, of `count`
+    """
+    mi = engine.load()
+    number = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, first)
+    angle = number // dr.opaque(mi.UInt32, each)
+    rng = mi.PCG32(size=count, initstate=dr.opaque(mi.UInt64, seed), initseq=dr.opaque(mi.UInt64, first))
+    # over the period along a Z-shaped curve: rays that are neighbours meet the same facets, which is 3 times as fast
+    along_curve = mi.Float64(number % dr.opaque(mi.UInt32, each)) + mi.Float64(rng.next_float32())
+    index = mi.UInt32(dr.minimum(along_curve * dr.opaque(mi.Float64, 2.0**32 / each), 2.0**32 - 1.0))
+    u, v = (2.0**-16 * (mi.Float(_every_other(index >> bit)) + rng.next_float32()) for bit in (0, 1))
+    turn = rng.next_float32()
+    cos = dr.gather(mi.Float, cosines, angle)
+    half_x, half_y, top, offset = (
+        dr.opaque(mi.Float, x) for x in (0.5 * on.size[0], 0.5 * on.size[1], on.top, on.offset)
+    )
+    sin_phi, cos_phi = dr.sincos(2.0 * dr.pi * turn)
+    sin = dr.safe_sqrt(1.0 - dr.square(cos))
+    place = mi.Point3f((2.0 * u - 1.0) * half_x, (2.0 * v - 1.0) * half_y, top)
+    along = mi.Vector3f(-sin * cos_phi, -sin * sin_phi, -cos)
+
+    def step(
+        place: Kernel, along: Kernel, weight: Kernel, bounces: Kernel, steps: Kernel, state: Kernel, rng: Kernel
+    ) -> tuple[Kernel, ...]:
+        # on its way to a facet it may come to a wall of the period, or to the roof
+        wall_x = dr.select(along.x == 0.0, dr.inf, (dr.select(along.x > 0.0, half_x, -half_x) - place.x) / along.x)
+        wall_y = dr.select(along.y == 0.0, dr.inf, (dr.select(along.y > 0.0, half_y, -half_y) - place.y) / along.y)
+        wall = dr.maximum(dr.minimum(wall_x, wall_y), 0.0)
+        roof = dr.select(along.z > 0.0, (top - place.z) / along.z, dr.inf)
+        ray = mi.Ray3f(place, along)
+        ray.maxt = dr.minimum(wall, roof)
+        hit = on.scene.ray_intersect_preliminary(ray, False, True)
+        met = hit.is_valid()
+        away = ~met & (roof <= wall)
+        through = ~met & ~away
+        # at a facet it turns
+        si = hit.compute_surface_interaction(ray, mi.RayFlags.Minimal, met)
+        frame = mi.Frame3f(si.n)
+        back = frame.to_local(-along)
+        u = mi.Point3f(rng.next_float32(), rng.next_float32(), rng.next_float32())
+        drawn = facet.sample(back, u)
+        onward = mi.Vector3f(drawn.wi)
+        behind = met & (back.z <= 0.0)
+        kept = met & ~behind
+        dark = kept & ~((drawn.pdf > 0.0) & (onward.z > 0.0))
+        weight = dr.select(kept, weight * dr.select(dark, 0.0, mi.Color3f(drawn.weight)), weight)
+        bounces = dr.select(kept, bounces + 1, bounces)
+        along_next = dr.select(kept, dr.normalize(frame.to_world(onward)), along)
+        # through a wall it comes in again across from there
+        beyond = place + along * wall
+        is_x = wall_x <= wall_y
+        beyond.x = dr.select(is_x, dr.select(along.x > 0.0, -half_x, half_x), beyond.x)
+        beyond.y = dr.select(is_x, beyond.y, dr.select(along.y > 0.0, -half_y, half_y))
+        place = dr.select(kept, si.p + si.n * offset, dr.select(through, beyond, place))
+        steps = steps + 1
+        over = (bounces >= MOST_BOUNCES) | (steps >= MOST_STEPS)
+        state = dr.select(behind | (over & ~away), LOST, dr.select(dark, DARK, dr.select(away, AWAY, state)))
+        return place, along_next, weight, bounces, steps, mi.UInt32(state), rng
+
+    start = (place, along, mi.Color3f(1.0), mi.UInt32(0), mi.UInt32(0), mi.UInt32(UNDERWAY), rng)
+    labels = ("place", "along", "weight", "bounces", "steps", "state", "rng")
+    _, along, weight, bounces, _, state, _ = dr.while_loop(
+        start, lambda *now: now[5] == UNDERWAY, step, labels=labels, label="goniometer"
+    )
+    turned = mi.Vector3f(along.x * cos_phi + along.y * sin_phi, along.y * cos_phi - along.x * sin_phi, along.z)
+    return Left(angle, turned, weight, bounces, state == AWAY, state == LOST)
+
+
+def _every_other(bits: Kernel) -> Kernel:
+    """Bits 0, 2, 4, ... as a number of 16 bits: one coordinate of a place on the Z-shaped curve."""
+    for shift, mask in ((0, 0x55555555), (1, 0x33333333), (2, 0x0F0F0F0F), (4, 0x00FF00FF), (8, 0x0000FFFF)):
+        bits = (bits | (bits >> shift)) & mask
+    return bits
+
+
+def bound(facet: BSDF) -> BSDF:
+    """A facet's material for Mitsuba's types, ready for loops."""
+    mi = engine.load()
+    guide_search.prepare(facet)
+    return facet.bind(backend.types_like(mi.Float))

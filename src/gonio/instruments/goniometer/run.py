@@ -1,0 +1,303 @@
+"""Measure a material, or a surface, and write what was found."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import files
+from ...arguments import shown
+from ...errors import InputError
+from ...measure import colours
+from ...measure.tables.base import Measurement
+from ...models import BSDF, is_model, notation, outside
+from ...owner import public
+from ..surfaces import base as surfaces
+from ..surfaces.base import Surface
+from .plan import Plan, beside_lamp, grid_of, without
+from .readings import Rough
+from .specimen import BOUNCES, GROUPS, Model, Specimen
+
+Floats = NDArray[np.float64]
+DETECTOR = 0.006  # sr, a cone of 2.5 degrees about its axis: what sees a surface where nothing is said
+MOST_BLOCKED = 60.0  # degrees
+
+
+@dataclass(frozen=True)
+class Readout:
+    """What was measured.
+
+    table      the values, which `table.beside` has the standard errors of ("error") and, of a surface, the part that
+               met one facet only ("first")
+    path       the file, None where none was asked for
+    format     of the file
+    cells      how many values it holds
+    blocked    share of its cells that could not be measured
+    error      median standard error as a share of the value; None where values are exact
+    incidence  angles of incidence that rays were sent at, degrees; empty of a material, as are the next three
+    first      share of that light which leaves after one facet, luminance
+    later      after two facets or more
+    lost       share of the rays that rounding lost
+    rays       sent
+    seconds    it took
+    notes      what there is to know
+    """
+
+    table: Measurement
+    path: Path | None
+    format: str
+    cells: int
+    blocked: float
+    error: float | None
+    incidence: tuple[float, ...]
+    first: tuple[float, ...]
+    later: tuple[float, ...]
+    lost: tuple[float, ...]
+    rays: int
+    seconds: float
+    notes: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON: everything but the values."""
+        about = {name: value for name, value in vars(self).items() if name not in ("table", "path")}
+        path = None if self.path is None else str(self.path)
+        return {"output": path, "title": self.table.title, "kind": self.table.name, **about}
+
+
+class _Pass(Measurement):
+    """What a format asks for its values: each answer is a measurement."""
+
+    def __init__(
+        self,
+        specimen: Specimen,
+        bounces: str,
+        blocked: float,
+        noise: float,
+        seed: int,
+        part: int | None = None,
+        known: dict[int, Floats] | None = None,
+    ) -> None:
+        """known: answers by the number of the question, f without noise, that are the same in all parts"""
+        super().__init__(specimen.title, specimen.about)
+        self._specimen, self._bounces, self._blocked, self._noise, self._seed = specimen, bounces, blocked, noise, seed
+        self._part, self._known = part, {} if known is None else known
+        self._asked = 0
+
+    def part(self, part: int) -> _Pass:
+        """The same questions, to a part of the measurement."""
+        made = self._specimen, self._bounces, self._blocked, self._noise, self._seed
+        return _Pass(*made, part, self._known)
+
+    def first(self) -> _Pass:
+        """The same questions about the first bounce alone, without noise."""
+        return _Pass(self._specimen, "first", self._blocked, 0.0, self._seed, None, self._known)
+
+    def rgb(self, wo: Floats, wi: Floats) -> Floats:
+        self._asked += 1
+        f = self._known.get(self._asked)
+        if f is None:
+            f = self._specimen.f(beside_lamp(wo, wi, self._blocked), wi, self._part, self._bounces)
+            if self._specimen.exact or wo is wi:
+                self._known[self._asked] = f
+        if self._noise > 0.0:
+            # an adaptive table takes its coordinates from retro-reflection: one set, noise and all, serves all parts
+            whole = self._part is None or wo is wi
+            rng = np.random.default_rng([self._seed, 92, GROUPS if whole else self._part or 0, self._asked])
+            f = f * (1.0 + self._noise * (1.0 if whole else np.sqrt(GROUPS)) * rng.standard_normal(f.shape))
+        return f * wi[:, 2:]
+
+
+class _Scout(Measurement):
+    """What only notes at which angles of incidence values are asked for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.theta_i: list[Floats] = []
+
+    def rgb(self, wo: Floats, wi: Floats) -> Floats:
+        self.theta_i.append(np.unique(np.round(np.arctan2(np.hypot(wi[:, 0], wi[:, 1]), wi[:, 2]), 9)))
+        return np.repeat(wi[:, 2:], 3, 1)
+
+
+@public
+def measure(
+    material: BSDF | str | None = None,
+    output: str | Path | None = None,
+    *,
+    surface: Surface | str | None = None,
+    facet: BSDF | str = "mirror",
+    kind: str = "",
+    theta_i: Sequence[float] | None = None,
+    theta_r: Sequence[float] | None = None,
+    phi: Sequence[float] | None = None,
+    solid_angle: float | None = None,
+    noise: float = 0.0,
+    blocked: float = 0.0,
+    bounces: str = "all",
+    rays: int = 1_000_000,
+    patches: int = 16,
+    seed: int = 0,
+    device: str = "cpu",
+    progress: Callable[[int, int], None] | None = None,
+) -> Readout:
+    """Measure a material, or a surface built of facets, as a gonioreflectometer does.
+
+        go.measure("conductor(alpha=.2)", "gold.binary")                      # any material into any format
+        go.measure(surface="gaussian:alpha=.3", facet="mirror", output="rough.gonio")
+
+    material     what is evaluated, as text or object; None where a surface is measured
+    output       the file, its suffix names the format: .binary, .bsdf, .brdf, .astm, .zbsdf, .gonio; None writes none
+    surface      gaussian, vgroove, spheres, with parameters behind a colon; a file of heights; or one of your own
+    facet        what its facets are made of, as text or object: "mirror", "lambert:albedo=.8", "conductor:Au"; as text,
+                 facets are smooth (alpha = 0) where nothing else is said
+    kind         of table in .gonio files: angles, half-difference, adaptive, specular, samples
+    theta_i, theta_r, phi  angles of one's own, degrees (of light, of view, between them), for .gonio, .astm and .brdf
+    solid_angle  of the detector, sr: each value is the mean over that cone; None: a point for materials, .006 for
+                 surfaces
+    noise        standard deviation of a reading, as a share of it
+    blocked      degrees about the lamp where the detector cannot stand. MERL's cells are invalid there, samples left
+                 out; other tables hold the value at the rim
+    bounces      of a surface: "all" light, that of the "first" bounce, or what "later" ones add
+    rays         sent at each angle of incidence
+    patches      pieces of a random surface that are measured, rounded up to a multiple of 8; their spread is the
+                 standard error, together with that of the rays
+    seed         same seed, same values
+    device       "cpu", "cuda" or "auto", for surfaces
+    progress     called with rays sent and rays in all
+
+    Returns a `Readout`: the table with a standard error for each value, the energy, the time. Light is counted as it
+    leaves: f is what arrives in the cone, over its projected solid angle above the horizon. A surface's angles of
+    incidence are each measured where a format has few; else a grid is, as fine as the detector's half angle, up to 89
+    degrees, with values linear between. The sample turns, so what is measured is isotropic.
+
+    Raises InputError for what is unknown, out of range or cannot be written, before anything is computed.
+    """
+    begun = time.perf_counter()
+    if bounces not in BOUNCES:
+        raise InputError(f"'{bounces}' given, {', '.join(BOUNCES)} expected", "--bounces")
+    for name, value, high in (("noise", noise, 1.0), ("blocked", blocked, MOST_BLOCKED)):
+        if not 0.0 <= value <= high:
+            raise InputError(f"{value:g} given, 0 to {high:g} expected", f"--{name}")
+    if solid_angle is not None and not 0.0 < solid_angle < np.pi:
+        raise InputError(f"{solid_angle:g} sr given, more than 0 and less than pi expected", "--solid-angle")
+    for name, count, low, most in (
+        ("rays", rays, 1000, 1 << 40),
+        ("patches", patches, 1, 4096),
+        ("seed", seed, 0, 1 << 31),
+    ):
+        if not low <= count <= most:
+            raise InputError(f"{count} given, {low} to {most} expected", f"--{name}")
+    target = None if output is None else files.check_file(output)
+    plan = Plan(None if output is None else Path(output), kind, grid_of(theta_i, theta_r, phi))
+    specimen: Specimen
+    if surface is not None:
+        if material is not None:
+            raise InputError("a material and a surface given", "MODEL", "name what facets are made of by --facet")
+        detector = DETECTOR if solid_angle is None else solid_angle
+        built = surface_of(surface) if isinstance(surface, str) else surface
+        if not isinstance(built, Surface):
+            raise InputError(f"{shown(surface)} given, a surface expected", "surface", 'such as "gaussian:alpha=.3"')
+        made = facet_of(facet) if isinstance(facet, str) else facet
+        specimen = rough = Rough(
+            built, made, detector, rays, patches, seed, device, progress, facet if isinstance(facet, str) else ""
+        )
+        scout = _Scout()
+        plan.table(scout)
+        specimen.prepare(np.unique(np.concatenate(scout.theta_i)))
+    else:
+        if material is None:
+            raise InputError("nothing to measure", "MODEL", "name a material, or a surface by --surface")
+        if bounces != "all":
+            raise InputError(f"{bounces} bounces of a material asked for", "--bounces", "that is for --surface")
+        named = notation.named(material)[0] if isinstance(material, str) else material
+        specimen, rough = Model(named, solid_angle, material if isinstance(material, str) else ""), None
+    table, hidden, notes = _filled(plan, specimen, np.radians(blocked), noise, bounces, seed)
+    error = table.beside.get("error")
+    values = vars(table)["values"]
+    typical = None if error is None or not np.any(values > 0.0) else error[values > 0.0] / values[values > 0.0]
+    if target is not None:
+        files.write_whole(target, plan.file.write(table))
+        if error is not None and plan.file.writes != "any":
+            notes.append(f"{plan.file.name} files have no place for standard errors; .gonio files keep them")
+    return Readout(
+        table=table,
+        path=None if output is None else Path(output),
+        format="" if output is None else plan.file.name,
+        cells=int(np.prod(values.shape)) // 3,
+        blocked=hidden,
+        error=None if typical is None else float(np.median(typical)),
+        incidence=() if rough is None else tuple(np.degrees(rough.lights).tolist()),
+        first=() if rough is None else tuple((rough.first @ colours.LUMINANCE).tolist()),
+        later=() if rough is None else tuple((rough.later @ colours.LUMINANCE).tolist()),
+        lost=() if rough is None else tuple(rough.lost.tolist()),
+        rays=0 if rough is None else rough.sent,
+        seconds=time.perf_counter() - begun,
+        notes=tuple(notes),
+    )
+
+
+def _filled(
+    plan: Plan, specimen: Specimen, blocked: float, noise: float, bounces: str, seed: int
+) -> tuple[Measurement, float, list[str]]:
+    """The table with what stands beside its values, the share of blocked cells, and notes."""
+    asked = _Pass(specimen, bounces, blocked, noise, seed)
+    table = plan.table(asked)
+    values = vars(table)["values"]
+    if noise > 0.0 or not specimen.exact:
+        total, square = np.zeros_like(values), np.zeros_like(values)
+        for part in range(GROUPS):
+            off = vars(plan.table(asked.part(part)))["values"] - values
+            total += off
+            square += off * off
+        variance = np.maximum(square - total * total / GROUPS, 0.0) / (GROUPS - 1.0)
+        table.beside["error"] = np.sqrt(variance / GROUPS)
+    if bounces == "all" and not specimen.exact:
+        table.beside["first"] = vars(plan.table(asked.first()))["values"]
+    table, hidden, left_out = without(table, blocked)
+    notes = []
+    if blocked > 0.0 and not left_out:
+        notes.append(f"{table.name} tables have a value everywhere: beside the lamp they hold that of the rim")
+    return table, hidden, notes
+
+
+def surface_of(text: str, assignments: Sequence[str] = (), preset: str = "") -> Surface:
+    """A surface from text: "gaussian", "gaussian:alpha=.3,length=4", "gaussian(alpha=.3)", a file of heights, or
+    FILE.py:CLASS; its parameters also as "name=value" each."""
+    if preset:
+        raise InputError("surfaces have no presets", "--preset", "such as --facet conductor:Au")
+    if outside.names_code(text):
+        head, rest = outside.member(text, where="--surface"), ""
+    else:
+        head, rest = _parted(text)
+    own = dict(notation.assignment(part, "--surface") for part in rest.split(",") if part.strip())
+    return surfaces.named(head, {**own, **dict(map(notation.assignment, assignments))})
+
+
+def facet_of(text: str) -> BSDF:
+    """A facet's material from text: as anywhere, or "conductor:Au" and "lambert:albedo=.8" for short.
+
+    What may be smooth is, alpha = 0, where no alpha is given.
+    """
+    head, colon, rest = text.strip().partition(":")
+    if colon and is_model(head):
+        first, comma, more = rest.partition(",")
+        text = f"{head}({first if '=' in first else 'preset=' + first}{comma}{more})"
+    smooth: list[str] = []
+    if is_model(text.partition("(")[0].strip()):
+        kind, given = notation.taken_apart(text, "--facet")
+        width = kind.parameters().get("alpha")
+        if width is not None and getattr(width, "low", None) == 0.0 and "alpha" not in given:
+            smooth = ["alpha=0"]
+    return notation.named(text, smooth)[0]
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """("gaussian", "alpha=.3") of "gaussian:alpha=.3" and of "gaussian(alpha=.3)"."""
+    match = re.fullmatch(r"([\w-]+)\s*(?::(.*)|\((.*)\))?", text.strip(), re.DOTALL)
+    return (text.strip(), "") if match is None else (match[1], match[2] or match[3] or "")

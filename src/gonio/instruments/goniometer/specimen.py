@@ -1,0 +1,99 @@
+"""What lies on the goniometer: it is lit from one direction, and seen by a detector in another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...models import BSDF
+from ...models.notation import written
+
+Floats = NDArray[np.float64]
+GROUPS = 8  # independent parts of a measurement, whose spread is its standard error
+BOUNCES = {"all": "all light", "first": "light that met one facet", "later": "light that met two facets or more"}
+RINGS = (1, 6, 12, 18)  # points over the detector's opening, of equal area each
+
+
+class Specimen:
+    """Something that scatters light.
+
+    title  what it is
+    about  how it was measured, for the file
+    exact  whether all parts of a measurement agree, and there are no bounces to tell apart
+    """
+
+    title: str
+    about: dict[str, str]
+    exact: ClassVar[bool] = False
+
+    def prepare(self, theta_i: Floats) -> None:
+        """Get ready for light at these angles [rad]: `f` is asked for no others."""
+
+    def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
+        """f averaged over the detector's opening about wo, lit from wi, (N, 3), 1/sr.
+
+        part     one of `GROUPS` independent measurements; None is all of them together
+        bounces  of `BOUNCES`
+        """
+        raise NotImplementedError
+
+
+class Model(Specimen):
+    """A material's formulas."""
+
+    exact: ClassVar[bool] = True
+
+    def __init__(self, material: BSDF, solid_angle: float | None, title: str = "") -> None:
+        if not material.isotropic:
+            raise InputError("this material is anisotropic", material.name, "files of measurements hold isotropic ones")
+        if material.delta != "never":
+            what = f"{material.name} is a mirror here: a delta lobe has no value in any direction"
+            raise InputError(what, "MODEL", "give it some roughness, such as --param alpha=.05")
+        self.material, self.title = material, title or written(material)
+        self._opening = opening(solid_angle)
+        size = "a point" if solid_angle is None else f"{solid_angle:g} sr"
+        about = {"instrument": "a model, evaluated", "material": written(material), "detector": size}
+        self.about = {"format": "gonio", **about}
+
+    def f(self, wo: Floats, wi: Floats, part: int | None = None, bounces: str = "all") -> Floats:
+        total, weight = np.zeros((len(wo), 3)), np.zeros((len(wo), 1))
+        for seen in around(wo, self._opening):
+            cos = np.maximum(seen[:, 2:], 0.0) if len(self._opening) > 1 else np.ones((len(wo), 1))
+            seen = np.where(seen[:, 2:] > 0.0, seen, wo)
+            total += cos * np.asarray(self.material.eval(seen, wi, precision="float64"), np.float64)
+            weight += cos
+        return total / (weight * wi[:, 2:])
+
+
+def half_angle(solid_angle: float) -> float:
+    """The half angle of a cone, rad."""
+    return float(np.arccos(1.0 - solid_angle / (2.0 * np.pi)))
+
+
+def opening(solid_angle: float | None) -> Floats:
+    """Directions evenly over a cone about z, (N, 3); z alone where there is no cone."""
+    if solid_angle is None:
+        return np.array([[0.0, 0.0, 1.0]])
+    found, count = [], sum(RINGS)
+    for index, points in enumerate(RINGS):
+        before = sum(RINGS[:index])
+        cos = 1.0 - (before + 0.5 * points) / count * solid_angle / (2.0 * np.pi) if index else 1.0
+        phi = (np.arange(points) + 0.5 * index) * (2.0 * np.pi / points)
+        sin = np.sqrt(1.0 - cos * cos)
+        found.append(np.stack([sin * np.cos(phi), sin * np.sin(phi), np.full(points, cos)], -1))
+    return np.concatenate(found)
+
+
+def around(w: Floats, offsets: Floats) -> Sequence[Floats]:
+    """Each offset from z as an offset from w, (N, 3) each."""
+    if len(offsets) == 1:
+        return [w]
+    side = np.where(np.abs(w[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
+    x = np.cross(side, w)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    y = np.cross(w, x)
+    return [a * x + b * y + c * w for a, b, c in offsets]

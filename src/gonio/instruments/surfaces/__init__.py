@@ -1,0 +1,1 @@
+"""Surfaces that the virtual goniometer can build, one file each."""

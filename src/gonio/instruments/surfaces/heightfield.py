@@ -1,0 +1,63 @@
+"""Heights from a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from ...render import images
+from .base import Floats, Patch, Surface, of_heights, parameter
+
+LEAST, MOST = 4, 1024  # pixels along a side
+SEAM = 2.0  # how many times its usual step a map may jump from its last row to its first, and count as periodic
+
+
+@dataclass(frozen=True)
+class Heightfield(Surface):
+    """A map of heights, one value a pixel (.exr, .hdr, .npz): a measured surface, or one of your own.
+
+    A map that is not periodic, whose last row or column does not join its first, is continued by its mirror image.
+    """
+
+    name: ClassVar[str] = "heightfield"
+
+    file: str
+    spacing: float = parameter(1.0, "distance of two pixels, in the unit of the heights", 1e-12, 1e12)
+    scale: float = parameter(1.0, "factor on the heights", -1e12, 1e12)
+
+    @classmethod
+    def reads(cls, text: str) -> bool:
+        return Path(text).suffix.lower() in (".exr", ".hdr", ".npz")
+
+    def patch(self, rng: np.random.Generator) -> Patch:
+        heights = read(self.file) * (self.scale / self.spacing)  # in pixels, as float32 has few digits
+        for axis in (0, 1):
+            if _jump(heights, axis) > SEAM:
+                heights = np.concatenate([heights, np.flip(heights, axis)], axis)
+        return of_heights(heights)
+
+
+def read(file: str) -> Floats:
+    """The heights in a file, (y, x). InputError where they are none."""
+    pixels = images.read(file).pixels.astype(np.float64)
+    rows, columns = pixels.shape[:2]
+    if min(rows, columns) < LEAST or max(rows, columns) > MOST:
+        what = f"{columns} x {rows} pixels, {LEAST} to {MOST} along each side expected"
+        raise InputError(what, file, "scale or cut the map")
+    bad = int(np.count_nonzero(~np.isfinite(pixels).all(axis=2)))
+    if bad:
+        raise InputError(f"{bad} of {rows * columns} heights are not finite", file, "fill the gaps in the map")
+    if not np.array_equal(pixels[..., :1].repeat(3, axis=2), pixels):
+        raise InputError("three channels that differ, one height a pixel expected", file, "keep one channel only")
+    return pixels[..., 0]
+
+
+def _jump(heights: Floats, axis: int) -> float:
+    """The rms step from the last row to the first, over that between other rows."""
+    usual = float(np.sqrt(np.mean(np.square(np.diff(heights, axis=axis)))))
+    seam = float(np.sqrt(np.mean(np.square(np.take(heights, 0, axis) - np.take(heights, -1, axis)))))
+    return seam / usual if usual > 0.0 else float(seam > 0.0) * 2.0 * SEAM

@@ -1,0 +1,92 @@
+"""Hemispheres on a plane."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from ...errors import InputError
+from .base import Floats, Patch, Surface, parameter
+
+SIDE = 16.0  # of the period, in radii
+SPLITS = 4  # of an icosahedron's facets, into four each
+TRIES = 200_000
+
+
+@dataclass(frozen=True)
+class Spheres(Surface):
+    """Hemispheres of one size, scattered over a plane without touching: beads half sunk into their binder.
+
+    A ball is a split icosahedron, each turned at random, so that all of them together have every normal.
+    """
+
+    name: ClassVar[str] = "spheres"
+    random: ClassVar[bool] = True
+
+    coverage: float = parameter(0.4, "share of the plane that is covered", 0.0, 0.5)
+
+    def patch(self, rng: np.random.Generator) -> Patch:
+        places = self._places(rng)
+        vertices, faces = [_SQUARE * (0.5 * SIDE + 2.0)], [np.array([[0, 1, 2], [0, 2, 3]])]
+        ball, triangles = _ball()
+        turns = Rotation.random(len(places), random_state=rng) if len(places) else None
+        shifts = np.array([(x, y, 0.0) for x in (-SIDE, 0.0, SIDE) for y in (-SIDE, 0.0, SIDE)])
+        start = 4
+        for index, place in enumerate(places):
+            turned = turns[index].apply(ball) if turns is not None else ball
+            for centre in np.append(place, 0.0) + shifts:
+                if np.abs(centre).max() < 0.5 * SIDE + 1.0:
+                    vertices.append(turned + centre)
+                    faces.append(triangles + start)
+                    start += len(ball)
+        top = 1.0 if len(places) else 0.0
+        return Patch(np.concatenate(vertices), np.concatenate(faces).astype(np.uint32), (SIDE, SIDE), top)
+
+    def _places(self, rng: np.random.Generator) -> Floats:
+        """Centres in the period, two radii or more apart."""
+        wanted = round(self.coverage * SIDE * SIDE / np.pi)
+        found = np.empty((0, 2))
+        for place in rng.uniform(-0.5 * SIDE, 0.5 * SIDE, (TRIES, 2)):
+            if len(found) == wanted:
+                return found
+            apart = np.abs(found - place)
+            if not len(found) or np.square(np.minimum(apart, SIDE - apart)).sum(axis=1).min() > 4.0:
+                found = np.vstack([found, place])
+        raise InputError(f"no room for {wanted} hemispheres without touching", "spheres.coverage", "cover less")
+
+
+_SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+
+
+@functools.cache
+def _ball() -> tuple[Floats, NDArray[np.int64]]:
+    """A unit sphere's vertices and triangles; what is below the plane is never seen."""
+    hull = ConvexHull(_icosahedron())
+    points, faces = hull.points, hull.simplices
+    for _ in range(SPLITS):
+        corners = points[faces]
+        middles = corners + np.roll(corners, -1, axis=1)  # of a b, b c, c a
+        middles /= np.linalg.norm(middles, axis=-1, keepdims=True)
+        (a, b, c), (ab, bc, ca) = corners.swapaxes(0, 1), middles.swapaxes(0, 1)
+        parts = [np.stack(part, 1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        points = np.concatenate(parts).reshape(-1, 3)
+        faces = np.arange(len(points)).reshape(-1, 3)
+    corners = points[faces]
+    inward = np.einsum(
+        "ni,ni->n", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), corners[:, 0]
+    )
+    faces = np.where(inward[:, None] < 0.0, faces[:, ::-1], faces)
+    return points, faces
+
+
+def _icosahedron() -> Floats:
+    golden = 0.5 * (1.0 + np.sqrt(5.0))
+    corners = [(0.0, x, y * golden) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+    points = np.array([np.roll(corner, turn) for corner in corners for turn in range(3)])
+    return points / np.linalg.norm(points, axis=1, keepdims=True)

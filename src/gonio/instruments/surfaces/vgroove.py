@@ -1,0 +1,50 @@
+"""V-grooves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from .base import Floats, Patch, Surface, parameter
+
+GROOVES = 256
+STEEPEST = np.radians(89.0)
+
+
+@dataclass(frozen=True)
+class VGroove(Surface):
+    """Long symmetric V-grooves whose upper edges lie in one plane (Torrance1967, OrenNayar1994).
+
+    Both sides of a groove slope by the same angle theta_a. Grooves of every slope take up the share of the surface that
+    Oren and Nayar's slope-area distribution gives them, exp(-theta_a^2 / (2 sigma^2)) sin theta_a; with `slope` all
+    have that one. The sample turns while it is measured, so grooves run in all directions.
+    """
+
+    name: ClassVar[str] = "vgroove"
+
+    sigma: float = parameter(0.3, "standard deviation of the slope's angle", 0.0, 1.5, "rad")
+    slope: float | None = parameter(None, "the angle of all slopes, instead of a distribution", 0.0, 1.5, "rad")
+
+    def patch(self, rng: np.random.Generator) -> Patch:
+        depth = 0.5 * np.tan(self.slopes(GROOVES) if self.slope is None else np.full(GROOVES, self.slope))
+        depth = np.concatenate([depth[-1:], depth, depth[:1]])  # one more on each side
+        x = np.arange(2 * len(depth) + 1) * 0.5 - 1.0 - 0.5 * GROOVES
+        z = np.zeros(len(x))
+        z[1::2] = -depth
+        y = np.array([-1.0, 1.0]) * (0.5 * GROOVES + 1.0)
+        vertices = np.stack([np.tile(x, 2), np.repeat(y, len(x)), np.tile(z, 2)], -1)
+        a = np.arange(len(x) - 1, dtype=np.uint32)
+        b, c, d = a + 1, a + 1 + len(x), a + len(x)
+        faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).astype(np.uint32)
+        return Patch(vertices, faces, (float(GROOVES), float(GROOVES)), 0.0)
+
+    def slopes(self, count: int) -> Floats:
+        """Angles that part the distribution into equal shares."""
+        theta = np.linspace(0.0, STEEPEST, 1 << 14)
+        density = np.exp(-0.5 * np.square(theta / max(self.sigma, 1e-9))) * np.sin(theta)
+        total = np.cumsum(density)
+        if total[-1] <= 0.0:
+            return np.zeros(count)
+        return np.interp((np.arange(count) + 0.5) / count, total / total[-1], theta)
