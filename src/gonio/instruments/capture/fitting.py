@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,16 @@ FARTHEST = 8.0  # standard deviations to which a fault of the calibration may go
 LEAST_NOISE = 1e-4  # relative: below it pixels are as good as exact, and a number of exactly 0 could not be divided by
 BALL = ("ball.x", "ball.y", "ball.radius")
 LAMP = ("right", "down", "intensity")
-# Residuals, derivatives, which numbers these are along, tiles
-Row = tuple[NDArray[np.floating], NDArray[np.floating], list[int], NDArray[np.int64]]
+
+
+class Rows(NamedTuple):
+    """Pixels of one lamp in one channel: residuals (N,), derivatives (N, K), which numbers these are along, tiles."""
+
+    residual: NDArray[np.floating]
+    slope: NDArray[np.floating]
+    which: list[int]
+    tile: NDArray[np.int64]
+    lamp: int
 
 
 @dataclass(frozen=True)
@@ -61,6 +70,16 @@ class Faults:
         found = [name for name, sd in zip(BALL, self.ball, strict=True) if sd > 0.0 and ball]
         found += ["scale"] if self.scale > 0.0 else []
         return found + [f"{lamp}.{name}" for lamp in lamps for name in self.of_lamp]
+
+    def slack(self, scene: Scene) -> tuple[float, float]:
+        """By how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: three
+        standard deviations."""
+        ball = (
+            0.0
+            if scene.ball is None
+            else float(np.hypot(self.ball[0] * scene.ball.pixel / scene.ball.radius, self.ball[2]))
+        )
+        return 3.0 * ball, 3.0 * self.direction
 
     @property
     def of_lamp(self) -> tuple[str, ...]:
@@ -217,7 +236,9 @@ class Problem:
 
     def _weight(self, part: Pixels, predicted: Floats) -> Floats:
         floor = 1e-6 * float(np.abs(part.value).max())
-        spread = np.sqrt((self.noise * predicted) ** 2 + part.step**2 + floor**2)
+        # a pixel that a fault has moved into the dark is not weighed by the dark
+        size = np.maximum(np.abs(predicted), 0.1 * np.abs(part.value))
+        spread = np.sqrt((self.noise * size) ** 2 + part.step**2 + floor**2)
         return np.asarray(1.0 / (spread * np.sqrt(self.alike)))
 
     def off(self, numbers: Floats) -> list[tuple[Pixels, Floats, Floats]]:
@@ -230,7 +251,7 @@ class Problem:
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
         """By lamp and channel, and the priors."""
-        return [row[:3] for row in self._linearized(numbers)] + self._priors(numbers)
+        return [(one.residual, one.slope, one.which) for one in self.rows(numbers)] + self._priors(numbers)
 
     def _priors(self, numbers: Floats) -> list[Linearized]:
         if not self.open:
@@ -238,12 +259,12 @@ class Problem:
         faults = list(range(self.own, self.count))
         return [(numbers[self.own :], np.eye(len(faults)), faults)]
 
-    def _linearized(self, numbers: Floats) -> list[Row]:
-        """By lamp and channel (residuals, derivatives, which numbers, tiles)."""
+    def rows(self, numbers: Floats) -> list[Rows]:
+        """By lamp and channel."""
         if self._weights is None:
             self.reweigh(numbers)
         assert self._weights is not None
-        found: list[Row] = []
+        found: list[Rows] = []
         for part, weight in zip(self.parts, self._weights, strict=True):
             predicted, slope = self.predicted(part, numbers, True)
             assert slope is not None
@@ -255,7 +276,7 @@ class Problem:
                 for channel in range(CHANNELS):
                     which = self.of_row(lamp, channel)
                     rows = slice(int(start), int(end))
-                    found.append((residual[rows, channel], slope[rows, channel], which, part.tile[rows]))
+                    found.append(Rows(residual[rows, channel], slope[rows, channel], which, part.tile[rows], lamp))
         return found
 
     # ------------------------------------------------------------------ how sure
@@ -265,7 +286,7 @@ class Problem:
         hessian = np.zeros((self.count, self.count))
         tiles = 1 + max(int(part.tile.max()) for part in self.parts)
         whole = np.zeros((tiles, self.count))
-        for residual, slope, which, tile in self._linearized(numbers):
+        for residual, slope, which, tile, _ in self.rows(numbers):
             hessian[np.ix_(which, which)] += slope.T @ slope
             for column, number in enumerate(which):
                 whole[:, number] += np.bincount(tile, weights=residual * slope[:, column], minlength=tiles)

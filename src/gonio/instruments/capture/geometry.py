@@ -266,10 +266,10 @@ class Seen(NamedTuple):
 
 
 def on_ball(ray: Array, center: Array, radius: Array, lamp: Array) -> Seen:
-    """What rays see on a ball; NaN where they miss it. The frame: z the normal, x and y by Duff2017."""
+    """What rays see on a ball; those that miss it, its limb. The frame: z the normal, x and y by Duff2017."""
     along = ops.dot(ray, center)
     root = ops.sqr(along) - ops.dot(center, center) + ops.sqr(radius)
-    point = ray * (along - ops.sqrt(root))
+    point = ray * (along - ops.safe_sqrt(root))
     normal = (point - center) / radius
     # the normal faces the camera, so that its z, which is forward, is always negative: a frame without a seam
     a = -1.0 / (normal.z - 1.0)

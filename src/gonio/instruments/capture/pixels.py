@@ -140,13 +140,16 @@ class Chosen:
         return sum(map(len, self.parts))
 
 
-def choose(scene: Scene, photographs: Sequence[Photograph], grazing: float) -> Chosen:
+def choose(
+    scene: Scene, photographs: Sequence[Photograph], grazing: float, slack: tuple[float, float] = (0.0, 0.0)
+) -> Chosen:
     """Every pixel of a sample, but the saturated, the shadowed, and those seen or lit from beyond an angle, degrees.
 
+    slack  by how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: what they
+           could move beyond that angle is left out too
     Raises InputError, with the file's name, where a photograph shows no sample where there should be one.
     """
     counts = dict.fromkeys(("used", "saturated", "shadowed", "grazing"), 0)
-    lowest = float(np.cos(np.radians(grazing)))
     gathered: dict[Kind, list[Pixels]] = {"ball": [], "flat": []}
     tiles = 0
     for shot in photographs:
@@ -154,13 +157,13 @@ def choose(scene: Scene, photographs: Sequence[Photograph], grazing: float) -> C
             continue
         kind: Kind = shot.shot.sample
         lamp = scene.names.index(shot.shot.light)
-        place, own = _on_sample(scene, kind)
+        place, own = on_sample(scene, kind)
         row, column = own
         wo, wi, _ = directions(scene, kind, place, np.full(len(place), lamp))
         fine = np.isfinite(wo).all(axis=1) & np.isfinite(wi).all(axis=1)
         saturated = shot.saturated[row, column]
         shadowed = fine & (wi[:, 2] <= 0.0)
-        steep = ~fine | (~shadowed & ((wo[:, 2] < lowest) | (wi[:, 2] < lowest)))
+        steep = ~shadowed & is_steep(wo, wi, grazing, slack if kind == "ball" else (0.0, slack[1]))
         kept = ~saturated & ~shadowed & ~steep
         _check_sample(shot, scene, kind, own, kept | (saturated & ~shadowed & ~steep))
         if saturated[~shadowed & ~steep].all():
@@ -188,6 +191,16 @@ def choose(scene: Scene, photographs: Sequence[Photograph], grazing: float) -> C
     return Chosen(parts, counts)
 
 
+def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.bool_]:
+    """Whether a pixel is seen or lit from beyond an angle, degrees, or might be: where the outline is off by a share s,
+    the normal turns by as much as takes sin theta_o to (1 + s) sin theta_o."""
+    outline, lamp = slack
+    theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
+    turned = np.arcsin(np.minimum((1.0 + outline) * np.sin(theta_o), 1.0)) - theta_o
+    turned = np.where((1.0 + outline) * np.sin(theta_o) < 1.0, turned, np.inf) if outline > 0.0 else 0.0
+    return np.asarray(np.maximum(theta_o, theta_i + lamp) + turned > np.radians(grazing))
+
+
 def _joined(group: list[Pixels]) -> Pixels:
     """As one, in the order of the lamps."""
     whole = Pixels(
@@ -201,7 +214,7 @@ def _joined(group: list[Pixels]) -> Pixels:
     return whole.at(np.argsort(whole.lamp, kind="stable"))
 
 
-def _on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
+def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Middles of the pixels that look at a sample, and (row, column) of each."""
     if kind == "ball":
         assert scene.ball is not None, "a photograph shows it"

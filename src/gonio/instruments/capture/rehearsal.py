@@ -51,7 +51,7 @@ def take(
     target.mkdir(exist_ok=True)
     rng = np.random.default_rng(seed)
     for shot in told.photographs:
-        radiance = _rendered(told, shot.light, shot.sample, material, spp)
+        radiance = _rendered(told, shot.light, shot.sample, material, spp, seed)
         for one in shot.pictures:
             if one.seconds is None:
                 raise InputError(f"no exposure time of '{one.file}'", "calibration", 'add "seconds"')
@@ -76,7 +76,7 @@ def _stored(values: Floats, calibration: Calibration) -> np.ndarray:
     return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
-def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF, spp: int) -> Floats:
+def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF, spp: int, seed: int) -> Floats:
     """Radiance of the sample under one lamp, by Gonio's own renderer."""
     camera, lamp = calibration.camera, calibration.lights[light]
     if lamp.position is None or camera.k1 or camera.k2:
@@ -120,6 +120,6 @@ def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF,
     with tempfile.TemporaryDirectory(prefix="gonio-") as folder:
         (Path(folder) / "scene.json").write_text(json.dumps(scene))
         overrides = {} if sample == "reference" else {"shapes.0.material": material}
-        prepared = run.prepare(Request(Path(folder), output=Path(folder) / "p.npz", overrides=overrides))
+        prepared = run.prepare(Request(Path(folder), output=Path(folder) / "p.npz", overrides=overrides, seed=seed))
         run.work(prepared)
         return np.asarray(run.finished(prepared.render, False), np.float64)

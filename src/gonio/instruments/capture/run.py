@@ -13,15 +13,16 @@ import numpy as np
 from ... import files
 from ...errors import InputError, did_you_mean
 from ...measure import format_of
-from ...measure.fitting.fit import Fit
+from ...measure.fitting.fit import Fit, moving_of
 from ...models import BSDF
 from ...owner import public
-from . import advice, fitting, geometry, pixels
+from . import advice, fitting, geometry, pixels, planning
 from . import calibration as calibrations
 from . import photographs as photographs_of
 from .calibration import NAME, Calibration, Floats
 from .photographs import Photograph
-from .pixels import GRAZING, Chosen, Gathered, Scene
+from .pixels import GRAZING, Chosen, Gathered, Kind, Scene
+from .planning import Proposal
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,33 @@ class Capture:
     def material(self) -> BSDF:
         """The fitted material."""
         return self.fit.material
+
+    def next(self, count: int = 1, places: Sequence[Sequence[float]] | None = None) -> list[Proposal]:
+        """Which photographs to take next, the best first: where the lamp should stand.
+
+        places  where it can stand, in the camera's frame; None: anywhere at the distance of the lamps so far
+        """
+        if self.fitted is None:
+            raise InputError("no material was fitted", "model", "a plan needs to know what is to be told")
+        problem, scene = self.fitted.problem, self.scene
+        kind = self.chosen.parts[0].kind
+        away = np.linalg.norm(scene.lamps - fitting.middle_of(scene), axis=1)
+        setting = planning.Setting(
+            scene,
+            kind,
+            self.fit.material,
+            problem.moving,
+            problem.faults,
+            np.median(scene.intensities, axis=0),
+            problem.noise,
+            problem.alike,
+            float(np.median(self.chosen.parts[0].step)),
+        )
+        hessian, _ = problem.information(self.fitted.numbers)
+        shared = problem.count - len(scene.names) * len(problem.faults.of_lamp)
+        known = planning.without(hessian + problem.prior(), shared)
+        lamps = planning.places(scene, kind, float(np.median(away))) if places is None else _points(places)
+        return planning.propose(setting, lamps, count, known)
 
     def save(self, path: str | Path) -> Path:
         """Write the samples as a table (.gonio, .binary, .astm, ...), or all that was found as .json."""
@@ -141,7 +169,8 @@ def capture(
         shots.append(photographs_of.read(shot, stated, path.parent))
     scene = _scene(stated, shots)
     progress("chooses pixels")
-    chosen = pixels.choose(scene, shots, grazing)
+    slack = fitting.Faults.of(stated.uncertainty, scene).slack(scene)
+    chosen = pixels.choose(scene, shots, grazing, slack)
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
     gathered = pixels.gather(scene, chosen, title=path.parent.resolve().name)
@@ -151,6 +180,49 @@ def capture(
         found = fitting.fitted(scene, chosen, model, stated.uncertainty, fixed=fixed, free=free)
     warnings = advice.on(scene, chosen, found)
     return Capture(scene, gathered, chosen.counts, found, warnings, tuple(shots), chosen)
+
+
+@public
+def plan(
+    calibration: str | Path,
+    model: str | BSDF,
+    count: int = 4,
+    *,
+    places: Sequence[Sequence[float]] | None = None,
+    fixed: Mapping[str, object] | None = None,
+    free: Sequence[str] = (),
+) -> list[Proposal]:
+    """Which photographs to take, before there are any: places of the lamp that tell most of a material like the model.
+
+    calibration  a calibration file; the ball needs its place (or the flat sample), one lamp its place and intensity
+    model        what will be fitted, set to what the material may be like
+    places       where the lamp can stand; None: anywhere at the distance of the calibration's lamps
+    """
+    path = Path(calibration).expanduser()
+    stated = calibrations.read(path)
+    kind: Kind = "ball" if stated.ball is not None else "flat"
+    ball = None if stated.ball is None else geometry.placed(stated.ball, stated.camera, ())
+    lamps = [np.array(lamp.position) for lamp in stated.lights.values() if lamp.position is not None]
+    light = next((found for name in stated.lights if (found := stated.intensity(name)) is not None), None)
+    if not lamps or light is None or (ball is None and stated.flat is None):
+        hint = "a plan needs a ball or a flat sample, and a lamp with its position and intensity"
+        raise InputError("too little is known for a plan", str(path), hint)
+    scene = Scene(stated.camera, ball, stated.flat, np.array(lamps), np.tile(light, (len(lamps), 1)), ())
+    material, moving = moving_of(model, fixed=fixed, free=free)
+    away = np.linalg.norm(scene.lamps - fitting.middle_of(scene), axis=1)
+    setting = planning.Setting(scene, kind, material, moving, fitting.Faults.of(stated.uncertainty, scene), light)
+    stand = planning.places(scene, kind, float(np.median(away))) if places is None else _points(places)
+    return planning.propose(setting, stand, count)
+
+
+def _points(places: Sequence[Sequence[float]]) -> Floats:
+    try:
+        found = np.array(places, np.float64)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+        raise InputError("places of the lamp are no (N, 3) numbers", "places", "such as [[0, -300, 200]]")
+    return found
 
 
 def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration]:
