@@ -196,8 +196,8 @@ def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] 
     the normal turns by as much as takes sin theta_o to (1 + s) sin theta_o."""
     outline, lamp = slack
     theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
-    turned = np.arcsin(np.minimum((1.0 + outline) * np.sin(theta_o), 1.0)) - theta_o
-    turned = np.where((1.0 + outline) * np.sin(theta_o) < 1.0, turned, np.inf) if outline > 0.0 else 0.0
+    moved = (1.0 + outline) * np.sin(theta_o)
+    turned = np.where(moved <= 1.0, np.arcsin(np.minimum(moved, 1.0)) - theta_o, np.inf)
     return np.asarray(np.maximum(theta_o, theta_i + lamp) + turned > np.radians(grazing))
 
 
