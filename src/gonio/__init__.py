@@ -38,6 +38,7 @@ _PLACES = {
     "models.library": ("fits", "material", "materials"),
     "measure.fitting.fit": ("fit",),
     "energy": ("Albedo", "albedo"),
+    "instruments.capture.run": ("capture",),
     "render": ("resume",),
     "render.integrators": ("Integrator",),
     "verify.laws": ("Law",),
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from .energy.materials.random_walk import RandomWalk
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
+    from .instruments.capture.run import capture
     from .measure.fitting.fit import fit
     from .measure.materials.measured import Measured
     from .members import register
@@ -140,8 +142,8 @@ __all__ = [
     "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty",
     "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
     "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
-    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "emit", "file",
-    "fit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model", "models", "never",
-    "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
+    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare",
+    "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "method", "mix", "model", "models",
+    "never", "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
     "verify", "view", "width",
 ]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -28,6 +28,7 @@ GAUSS = 0.5 / np.sqrt(3.0)  # of a pixel: where two points integrate cubics exac
 CELLS = (60, 60, 36)  # of theta_h by its root, theta_d and phi_d, in which samples are gathered
 
 Kind = Literal["ball", "flat"]
+FATES = ("used", "saturated", "shadowed", "grazing")  # of the sample's pixels
 
 
 @dataclass(frozen=True)
@@ -131,10 +132,12 @@ def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64])
 
 @dataclass(frozen=True)
 class Chosen:
-    """The pixels of all photographs that count, and how many of the sample's were left out, by why."""
+    """The pixels of all photographs that count, how many of the sample's were left out, by why, and a map of each
+    photograph: 0 beside the sample, else 1 + the place in `FATES`."""
 
     parts: tuple[Pixels, ...]
     counts: Mapping[str, int]
+    maps: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return sum(map(len, self.parts))
@@ -149,7 +152,7 @@ def choose(
            could move beyond that angle is left out too
     Raises InputError, with the file's name, where a photograph shows no sample where there should be one.
     """
-    counts = dict.fromkeys(("used", "saturated", "shadowed", "grazing"), 0)
+    counts, maps = dict.fromkeys(FATES, 0), {}
     gathered: dict[Kind, list[Pixels]] = {"ball": [], "flat": []}
     tiles = 0
     for shot in photographs:
@@ -170,10 +173,11 @@ def choose(
             raise InputError(
                 "every pixel of the sample is saturated", shot.name, "expose it for a shorter time, or add such one"
             )
-        counts["saturated"] += int(np.sum(saturated))
-        counts["shadowed"] += int(np.sum(shadowed & ~saturated))
-        counts["grazing"] += int(np.sum(steep & ~saturated))
-        counts["used"] += int(np.sum(kept))
+        fate = np.select([kept, saturated, shadowed], [1, 2, 3], 4).astype(np.uint8)
+        maps[shot.name] = np.zeros(shot.saturated.shape, np.uint8)
+        maps[shot.name][own] = fate
+        for number, name in enumerate(FATES, 1):
+            counts[name] += int(np.sum(fate == number))
         across = -(-scene.camera.size[0] // TILE)
         tile = tiles + (row // TILE) * across + column // TILE
         tiles += across * -(-scene.camera.size[1] // TILE)
@@ -188,7 +192,7 @@ def choose(
             )
         )
     parts = tuple(_joined(group) for group in gathered.values() if group)
-    return Chosen(parts, counts)
+    return Chosen(parts, counts, maps)
 
 
 def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.bool_]:

@@ -43,6 +43,11 @@ class Proposal:
     names: tuple[str, ...]
     errors: Floats
 
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        errors = {name: float(error) for name, error in zip(self.names, self.errors, strict=True)}
+        return {"position": list(self.position), "angle": self.angle, "errors": errors}
+
     def __str__(self) -> str:
         place = ", ".join(f"{x:.4g}" for x in self.position)
         told = ", ".join(f"{n} +- {NORMAL_95 * e:.2g}" for n, e in zip(self.names, self.errors, strict=True))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import files
-from ...errors import InputError, did_you_mean
+from ...errors import InputError
 from ...measure import format_of
 from ...measure.fitting.fit import Fit, moving_of
 from ...models import BSDF
@@ -162,18 +162,18 @@ def capture(
     """
     if not 10.0 <= grazing < 90.0:
         raise InputError(f"{grazing:g} degrees given, 10 to less than 90 expected", "grazing")
-    path, stated = _calibration(photographs, calibration)
+    path, stated, folder = _calibration(photographs, calibration)
     shots = []
     for shot in stated.photographs:
         progress(f"reads {shot.pictures[0].file}")
-        shots.append(photographs_of.read(shot, stated, path.parent))
+        shots.append(photographs_of.read(shot, stated, folder))
     scene = _scene(stated, shots)
     progress("chooses pixels")
     slack = fitting.Faults.of(stated.uncertainty, scene).slack(scene)
     chosen = pixels.choose(scene, shots, grazing, slack)
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
-    gathered = pixels.gather(scene, chosen, title=path.parent.resolve().name)
+    gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     found = None
     if model is not None:
         progress("fits")
@@ -225,34 +225,48 @@ def _points(places: Sequence[Sequence[float]]) -> Floats:
     return found
 
 
-def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration]:
-    """The calibration file, with only those photographs that are named."""
+def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
+    """The calibration file that goes with photographs, or with their folder; or which itself is named."""
+    if calibration is not None:
+        return Path(calibration).expanduser()
     several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
     if not several:
         raise InputError("no photographs given", "photographs", "name files, or a folder with a calibration.json")
     first = Path(several[0]).expanduser()
-    if len(several) == 1 and first.is_dir():
-        path = Path(calibration).expanduser() if calibration is not None else first / NAME
-        return _beside(path, first), calibrations.read(path)
-    path = Path(calibration).expanduser() if calibration is not None else first.parent / NAME
+    if len(several) == 1 and first.suffix.lower() == ".json":
+        return first
+    return (first if first.is_dir() else first.parent) / NAME
+
+
+def is_blank(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> bool:
+    """Whether the calibration lists no photograph of a sample yet."""
+    stated = calibrations.read(calibration_of(named, calibration))
+    return all(shot.sample == "reference" for shot in stated.photographs)
+
+
+def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration, Path]:
+    """The calibration's file, what it says of those photographs that are named, and the folder that they lie in."""
+    path = calibration_of(named, calibration)
     whole = calibrations.read(path)
-    wanted = {Path(one).name for one in several}
-    known = {one.file for shot in whole.photographs for one in shot.pictures}
-    for name in sorted(wanted - {Path(one).name for one in known}):
-        hint = did_you_mean(name, sorted(known)) if known else "add it"
-        raise InputError("the calibration tells neither its exposure nor its light", name, hint)
-    # a reference is always read, whatever is named: without it lamps have no intensity
-    kept = [
-        shot
-        for shot in whole.photographs
-        if shot.sample == "reference" or any(Path(one.file).name in wanted for one in shot.pictures)
-    ]
-    return _beside(path, first.parent), whole.model_copy(update={"photographs": kept})
-
-
-def _beside(path: Path, folder: Path) -> Path:
-    """The calibration's path, as if it lay in the folder of the photographs, which its files are named from."""
-    return folder / path.name
+    several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
+    first = Path(several[0]).expanduser()
+    folder = first if first.is_dir() else first.parent
+    kept = whole.photographs
+    if not (len(several) == 1 and (first.is_dir() or first.suffix.lower() == ".json")):
+        known = {Path(one.file).name for shot in whole.photographs for one in shot.pictures}
+        wanted = {Path(one).name for one in several}
+        for name in sorted(wanted - known):
+            what = "the calibration tells neither its exposure nor its light"
+            raise InputError(what, str(folder / name), f"list it under photographs in {path}")
+        # a reference is always read, whatever is named: without it lamps have no intensity
+        kept = [
+            shot
+            for shot in whole.photographs
+            if shot.sample == "reference" or any(Path(one.file).name in wanted for one in shot.pictures)
+        ]
+    if all(shot.sample == "reference" for shot in kept):
+        raise InputError("no photograph of a sample", str(path), 'add some with "sample": "ball" or "flat"')
+    return path, whole.model_copy(update={"photographs": kept}), folder
 
 
 # ---------------------------------------------------------------------- what stood where
