@@ -24,7 +24,7 @@ LARGEST = 50.0  # % at which the scale of differences and of errors ends at most
 
 def draw(found: Capture) -> Drawing:
     """The first photograph of a sample with the fit to it and the difference, the fate of its pixels, and over theta_h
-    and theta_d the samples' values and their standard errors; white where nothing was seen."""
+    and theta_d the samples' values and their standard errors; grey where nothing was seen."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -103,8 +103,9 @@ def _values(axis: Axes, found: Capture) -> None:
     with np.errstate(invalid="ignore"):
         value = total / count[..., None]
     white = max(float(np.nanpercentile(np.cbrt(np.abs(value)), 97.0)), 1e-6)
-    shown = np.where(np.isnan(value), 1.0, np.clip(np.cbrt(np.maximum(value, 0.0)) / white, 0.0, 1.0))
-    axis.imshow(shown.swapaxes(0, 1), origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto")
+    shown = np.clip(np.cbrt(np.maximum(np.nan_to_num(value), 0.0)) / white, 0.0, 1.0)
+    with_alpha = np.concatenate([shown, np.isfinite(value[..., :1])], axis=-1)
+    axis.imshow(with_alpha.swapaxes(0, 1), origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto")
     axis.set_title("samples: f by its cube root", fontsize=10)
     _angles(axis)
 
@@ -134,6 +135,7 @@ def _errors(axis: Axes, found: Capture) -> None:
 
 
 def _angles(axis: Axes) -> None:
+    axis.set_facecolor(figures.FAINT)  # where nothing was seen
     degrees = (0.0, 2.0, 10.0, 30.0, 60.0, 90.0)
     axis.set_xticks([float(np.sqrt(d / 90.0)) for d in degrees], [f"{d:g}" for d in degrees])
     axis.set_yticks([0.0, 30.0, 60.0, 90.0])

@@ -17,6 +17,7 @@ CLIPPED = 0.02  # of the lit pixels
 VAGUE = 0.25  # relative half width of an interval from which on the pictures are said not to tell
 SMALL = 2.0  # pixels of a lobe's width
 FAR = 3.0  # standard deviations, beyond which a fault is more than was stated
+ALIKE = 4.0  # pixels that count as one, from which on more is off than noise
 WRONG = 0.05  # relative difference of model and pictures
 
 
@@ -64,5 +65,7 @@ def _on_fit(scene: Scene, found: Fitted) -> Iterator[str]:
     for name, (value, _) in found.faults.items():
         if abs(value) > FAR:
             yield f"{name} is {abs(value):.1f} standard deviations from what the calibration says"
+    if found.problem.alike > ALIKE:
+        yield "neighbouring pixels err alike: the calibration is off by more than it states, or the model is wrong"
     if fit.relative > max(WRONG, 3.0 * found.noise):
         yield f"the model is {100.0 * fit.relative:.0f} % off on average: intervals are those of a model that is wrong"

@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...measure.fitting import fit as tables
 from ...measure.fitting.data import Data
 from ...measure.fitting.fit import Fit
-from ...measure.fitting.parameters import CHANNELS, Free, start_of, with_drjit, with_values
+from ...measure.fitting.parameters import CHANNELS, Free, ranges, start_of, with_drjit, with_values
 from ...measure.fitting.solver import Linearized, solve
 from ...models import BSDF
 from ...ops import backend
@@ -152,10 +152,7 @@ class Problem:
         own = [backend.float_of(float(x), types) for x in numbers[: self.own]]
         at = dict(zip(self.open, numbers[self.own :], strict=True))
         ball = [backend.float_of(float(at.get(name, 0.0)), types) for name in BALL]
-        turns = [
-            backend.float_of(np.array([at.get(f"{lamp}.{name}", 0.0) for lamp in scene.names]), types)
-            for name in LAMP[:2]
-        ]
+        turns = self._turns(at, types)
         groups = [[own[column] for column in columns] for columns in self.columns]
         with_ball = part.kind == "ball"
         groups += [[one] for name, one in zip(BALL, ball, strict=True) if name in self.open]
@@ -167,11 +164,7 @@ class Problem:
         lamp = types.vec3(*(dr.gather(types.float, component, which) for component in lamps))
         found = seen(scene, part.kind, ray, lamp, self._ball(ball, types) if with_ball else None)
         value = with_drjit(self.material, self.moving, own, types).eval(found.wo, found.wi)
-        brightness = scene.intensities * np.exp(
-            faults.scale * at.get("scale", 0.0)
-            + faults.intensity * np.array([[at.get(f"{lamp}.{LAMP[2]}", 0.0)] for lamp in scene.names])
-        )
-        light = [dr.gather(types.float, backend.float_of(c, types), which) for c in brightness.T]
+        light = [dr.gather(types.float, backend.float_of(c, types), which) for c in self._brightness(at).T]
         radiance = [light[c] * value[c] / found.square for c in range(CHANNELS)]
         slopes: list[list[Array]] = []
         if derive:
@@ -227,6 +220,28 @@ class Problem:
             toward = toward + backend.vector_of(np.array([axis[number] for axis in axes]), 3, types) * (one * sd)
         length = backend.drjit().rsqrt(toward.x * toward.x + toward.y * toward.y + toward.z * toward.z)
         return constant(middle, types) + toward * (length * backend.float_of(distance[:, 0], types))
+
+    def corrected(self, numbers: Floats) -> Scene:
+        """The scene with its faults put right, as far as the pixels told them."""
+        types = backend.types("float64")
+        at = dict(zip(self.open, numbers[self.own :], strict=True))
+        ball = self.scene.ball
+        if ball is not None:
+            center, radius = self._ball([backend.float_of(float(at.get(name, 0.0)), types) for name in BALL], types)
+            ball = replace(ball, center=backend.to_numpy(center, 1)[0], radius=float(backend.to_numpy(radius, 1)[0]))
+        lamps = backend.to_numpy(self._lamps(self._turns(at, types), types), len(self.scene.names))
+        return replace(self.scene, ball=ball, lamps=lamps, intensities=self._brightness(at))
+
+    def _turns(self, at: Mapping[str, float], types: backend.Types) -> list[Array]:
+        return [
+            backend.float_of(np.array([at.get(f"{lamp}.{name}", 0.0) for lamp in self.scene.names]), types)
+            for name in LAMP[:2]
+        ]
+
+    def _brightness(self, at: Mapping[str, float]) -> Floats:
+        own = np.array([[at.get(f"{lamp}.{LAMP[2]}", 0.0)] for lamp in self.scene.names])
+        together = self.faults.scale * at.get("scale", 0.0)
+        return np.asarray(self.scene.intensities * np.exp(together + self.faults.intensity * own))
 
     # ------------------------------------------------------------------ residuals
 
@@ -359,16 +374,21 @@ def fitted(
     """A model fitted to the pixels that were chosen, the calibration's faults beside it."""
     started = time.perf_counter()
     few = _some(chosen, FEW)
-    _, moving = tables.moving_of(model, fixed=fixed, free=free)
+    plain, moving = tables.moving_of(model, fixed=fixed, free=free)
     material = tables.fit(_data(scene, few), model, fixed=fixed, free=free).material
     faults = Faults.of(stated, scene)
 
     problem = Problem(material, moving, scene, few, faults)
     numbers = np.concatenate([start_of(material, moving), np.zeros(len(problem.open))])
-    for _ in range(3):  # weights follow the prediction, and the noise the weights
+    numbers = _followed(problem, numbers)
+    low, high, _ = ranges(problem.free)
+    ended = (numbers <= low) | (numbers >= high)
+    if ended.any():  # an end may have no slope, as an index of 1 has none: once more from where the model stands
+        other = np.where(ended, np.concatenate([start_of(plain, moving), np.zeros(len(problem.open))]), numbers)
         problem.reweigh(numbers)
-        numbers = solve(problem, numbers, steps=12).numbers
-        problem.noise = _noise(problem, numbers)
+        other = solve(problem, other, steps=20).numbers
+        if solve(problem, other, steps=0).cost < solve(problem, numbers, steps=0).cost:
+            numbers = _followed(problem, other)
     whole = Problem(material, moving, scene, chosen.parts, faults, problem.noise)
     whole.reweigh(numbers)
     whole.alike = _alike(whole, numbers)
@@ -377,6 +397,15 @@ def fitted(
     whole.noise = _noise(whole, numbers)
     whole.reweigh(numbers)
     return _result(whole, numbers, started)
+
+
+def _followed(problem: Problem, numbers: Floats) -> Floats:
+    """Where the sum of squares is least: weights follow the prediction, and the noise the weights."""
+    for _ in range(3):
+        problem.reweigh(numbers)
+        numbers = solve(problem, numbers, steps=12).numbers
+        problem.noise = _noise(problem, numbers)
+    return numbers
 
 
 def _some(chosen: Chosen, count: int) -> list[Pixels]:

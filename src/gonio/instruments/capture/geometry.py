@@ -21,6 +21,8 @@ ANGLES = 720  # at which the outline is looked for
 INSIDE = 2.0  # pixels inside of the edge, where the ball has its own brightness
 SHARP = 2.5  # pixels within which an outline rises; a shadow's edge takes longer
 FOUND = 0.25  # of the outline that must have been seen
+ROUND = 0.6  # of what was seen of it that must lie on one circle
+BRIGHT = 0.3  # of the brightest, which the ground must stay below
 SYSTEMATIC = 0.1  # pixels by which a found outline is off beside its noise: limbs darken toward the edge
 
 
@@ -106,6 +108,7 @@ def _found(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid:
     """The ball by its outline, over all photographs: what one lamp leaves dark another one lights."""
     from scipy import ndimage
 
+    hint = 'the ground must be dark; or give "center" or "outline" of the ball'
     shots = [one for one in photographs if one.shot.sample == "ball"]
     seen = np.zeros(shots[0].radiance.shape[:2])
     for one in shots:
@@ -113,15 +116,16 @@ def _found(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid:
         bright = float(np.percentile(grey[np.isfinite(grey)], 99.0))
         if not bright > 0.0:
             raise InputError("no ball in it: it is dark", one.name, "was the lamp on?")
+        if float(np.median(_rim(grey))) > BRIGHT * bright:
+            raise InputError("no ball in it: the ground is as bright as all else", one.name, hint)
         seen = np.maximum(seen, np.minimum(grey / bright, 1.0))
     for other in avoid:
         seen[covers(other, camera, margin=1.1)] = 0.0
-    rim = np.concatenate([seen[:3].ravel(), seen[-3:].ravel(), seen[:, :3].ravel(), seen[:, -3:].ravel()])
+    rim = _rim(seen)
     ground, spread = float(np.median(rim)), 1.4826 * float(np.median(np.abs(rim - np.median(rim))))
     level = ground + max(8.0 * spread, 0.03)
     parts, count = ndimage.label(ndimage.binary_opening(seen > level, iterations=2))
     names = shots[0].name if len(shots) == 1 else f"{shots[0].name} and {len(shots) - 1} more"
-    hint = 'the ground must be dark; or give "center" or "outline" of the ball'
     if count == 0:
         raise InputError("no ball in it: nothing stands out from the ground", names, hint)
     largest = int(np.argmax(np.bincount(parts.ravel())[1:])) + 1
@@ -131,11 +135,16 @@ def _found(ball: Ball, camera: Camera, photographs: Sequence[Photograph], avoid:
     if len(edge) < FOUND * ANGLES:
         raise InputError("no ball in it: no sharp outline stands out from the ground", names, hint)
     m, residual = _agreed(rays(camera, edge[:, 0], edge[:, 1]), camera)
-    if m is None or len(residual) < FOUND * ANGLES:
+    if m is None or len(residual) < max(FOUND * ANGLES, ROUND * len(edge)):
         raise InputError("no ball in it: what stands out is not round", names, hint)
     noise = float(np.sqrt(np.mean(residual**2) / len(residual))) + SYSTEMATIC
     found = _of_cone(m, ball, camera)
     return _of_cone(m, ball, camera, (noise, noise * found.pixel / found.radius))
+
+
+def _rim(picture: Floats) -> Floats:
+    """The pixels along the edges of a picture, where the ground is."""
+    return np.concatenate([picture[:3].ravel(), picture[-3:].ravel(), picture[:, :3].ravel(), picture[:, -3:].ravel()])
 
 
 def _edge(seen: Floats, x: float, y: float, ground: float, level: float) -> Floats:

@@ -29,7 +29,7 @@ from .planning import Proposal
 class Capture:
     """What photographs say of a material.
 
-    scene     camera, ball and lamps, as they were given or found
+    scene     camera, ball and lamps, as they were given or found; after a fit with their faults put right
     samples   BRDF samples, gathered in cells: their table, standard errors, and how many pixels each
     counts    pixels of the sample: used, saturated, shadowed, grazing
     fitted    a material fitted to the pixels, None where no model was asked for
@@ -173,11 +173,12 @@ def capture(
     chosen = pixels.choose(scene, shots, grazing, slack)
     if not len(chosen):
         raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
-    gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     found = None
     if model is not None:
         progress("fits")
         found = fitting.fitted(scene, chosen, model, stated.uncertainty, fixed=fixed, free=free)
+        scene = found.problem.corrected(found.numbers)
+    gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     warnings = advice.on(scene, chosen, found)
     return Capture(scene, gathered, chosen.counts, found, warnings, tuple(shots), chosen)
 
