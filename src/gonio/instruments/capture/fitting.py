@@ -393,7 +393,8 @@ def fitted(
     whole.reweigh(numbers)
     whole.alike = _alike(whole, numbers)
     whole.reweigh(numbers)
-    numbers = solve(whole, numbers, steps=4).numbers
+    # a standard error changes the sum of squares by 1, of as many as there are pixels
+    numbers = solve(whole, numbers, steps=6, tolerance=1e-10).numbers
     whole.noise = _noise(whole, numbers)
     whole.reweigh(numbers)
     return _result(whole, numbers, started)

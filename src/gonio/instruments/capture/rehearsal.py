@@ -49,7 +49,7 @@ def take(
     told = made(calibration, Path("calibration"))
     target = files.check_folder(folder)
     target.mkdir(exist_ok=True)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, 41])
     for shot in told.photographs:
         radiance = _rendered(told, shot.light, shot.sample, material, spp, seed)
         for one in shot.pictures:
