@@ -312,6 +312,10 @@ fitted = go.fit("gold.binary", "lambert+ggx", metric="log")
 assert_type(fitted.material, go.BSDF)
 print(fitted.interval[0, 1], fitted.text, fitted.notes)
 
+photographed = go.capture("photographs", "lambert+ggx", grazing=75.0)
+assert_type(photographed.material, go.BSDF)
+print(photographed.fit.interval, photographed.warnings, photographed.next(2)[0].position)
+
 # ---------------------------------------------------------------------- long jobs
 
 again = go.resume("ball.exr.checkpoint", spp=64)
