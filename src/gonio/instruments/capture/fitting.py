@@ -17,7 +17,7 @@ from ...measure.fitting import fit as tables
 from ...measure.fitting.data import Data
 from ...measure.fitting.fit import Fit
 from ...measure.fitting.parameters import CHANNELS, Free, ranges, start_of, with_drjit, with_values
-from ...measure.fitting.solver import Linearized, solve
+from ...measure.fitting.solver import Linearized, columns_of, solve
 from ...models import BSDF
 from ...ops import backend
 from . import geometry
@@ -120,7 +120,7 @@ class Problem:
     @cached_property
     def columns(self) -> list[list[int]]:
         """Of the material's numbers, those that one derivative is taken along: each alone, or a colour's three."""
-        return tables_columns(self.material, self.moving)
+        return columns_of(self.material, self.moving)
 
     def of_row(self, lamp: int, channel: int) -> list[int]:
         """Which numbers the derivatives of a row are along, in the order in which `_derived` gives them."""
@@ -310,18 +310,6 @@ class Problem:
     def prior(self) -> Floats:
         """What the calibration says, as information: 1 for each fault."""
         return np.diag(np.r_[np.zeros(self.own), np.ones(len(self.open))])
-
-
-def tables_columns(material: BSDF, moving: list[Free]) -> list[list[int]]:
-    """Which numbers of a material one derivative is taken along, found by asking a few directions."""
-    from ...measure.fitting.solver import Problem as OfTables
-
-    rng = np.random.default_rng(3)
-    w = rng.normal(size=(2, 64, 3))
-    w[..., 2] = np.abs(w[..., 2]) + 0.1
-    w /= np.linalg.norm(w, axis=-1, keepdims=True)
-    probe = Data(w[0], w[1], np.ones((64, 3)), np.zeros(64, np.int64))
-    return OfTables(material, moving, probe, "linear").columns
 
 
 def middle_of(scene: Scene) -> Floats:

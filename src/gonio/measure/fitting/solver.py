@@ -187,6 +187,15 @@ class Problem:
         return found
 
 
+def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
+    """Which numbers of a material one derivative is taken along: each alone, or a colour's three where its channels do
+    not mix; found by asking a few directions."""
+    w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
+    w[..., 2] = np.abs(w[..., 2]) + 0.1
+    w /= np.linalg.norm(w, axis=-1, keepdims=True)
+    return Problem(material, free, Data(w[0], w[1], np.ones((64, CHANNELS)), np.zeros(64, np.int64)), "linear").columns
+
+
 def normal_equations(problem: Residuals, numbers: Floats) -> tuple[float, Floats, Floats]:
     """(sum of squares, gradient J^T r, J^T J) at some numbers."""
     count = problem.count
