@@ -31,7 +31,7 @@ from ..render.types import Float, MitsubaBSDF
 from ..work import garbage
 
 Floats = NDArray[np.float64]
-SPP = 64
+SPP, STEPS = 64, 20
 DARK = 0.05  # of the median brightness: below it differences are differences, above it ratios
 TILE = 8  # pixels: errors within a tile are alike
 DEEPEST = 8  # segments of paths, where the scene says nothing
@@ -105,7 +105,7 @@ def fit_picture(
     model: str | BSDF | None = None,
     fixed: Mapping[str, object] | None = None,
     spp: int = SPP,
-    steps: int = 20,
+    steps: int = STEPS,
     seed: int = 1,
     device: str = "cpu",
     allow_outside: bool = False,
