@@ -101,6 +101,7 @@ def test_faults_that_are_not_stated_are_noticed(taken: Path, found: run.Capture,
     assert any("neighbouring pixels err alike" in text for text in got.warnings)
 
 
+@pytest.mark.slow
 def test_intervals_are_wider_by_what_the_calibration_leaves_open(
     taken: Path, found: run.Capture, tmp_path: Path
 ) -> None:
@@ -118,6 +119,7 @@ def test_the_outline_of_a_ball_is_found(taken: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(got.fit.values[-1], TRUTH[-1], rtol=0.03)
 
 
+@pytest.mark.slow
 def test_photographs_of_8_bits_are_enough(tmp_path: Path) -> None:
     raw = rig(suffix="png", response="srgb")
     for one in raw["photographs"]:
@@ -182,6 +184,7 @@ def test_a_capture_becomes_a_table_and_a_report(found: run.Capture, tmp_path: Pa
         found.save(tmp_path / "paint.doc")
 
 
+@pytest.mark.slow
 def test_the_next_photograph_tells_what_was_promised(found: run.Capture, tmp_path: Path) -> None:
     first, second = found.next(2)
     assert np.all(first.errors < 1.4 * found.fit.errors) and np.all(second.errors < first.errors)

@@ -58,12 +58,12 @@ def _beside(axes: list[Axes], found: Capture, shot: Photograph) -> None:
     column, row = np.floor(chosen.place).astype(int).T
     picture = np.full(shot.radiance.shape, np.nan)
     picture[row, column] = predicted
-    seen = np.full(shot.radiance.shape, np.nan)
-    seen[row, column] = shot.radiance[row, column]
     white = max(float(np.nanpercentile(shot.radiance, 99.5)), 1e-12)
     _picture(axes[0], shot.radiance, white, f"photograph: {shot.name.rpartition('/')[2]}")
     _picture(axes[1], picture, white, "the fit to it")
-    off = 100.0 * (np.nanmean(picture - seen, axis=-1) / np.maximum(np.nanmean(seen, axis=-1), 1e-3 * white))
+    off = np.full(shot.radiance.shape[:2], np.nan)
+    level = np.maximum(chosen.value.mean(axis=1), 1e-3 * white)
+    off[row, column] = 100.0 * (predicted - chosen.value).mean(axis=1) / level
     end = min(max(float(np.nanpercentile(np.abs(off), 98.0)), 1.0), LARGEST)
     image = axes[2].imshow(off, cmap="RdBu_r", vmin=-end, vmax=end, interpolation="nearest")
     axes[2].set_title("difference", fontsize=10)
