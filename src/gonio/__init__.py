@@ -39,6 +39,7 @@ _PLACES = {
     "measure.compression.compress": ("compress",),
     "measure.fitting.fit": ("fit",),
     "energy": ("Albedo", "albedo"),
+    "instruments.capture.run": ("capture",),
     "render": ("resume",),
     "render.integrators": ("Integrator",),
     "verify.laws": ("Law",),
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
     from .energy.materials.random_walk import RandomWalk
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
+    from .instruments.capture.run import capture
     from .instruments.goniometer.run import measure
     from .measure.compression.compress import compress
     from .measure.fitting.fit import fit
@@ -149,9 +151,9 @@ __all__ = [
     "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty",
     "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
     "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
-    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "choice", "cluster", "compare", "compress",
-    "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "measure", "method", "mix",
-    "model", "models",
+    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare",
+    "compress", "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "measure", "method",
+    "mix", "model", "models",
     "never", "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
     "verify", "view", "width",
 ]  # fmt: skip

@@ -113,6 +113,34 @@ def scene_json(data: bytes, folder: Path) -> object:
     return scene.build(scene.read(saved(folder / "scene.json", data)), engine.load("cpu"))
 
 
+def calibrations() -> list[bytes]:
+    ball = {"radius": 50, "center": [0, 0, 500]}
+    lamp = {"position": [100, 0, 100], "intensity": [1.6e5, 1.6e5, 1.6e5]}
+    shot = {"file": "a.npz", "seconds": 0.1, "light": "a"}
+    raw = {"camera": {"size": [4, 4], "focal": 20}, "ball": ball, "lights": {"a": lamp}, "photographs": [shot]}
+    flat = {"base": [-9, -9, 400], "edge0": [18, 0, 0], "edge1": [0, 18, 0]}
+    series = {"exposures": [{"file": "a.npz", "seconds": 0.1}], "light": "a", "sample": "flat"}
+    more = {
+        "flat": flat,
+        "photographs": [series],
+        "response": [[0, 0], [0.5, 0.2], [1, 1]],
+        "uncertainty": {"light": 1},
+    }
+    return [json.dumps(raw).encode(), json.dumps(raw | more).encode()]
+
+
+@target("calibration", calibrations, [b'"center"', b"null", b"[[", b"1e400", b'"outline"', b"-0.0"])
+def calibration_json(data: bytes, folder: Path) -> object:
+    import numpy as np
+    from gonio.instruments.capture.run import capture
+    from gonio.render import images
+
+    if not (folder / "a.npz").exists():
+        images.write(folder / "a.npz", np.full((4, 4, 3), 0.1, np.float32))
+    saved(folder / "calibration.json", data)
+    return capture(folder)
+
+
 XML = b"""<scene version="3.0.0"><default name="spp" value="2"/>
 <integrator type="path"><integer name="max_depth" value="3"/></integrator>
 <sensor type="perspective"><float name="fov" value="45"/>

@@ -318,6 +318,10 @@ readout = go.measure(surface="gaussian:alpha=.3", facet=go.Mirror(), output="rou
 print(readout.table.beside["error"], readout.first, readout.later, readout.error)
 go.measure(gold, "gold.binary", noise=0.02, blocked=5.0, solid_angle=0.002)
 
+photographed = go.capture("photographs", "lambert+ggx", grazing=75.0)
+assert_type(photographed.material, go.BSDF)
+print(photographed.fit.interval, photographed.warnings, photographed.next(2)[0].position)
+
 # ---------------------------------------------------------------------- long jobs
 
 again = go.resume("ball.exr.checkpoint", spp=64)

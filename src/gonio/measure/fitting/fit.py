@@ -142,6 +142,18 @@ def modelled(text: str, lobes: int = 1) -> Model:
     return whole
 
 
+def moving_of(
+    model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
+) -> tuple[BSDF, list[Free]]:
+    """A model with the values that `fixed` holds, and its parameters that move; as `fit` takes them."""
+    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
+    given = dict(fixed or {})
+    if given:
+        material = tree.replace(material, given)
+    moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
+    return material, [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
+
+
 @public
 def fit(
     data: str | os.PathLike[str] | Measurement | Data,
@@ -172,12 +184,7 @@ def fit(
     started = time.perf_counter()
     if metric not in METRICS:
         raise InputError(f"unknown metric '{metric}'", "metric", " | ".join(METRICS))
-    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
-    given = dict(fixed or {})
-    if given:
-        material = tree.replace(material, given)
-    moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
-    moving = [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
+    material, moving = moving_of(model, lobes, fixed, free)
     cells = (
         data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
     )
@@ -256,16 +263,18 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float) -> Fi
         relative,
         float(3 * runs * np.log(max(mean, 1e-300)) + len(numbers) * np.log(3 * runs)),
         len(data),
-        tuple(_notes(problem, numbers, errors, correlation, names)),
+        tuple(notes_on(problem.free, numbers, errors, correlation, names)),
         seconds,
         data,
     )
 
 
-def _notes(problem: Problem, numbers: Floats, errors: Floats, correlation: Floats, names: tuple[str, ...]) -> list[str]:
+def notes_on(
+    free: Sequence[Free], numbers: Floats, errors: Floats, correlation: Floats, names: tuple[str, ...]
+) -> list[str]:
     """What a reader must know before the values are trusted."""
     notes, at = [], 0
-    for one in problem.free:
+    for one in free:
         for k in range(at, at + one.count):
             if not np.isfinite(errors[k]):
                 notes.append(f"the data do not tell {names[k]}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,19 @@ def metric(name: str, value: Array, floor: Array) -> Array:
 
 # --------------------------------------------------------------------------- residuals and their derivatives
 
+# Residuals (N,), derivatives (N, K), and which numbers these are along
+Linearized = tuple[NDArray[np.floating], NDArray[np.floating], list[int]]
+
+
+class Residuals(Protocol):
+    """What can be solved: numbers that move, and residuals with their derivatives, in parts."""
+
+    free: list[Free]
+
+    @property
+    def count(self) -> int: ...
+    def linearized(self, numbers: Floats) -> list[Linearized]: ...
+
 
 @dataclass
 class Problem:
@@ -71,7 +84,7 @@ class Problem:
             raise InputError(f"unknown metric '{self.name}'", "metric", " | ".join(METRICS))
         if self.floor <= 0.0:
             self.floor = max(SMALL * float(np.percentile(np.abs(self.data.value), 99.0)), 1e-6)
-        self._columns = self._of_parameters()
+        self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
         """The numbers that one derivative is taken along: each alone, or the three of a colour together."""
@@ -97,7 +110,7 @@ class Problem:
 
     @property
     def count(self) -> int:
-        return sum(map(len, self._columns))
+        return sum(map(len, self.columns))
 
     def _loaded(self, types: backend.Types) -> tuple[Array, Array, list[Array]]:
         if self._given is None:
@@ -142,7 +155,7 @@ class Problem:
         backend.drjit().eval(found)
         return [np.asarray(backend.to_numpy(r, len(self.data))) for r in found]
 
-    def linearized(self, numbers: Floats) -> list[tuple[NDArray[np.float32], NDArray[np.float32], list[int]]]:
+    def linearized(self, numbers: Floats) -> list[Linearized]:
         """Of each channel (residuals (N,), derivatives (N, K), which numbers these are along)."""
         dr = backend.drjit()
         types = backend.types("float32")
@@ -154,7 +167,7 @@ class Problem:
         seen = model.eval(wo, wi)
         residual = self._residual(seen, types)
         derivatives: list[list[Array]] = []
-        for columns in self._columns:
+        for columns in self.columns:
             dr.clear_grad(values)
             dr.clear_grad(residual)
             for column in columns:
@@ -166,15 +179,24 @@ class Problem:
         residual = [dr.detach(r) for r in residual]
         dr.eval(residual, derivatives)
         rows = len(self.data)
-        found = []
+        found: list[Linearized] = []
         for c in range(CHANNELS):
-            which = [columns[c] if len(columns) > 1 else columns[0] for columns in self._columns]
+            which = [columns[c] if len(columns) > 1 else columns[0] for columns in self.columns]
             jacobian = np.stack([np.asarray(backend.to_numpy(d[c], rows)) for d in derivatives], axis=1)
             found.append((np.asarray(backend.to_numpy(residual[c], rows)), jacobian, which))
         return found
 
 
-def normal_equations(problem: Problem, numbers: Floats) -> tuple[float, Floats, Floats]:
+def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
+    """Which numbers of a material one derivative is taken along: each alone, or a colour's three where its channels do
+    not mix; found by asking a few directions."""
+    w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
+    w[..., 2] = np.abs(w[..., 2]) + 0.1
+    w /= np.linalg.norm(w, axis=-1, keepdims=True)
+    return Problem(material, free, Data(w[0], w[1], np.ones((64, CHANNELS)), np.zeros(64, np.int64)), "linear").columns
+
+
+def normal_equations(problem: Residuals, numbers: Floats) -> tuple[float, Floats, Floats]:
     """(sum of squares, gradient J^T r, J^T J) at some numbers."""
     count = problem.count
     cost, gradient, hessian = 0.0, np.zeros(count), np.zeros((count, count))
@@ -205,7 +227,7 @@ class Solution:
 
 
 def solve(
-    problem: Problem,
+    problem: Residuals,
     start: Floats,
     steps: int = 30,
     tolerance: float = 1e-6,

@@ -8,8 +8,8 @@ mitsuba_scene = scene.build(description, engine.load())
 from __future__ import annotations
 
 from .ball import of_material
-from .build import build
+from .build import build, built
 from .reader import read, sources
 from .schema import SceneDescription, json_schema
 
-__all__ = ["SceneDescription", "build", "json_schema", "of_material", "read", "sources"]
+__all__ = ["SceneDescription", "build", "built", "json_schema", "of_material", "read", "sources"]

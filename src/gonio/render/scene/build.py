@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -27,7 +29,21 @@ def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
 
     Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
     """
-    return _Builder(description, mi).scene()
+    return built(description, mi).scene
+
+
+@dataclass(frozen=True)
+class Built:
+    """A scene, and the BSDF that each material of its description has become."""
+
+    scene: Scene
+    bsdfs: Mapping[MaterialPart, MitsubaBSDF]
+
+
+def built(description: schema.SceneDescription, mi: ModuleType) -> Built:
+    """As `build`, with the materials, for who changes them."""
+    builder = _Builder(description, mi)
+    return Built(builder.scene(), builder.bsdfs)
 
 
 def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:

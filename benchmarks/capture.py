@@ -1,0 +1,181 @@
+"""A material from photographs of a ball: accuracy, how often intervals hold the truth, faults, and plans.
+
+    python benchmarks/capture.py [--only accuracy,coverage,faults,plan] [--trials 50]
+
+accuracy  8 lights, 256 x 256, 1 % noise: how far albedo and alpha are off after the fit, of several materials; seconds
+coverage  the same with a calibration that is off as it says (lamps by 1 degree, ball by 1 % and a pixel, intensities by
+          1 % each and .5 % together): how often the 95 % intervals hold the truth
+faults    one fault at a time, and 8-bit photographs
+plan      4 planned photographs against 8 random ones, in pairs: root mean square error of the parameters
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+import numpy as np
+from gonio.instruments.capture import rehearsal
+from gonio.instruments.capture.fitting import across
+from gonio.instruments.capture.run import Capture, capture, plan
+from gonio.models import tree
+from gonio.models.sum import Sum
+
+MIDDLE, RADIUS, AWAY = np.array([0.0, 0.0, 500.0]), 50.0, 400.0
+ANGLES = (15.0, 35.0, 55.0, 75.0, 25.0, 45.0, 65.0, 95.0)  # between lamp and camera, of the eight
+PAINT = Sum(go.Lambert((0.3, 0.2, 0.1)), go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick"))
+STATED = {"light": 1.0, "radius": 0.01, "center": 1.0, "intensity": 0.01, "scale": 0.005}
+
+
+def rig(lamps: np.ndarray, bits: int | None = None) -> dict[str, Any]:
+    """A calibration with lamps at these places."""
+    suffix = "npz" if bits is None else "png"
+    seconds = 1.0 if bits is None else 1.6
+    return {
+        "camera": {"size": [256, 256], "focal": 1000.0},
+        "response": "srgb" if bits else "linear",
+        "ball": {"radius": RADIUS, "center": MIDDLE.tolist()},
+        "lights": {f"l{n}": {"position": p.tolist(), "intensity": AWAY**2} for n, p in enumerate(lamps)},
+        "photographs": [{"file": f"p{n}.{suffix}", "seconds": seconds, "light": f"l{n}"} for n in range(len(lamps))],
+    }
+
+
+def eight() -> np.ndarray:
+    theta, phi = np.radians(ANGLES), np.arange(8) * 0.75 * np.pi
+    toward = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta)], -1)
+    return MIDDLE + AWAY * toward
+
+
+def off(true: dict[str, Any], stated: dict[str, float], rng: np.random.Generator) -> dict[str, Any]:
+    """The calibration as one would write it who is off by what he states."""
+    lights = {}
+    together = 1.0 + stated.get("scale", 0.0) * rng.normal()
+    for name, lamp in true["lights"].items():
+        away = np.array(lamp["position"]) - MIDDLE
+        distance = np.linalg.norm(away)
+        a, b = across(away)
+        turned = away / distance + np.radians(stated.get("light", 0.0)) * (rng.normal() * a + rng.normal() * b)
+        place = MIDDLE + distance * turned / np.linalg.norm(turned)
+        bright = lamp["intensity"] * together * (1.0 + stated.get("intensity", 0.0) * rng.normal())
+        lights[name] = {"position": place.tolist(), "intensity": float(bright)}
+    pixel = 500.0 / 1000.0
+    ball = {
+        "radius": RADIUS * (1.0 + stated.get("radius", 0.0) * rng.normal()),
+        "center": (MIDDLE + stated.get("center", 0.0) * pixel * rng.normal(size=3) * [1, 1, 0]).tolist(),
+    }
+    return {**true, "lights": lights, "ball": ball, "uncertainty": stated}
+
+
+def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
+    found = []
+    for name in names:
+        path, _, channel = name.rpartition(".")
+        if channel in ("r", "g", "b"):
+            found.append(np.broadcast_to(tree.value_at(material, path), 3)["rgb".index(channel)])
+        else:
+            found.append(tree.value_at(material, name))
+    return np.array(found, float)
+
+
+def measured(
+    material: go.BSDF, model: str, lamps: np.ndarray, stated: dict[str, float], seed: int, bits: int | None = None
+) -> tuple[Capture, np.ndarray, float]:
+    """What was found, the truth, and the seconds that it took."""
+    true = rig(lamps, bits)
+    with tempfile.TemporaryDirectory() as folder:
+        told = off(true, stated, np.random.default_rng([seed, 5]))
+        at = rehearsal.take(true, material, Path(folder) / "p", noise=0.01, bits=bits, seed=seed, stated=told)
+        start = time.perf_counter()
+        found = capture(at, model)
+        return found, truth(material, found.fit.names), time.perf_counter() - start
+
+
+def show(title: str, names: tuple[str, ...], errors: np.ndarray, inside: np.ndarray, seconds: float) -> None:
+    print(title)
+    for name, one, share in zip(names, errors.T, inside.mean(axis=0), strict=True):
+        print(f"  {name:12} off by at most {one.max():8.4%}, inside its interval in {share:.0%} of {len(one)}")
+    print(f"  {seconds:.1f} s at most", flush=True)
+
+
+def trials(
+    title: str, material: go.BSDF, model: str, stated: dict[str, float], count: int, bits: int | None = None
+) -> None:
+    errors, inside, took = [], [], []
+    for seed in range(1, count + 1):
+        found, known, seconds = measured(material, model, eight(), stated, seed, bits)
+        errors.append(np.abs(found.fit.values - known) / known)
+        inside.append((found.fit.interval[:, 0] <= known) & (known <= found.fit.interval[:, 1]))
+        took.append(seconds)
+    show(title, found.fit.names, np.array(errors), np.array(inside), max(took))
+
+
+def accuracy() -> None:
+    for alpha in (0.05, 0.15, 0.4):
+        paint = tree.replace(PAINT, {"b.alpha": alpha})
+        trials(f"paint, alpha {alpha:g}, exact calibration", paint, "lambert+ggx", {}, 3)
+    for alpha in (0.1, 0.3):
+        gold = go.Conductor.preset("Au", alpha=alpha)
+        trials(f"gold, alpha {alpha:g}, exact calibration", gold, "conductor", {}, 3)
+
+
+def faults(count: int) -> None:
+    for name, stated in (
+        ("lamps off by 1 degree", {"light": 1.0}),
+        ("ball off by 1 %, and by a pixel", {"radius": 0.01, "center": 1.0}),
+        ("intensities off by 1 % each, .5 % together", {"intensity": 0.01, "scale": 0.005}),
+    ):
+        trials(name, PAINT, "lambert+ggx", stated, count)
+    trials("8 bits", PAINT, "lambert+ggx", {}, count, bits=8)
+
+
+def plans(count: int) -> None:
+    """Two photographs planned from a guess, two more from what they say; against eight at random places."""
+    stated = {"light": 1.0, "intensity": 0.01}
+    errors = {"planned": [], "random": []}
+    for seed in range(1, count + 1):
+        rng = np.random.default_rng([seed, 77])
+        albedo, alpha = rng.uniform(0.05, 0.6, 3), float(np.exp(rng.uniform(np.log(0.06), np.log(0.5))))
+        material = tree.replace(PAINT, {"a.albedo": tuple(map(float, albedo)), "b.alpha": alpha})
+        with tempfile.TemporaryDirectory() as folder:
+            first = rig(eight()[:1])
+            first["uncertainty"] = stated
+            path = Path(folder) / "calibration.json"
+            path.write_text(json.dumps(first))
+            guess = plan(path, "lambert+ggx", 2)
+        lamps = np.array([one.position for one in guess])
+        found, _, _ = measured(material, "lambert+ggx", lamps, stated, seed)
+        lamps = np.concatenate([lamps, [one.position for one in found.next(2)]])
+        directions = rng.normal(size=(200, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        angle = np.degrees(np.arccos(-directions[:, 2]))
+        anywhere = MIDDLE + AWAY * directions[(angle > 8.0) & (angle < 125.0)][:8]
+        for name, places in (("planned", lamps), ("random", anywhere)):
+            got, known, _ = measured(material, "lambert+ggx", places, stated, seed)
+            errors[name].append(float(np.sqrt(np.mean(((got.fit.values - known) / known) ** 2))))
+        print(f"  {seed}: 4 planned {errors['planned'][-1]:.4%}, 8 random {errors['random'][-1]:.4%}", flush=True)
+    medians = {name: float(np.median(one)) for name, one in errors.items()}
+    print(f"median of {count}: 4 planned {medians['planned']:.4%}, 8 random {medians['random']:.4%}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default="accuracy,coverage,faults,plan")
+    parser.add_argument("--trials", type=int, default=50)
+    options = parser.parse_args()
+    if "accuracy" in options.only:
+        accuracy()
+    if "coverage" in options.only:
+        trials("paint, every fault at once", PAINT, "lambert+ggx", STATED, options.trials)
+    if "faults" in options.only:
+        faults(max(options.trials // 5, 2))
+    if "plan" in options.only:
+        plans(max(options.trials // 2, 2))
+
+
+if __name__ == "__main__":
+    main()

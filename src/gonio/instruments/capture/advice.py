@@ -1,0 +1,71 @@
+"""What is odd about photographs, and what they cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...measure.fitting.fit import NORMAL_95
+from . import pixels
+from .fitting import Fitted
+from .pixels import Chosen, Scene
+
+NARROW = 5.0  # degrees: difference angles that lie closer together tell nothing of Fresnel's term
+HIGHLIGHT = 4.0  # degrees of the half vector, within which a highlight has its peak
+CLIPPED = 0.02  # of the lit pixels
+VAGUE = 0.25  # relative half width of an interval from which on the pictures are said not to tell
+SMALL = 2.0  # pixels of a lobe's width
+FAR = 3.0  # standard deviations, beyond which a fault is more than was stated
+ALIKE = 4.0  # pixels that count as one, from which on more is off than noise
+WRONG = 0.05  # relative difference of model and pictures
+
+
+def on(scene: Scene, chosen: Chosen, found: Fitted | None) -> tuple[str, ...]:
+    """In words, the gravest first."""
+    return (*_on_pictures(scene, chosen), *(_on_fit(scene, found) if found is not None else ()))
+
+
+def _on_pictures(scene: Scene, chosen: Chosen) -> Iterator[str]:
+    half, difference = [], []
+    for part in chosen.parts:
+        wo, wi, _ = pixels.directions(scene, part.kind, part.place, part.lamp)
+        theta_h, theta_d, _ = pixels.half_difference(wo, wi)
+        half.append(theta_h)
+        difference.append(theta_d)
+    nearest = float(np.degrees(np.percentile(np.concatenate(half), 0.1)))
+    low, high = np.degrees(np.percentile(np.concatenate(difference), [1.0, 99.0]))
+    span = f"difference angles of {low:.0f} to {high:.0f} degrees"
+    if len(scene.names) == 1:
+        yield (
+            f"one light alone, {span}: one highlight tells roughness only as far as the model is right, and nothing "
+            "tells what depends on the angle (index, Fresnel)"
+        )
+    elif high - low < NARROW:
+        yield f"{span} only: they do not tell index and Fresnel"
+    clipped, used = chosen.counts["saturated"], chosen.counts["used"]
+    if nearest > HIGHLIGHT:
+        why = ", which is saturated" if clipped else ""
+        yield f"no pixel within {nearest:.0f} degrees of the peak of a highlight{why}: roughness is hardly told"
+    if clipped > CLIPPED * (clipped + used):
+        yield f"{100.0 * clipped / (clipped + used):.0f} % of the lit pixels are saturated: add a shorter exposure"
+
+
+def _on_fit(scene: Scene, found: Fitted) -> Iterator[str]:
+    fit = found.fit
+    for name, value, error in zip(fit.names, fit.values, fit.errors, strict=True):
+        if np.isfinite(error) and NORMAL_95 * error > VAGUE * max(abs(value), 1e-3):
+            yield f"the pictures hardly tell {name}: {value:.3g} +- {NORMAL_95 * error:.2g}"
+    yield from fit.notes
+    if scene.ball is not None:
+        pixel = scene.ball.pixel / scene.ball.radius
+        for name, value in zip(fit.names, fit.values, strict=True):
+            if name.rpartition(".")[2] == "alpha" and value < SMALL * pixel:
+                yield f"{name} = {value:.3g} is a highlight of {value / pixel:.1f} pixels: come nearer"
+    for name, (value, _) in found.faults.items():
+        if abs(value) > FAR:
+            yield f"{name} is {abs(value):.1f} standard deviations from what the calibration says"
+    if found.problem.alike > ALIKE:
+        yield "neighbouring pixels err alike: the calibration is off by more than it states, or the model is wrong"
+    if fit.relative > max(WRONG, 3.0 * found.noise):
+        yield f"the model is {100.0 * fit.relative:.0f} % off on average: intervals are those of a model that is wrong"

@@ -1,0 +1,202 @@
+"""The calibration file: camera, ball, lamps and photographs, and how sure each is.
+
+Everything is in the camera's frame: x to the right of the picture, y downward, z forward; any unit of length, the same
+throughout. Pixels are counted from the picture's upper left corner, whose pixel has its middle at (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError, model_validator
+
+from ...errors import InputError
+from ...render.scene.reader import explain
+from ...render.scene.text import read_json
+from ...render.scene.values import NonNegative, Number, Part, Positive, Vector, Whole, invalid, rgb
+from ...render.types import Json
+
+NAME = "calibration.json"  # in a folder of photographs
+Floats = NDArray[np.float64]
+Pair = tuple[Number, Number]
+Light = Positive | tuple[Positive, Positive, Positive]
+
+
+class Camera(Part):
+    """A pinhole with radial distortion."""
+
+    size: tuple[Whole, Whole]
+    """[width, height] of a photograph, pixels."""
+    focal: Positive
+    """Focal length, in the unit of `pixel`."""
+    pixel: Positive = 1.0
+    """Distance of two pixels on the sensor; where it is left out, `focal` is in pixels."""
+    principal: Pair | None = None
+    """Where the optical axis meets the picture, pixels; the middle where left out."""
+    k1: Number = 0.0
+    """Radial distortion: x' = x (1 + k1 r^2 + k2 r^4) of x, y over z (Brown1971, as OpenCV has it)."""
+    k2: Number = 0.0
+
+    @property
+    def focal_pixels(self) -> float:
+        return self.focal / self.pixel
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        return self.principal or (0.5 * self.size[0], 0.5 * self.size[1])
+
+
+class Ball(Part):
+    """A ball: its place is given, or its outline in the picture, or neither; then the outline is found."""
+
+    radius: Positive
+    center: Vector | None = None
+    outline: tuple[Number, Number, Positive] | None = None
+    """[x, y, radius] of its outline, pixels."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Ball:
+        if self.center is not None and self.outline is not None:
+            raise invalid("both center and outline are given", "keep one", "outline")
+        if self.center is not None and np.linalg.norm(self.center) <= self.radius:
+            raise invalid("the camera stands inside the ball", "is center in the camera's frame?", "center")
+        return self
+
+
+class Flat(Part):
+    """A flat sample: the parallelogram base + s edge0 + t edge1."""
+
+    base: Vector
+    edge0: Vector
+    edge1: Vector
+
+    @model_validator(mode="after")
+    def _spans_a_plane(self) -> Flat:
+        area = np.linalg.norm(np.cross(self.edge0, self.edge1))
+        if area <= 1e-9 * np.linalg.norm(self.edge0) * np.linalg.norm(self.edge1):
+            raise invalid("edge0 and edge1 span no plane", "turn one of them", "edge1")
+        return self
+
+
+class Reference(Flat):
+    """A flat white target that scatters evenly (Lambert): it tells the lamps' intensities."""
+
+    albedo: Light
+    """What it reflects, such as 0.99."""
+
+
+class Lamp(Part):
+    """A lamp that is small beside its distance."""
+
+    position: Vector | None = None
+    """Where it stands; where left out, it is found in the mirror balls."""
+    distance: Positive | None = None
+    """From the middle of the ball; with one mirror ball alone it must be known."""
+    intensity: Light | None = None
+    """Radiant intensity, such that a photograph holds f cos theta_i intensity / distance^2 times seconds; a number or
+    [r, g, b]. Where left out, a photograph of the reference tells it."""
+
+
+class Exposure(Part):
+    """A picture, and how long it was exposed; where `seconds` is left out, the file itself must tell."""
+
+    file: str = Field(min_length=1)
+    seconds: Positive | None = None
+
+
+class Shot(Part):
+    """A photograph: one picture, or a series of several exposures of one view."""
+
+    file: str | None = None
+    seconds: Positive | None = None
+    exposures: list[Exposure] = Field(default_factory=list)
+    light: str = "lamp"
+    """Which of `lights` was on."""
+    sample: Literal["ball", "flat", "reference"] = "ball"
+
+    @model_validator(mode="after")
+    def _some_file(self) -> Shot:
+        if (self.file is None) == (not self.exposures):
+            raise invalid("file or exposures expected, one of them", 'such as {"file": "a.exr", "seconds": 0.1}')
+        return self
+
+    @property
+    def pictures(self) -> list[Exposure]:
+        return self.exposures or [Exposure(file=self.file or "", seconds=self.seconds)]
+
+
+class Uncertainty(Part):
+    """One standard deviation of what the calibration says; what is left out is taken as exact, an outline that is found
+    as exact as it was found."""
+
+    light: NonNegative = 0.0
+    """Of a lamp's direction, each way, degrees."""
+    intensity: NonNegative = 0.0
+    """Of each lamp's intensity, relative."""
+    scale: NonNegative = 0.0
+    """Of all intensities together, relative."""
+    center: NonNegative | None = None
+    """Of the ball's middle, each way, pixels."""
+    radius: NonNegative | None = None
+    """Of the ball's radius in the picture, relative."""
+
+
+class Calibration(Part):
+    """What stood where when the photographs were taken, and how sure that is."""
+
+    camera: Camera
+    response: Literal["linear", "srgb"] | list[Pair] = "linear"
+    """How a file of whole numbers stores light: in proportion, as sRGB, or by a curve of [value, light] pairs from
+    [0, 0] to [1, 1]. Files of floating-point numbers are linear."""
+    saturation: Annotated[Number, Field(gt=0, le=1)] = 0.99
+    """Value from which on a file of whole numbers is saturated."""
+    ball: Ball | None = None
+    flat: Flat | None = None
+    reference: Reference | None = None
+    mirrors: list[Ball] = Field(default_factory=list)
+    """Mirror balls in the pictures."""
+    lights: dict[str, Lamp]
+    photographs: list[Shot]
+    """In any order; none yet where the first ones are to be planned."""
+    uncertainty: Uncertainty = Uncertainty()
+
+    @model_validator(mode="after")
+    def _complete(self) -> Calibration:
+        for shot in self.photographs:
+            if shot.light not in self.lights:
+                raise invalid(f"no light '{shot.light}'", "known: " + ", ".join(self.lights), "photographs")
+            if getattr(self, shot.sample) is None:
+                raise invalid(f"a photograph shows the {shot.sample}, which is not described", f'add "{shot.sample}"')
+        if isinstance(self.response, list):
+            curve = np.array(self.response)
+            steps = np.diff(curve, axis=0)
+            if len(curve) < 2 or np.any(steps <= 0.0) or not np.allclose(curve[[0, -1]], [[0, 0], [1, 1]]):
+                raise invalid("the curve does not rise from [0, 0] to [1, 1]", "sort and scale it", "response")
+        return self
+
+    def intensity(self, light: str) -> Floats | None:
+        """Of a lamp, (3,); None where it is not given."""
+        given = self.lights[light].intensity
+        return None if given is None else np.array(rgb(given))
+
+
+def read(path: Path) -> Calibration:
+    """The calibration in a file. Raises InputError for all that is wrong with it."""
+    if not path.is_file():
+        raise InputError("no calibration file", str(path), f"name one by --calibration, or add {NAME} to the folder")
+    return made(read_json(path), path)
+
+
+def made(raw: Mapping[str, Json], path: Path) -> Calibration:
+    """The calibration of a file's contents."""
+    given = json.loads(json.dumps(dict(raw)))
+    try:
+        return Calibration.model_validate(given)
+    except ValidationError as error:
+        found = explain(error, given, path)
+        raise InputError(found.what, found.where, found.hint.replace("`gonio schema`", "docs/capture.md")) from None

@@ -1,0 +1,160 @@
+"""Photographs to radiance: files decoded, made linear, divided by their exposure, and series of exposures merged."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...render import formats, images
+from .calibration import Calibration, Exposure, Shot
+
+Floats = NDArray[np.float64]
+NOISE = 0.01  # relative, by which exposures are weighed against each other beside their steps
+STEPS = 255  # of a file of 8 bits, which is the least that cameras write
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """What a camera saw, in its own linear unit a second.
+
+    name       of its file, the first of a series
+    shot       what the calibration says of it
+    radiance   (H, W, 3); nan where every exposure was saturated
+    step       (H, W, 3), standard deviation of what quantisation does to it, 0 in files of floating-point numbers
+    """
+
+    name: str
+    shot: Shot
+    radiance: Floats
+    step: Floats
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        return np.asarray(np.isnan(self.radiance).any(axis=-1))
+
+
+def read(shot: Shot, calibration: Calibration, folder: Path) -> Photograph:
+    """A photograph, its exposures merged. Raises InputError, with the file's name, where it cannot be used."""
+    total, weights = np.zeros(()), np.zeros(())
+    best = np.zeros(())
+    for one in shot.pictures:
+        values, step, seconds = _exposed(one, calibration, folder)
+        light, spread = values / seconds, step / seconds
+        # The mean that is least uncertain (Debevec1997 weighs alike); saturated values say nothing.
+        weight = np.where(np.isnan(values), 0.0, 1.0 / (spread**2 + (NOISE * np.nan_to_num(light)) ** 2 + 1e-30))
+        total = total + weight * np.nan_to_num(light)
+        best = best + np.where(weight > 0.0, weight**2 * spread**2, 0.0)
+        weights = weights + weight
+    with np.errstate(invalid="ignore", divide="ignore"):
+        radiance = np.where(weights > 0.0, total / weights, np.nan)
+        step = np.where(weights > 0.0, np.sqrt(best) / weights, 0.0)
+    name = str(folder / shot.pictures[0].file)
+    found = Photograph(name, shot, radiance, step)
+    if found.saturated.all():
+        raise InputError("saturated throughout", name, "expose it for a shorter time, or add such an exposure")
+    return found
+
+
+def _exposed(one: Exposure, calibration: Calibration, folder: Path) -> tuple[Floats, Floats, float]:
+    """(light (H, W, 3), standard deviation of its quantisation, seconds) of a picture; nan where it is saturated."""
+    path = folder / one.file
+    where = str(path)
+    try:
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:
+        what = f"cannot read this photograph: {getattr(error, 'strerror', None) or error}"
+        raise InputError(what, where, "check the name in the calibration file") from None
+    whole = False
+    if path.suffix.lower() == ".npz":
+        values = np.asarray(images.read(path).pixels, np.float64)
+    else:
+        kind = formats.kind_of(content)
+        if kind is None:
+            raise InputError("no picture of a known format", where, "give .png, .jpg, .exr, .hdr or .npz")
+        try:
+            decoded = formats.decode(path, content, kind)
+        except formats.Unreadable as error:
+            raise InputError(f"this photograph is damaged: {error}", where, "copy it again") from None
+        values, whole = decoded.values.astype(np.float64), decoded.whole
+    values = values[..., :1].repeat(3, axis=2) if values.shape[2] < 3 else values[..., :3]
+    height, width = values.shape[:2]
+    if (width, height) != tuple(calibration.camera.size):
+        expected = "x".join(map(str, calibration.camera.size))
+        raise InputError(
+            f"{width}x{height} pixels, {expected} expected, as the camera has", where, "never crop or scale"
+        )
+    if not np.isfinite(values).all():
+        raise InputError("some values are not finite", where, "export it again")
+    seconds = one.seconds if one.seconds is not None else _own_seconds(content)
+    if seconds is None:
+        raise InputError("no exposure time", where, 'add "seconds" to it in the calibration file')
+    if not whole:
+        return values, np.zeros_like(values), seconds
+    steps = 65535 if _sixteen(values) else STEPS
+    clipped = values >= calibration.saturation
+    high, low = (_light(values + side * 0.5 / steps, calibration) for side in (1.0, -1.0))
+    light = np.where(clipped, np.nan, _light(values, calibration))
+    return light, (high - low) / np.sqrt(12.0), seconds
+
+
+def _sixteen(values: Floats) -> bool:
+    """Whether values are finer than 8 bits have."""
+    sample = values[:: max(1, len(values) // 64)].ravel() * STEPS
+    return bool(np.abs(sample - np.round(sample)).max() > 1e-3)
+
+
+def _light(values: Floats, calibration: Calibration) -> Floats:
+    """Light that values of a file stand for, by the camera's response."""
+    response = calibration.response
+    if response == "linear":
+        return values
+    inside = np.clip(values, 0.0, 1.0)
+    if response == "srgb":
+        return images.from_screen(inside).astype(np.float64)
+    curve = np.array(response)
+    return np.interp(inside, curve[:, 0], curve[:, 1])
+
+
+# ---------------------------------------------------------------------- exposure times that files tell
+
+
+def _own_seconds(content: bytes) -> float | None:
+    """The exposure time in an OpenEXR file (`expTime`) or in a JPEG's EXIF; None where there is none."""
+    found: float | None = None
+    try:
+        if formats.kind_of(content) == "OpenEXR":
+            for name, kind, value in formats.exr_attributes(content):
+                if name == "expTime" and kind == "float":
+                    found = float(struct.unpack("<f", value)[0])
+        elif content.startswith(b"\xff\xd8"):
+            found = _exif_seconds(content)
+    except (struct.error, IndexError, formats.Unreadable):
+        return None
+    return found if found is not None and np.isfinite(found) and found > 0.0 else None
+
+
+def _exif_seconds(content: bytes) -> float | None:
+    """ExposureTime, tag 0x829A of the EXIF directory, tag 0x8769 of the first one (CIPA DC-008, 4.6)."""
+    at = content.find(b"Exif\0\0", 0, 1 << 16)
+    if at < 0:
+        return None
+    tiff = content[at + 6 : at + 6 + (1 << 16)]
+    order = "<" if tiff[:2] == b"II" else ">"
+
+    def entries(offset: int) -> dict[int, int]:
+        (count,) = struct.unpack_from(order + "H", tiff, offset)
+        rows = (struct.unpack_from(order + "HHII", tiff, offset + 2 + 12 * n) for n in range(count))
+        return {tag: value for tag, _, _, value in rows}
+
+    (first,) = struct.unpack_from(order + "I", tiff, 4)
+    inner = entries(first).get(0x8769)
+    place = entries(inner).get(0x829A) if inner is not None else None
+    if place is None:
+        return None
+    above, below = struct.unpack_from(order + "II", tiff, place)
+    return above / below if below else None

@@ -1,0 +1,341 @@
+"""Which pixels of a photograph tell something of the sample, and the BRDF samples that they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...measure.tables.half_difference import pair_at
+from ...measure.tables.samples import Samples
+from ...ops import backend
+from . import geometry
+from .calibration import Camera, Flat, Floats
+from .geometry import Array, Placed, Seen
+from .photographs import Photograph
+
+GRAZING = 80.0  # degrees: beyond, a wrong outline moves the angles too far, and papers leave them out (Ngan2005)
+EDGE = 0.02  # of a flat sample's edges, left out all round
+TILE = 8  # pixels: errors within a tile are alike
+LEAST = 50  # pixels without which a photograph shows no sample
+CONTRAST = 3.0  # by how much the lit sample outshines what is around it, at least
+GAUSS = 0.5 / np.sqrt(3.0)  # of a pixel: where two points integrate cubics exactly
+CELLS = (60, 60, 36)  # of theta_h by its root, theta_d and phi_d, in which samples are gathered
+
+Kind = Literal["ball", "flat"]
+FATES = ("used", "saturated", "shadowed", "grazing")  # of the sample's pixels
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What the photographs show, as the calibration has it.
+
+    lamps        (L, 3), their places
+    intensities  (L, 3)
+    names        of the lamps
+    """
+
+    camera: Camera
+    ball: Placed | None
+    flat: Flat | None
+    lamps: Floats
+    intensities: Floats
+    names: tuple[str, ...]
+
+    @cached_property
+    def plane(self) -> tuple[Floats, Floats]:
+        """A point of the flat sample, and its axes (3, 3): x along edge0, z the normal that faces the camera."""
+        assert self.flat is not None, "a photograph shows it"
+        return plane_of(self.flat)
+
+
+def plane_of(flat: Flat) -> tuple[Floats, Floats]:
+    base, x, y = (np.array(v, np.float64) for v in (flat.base, flat.edge0, flat.edge1))
+    normal = np.cross(x, y)
+    normal /= np.linalg.norm(normal)
+    if normal @ base > 0.0:
+        normal = -normal
+    x = x / np.linalg.norm(x)
+    return base, np.stack([x, np.cross(normal, x), normal])
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """Pixels that count, of samples of one kind.
+
+    kind    "ball" or "flat"
+    place   (N, 2), pixel coordinates of their middles
+    lamp    (N,), which lamp
+    tile    (N,), which run of neighbours
+    value   (N, 3), radiance in the camera's unit
+    step    (N, 3), standard deviation of its quantisation
+    """
+
+    kind: Kind
+    place: Floats
+    lamp: NDArray[np.int64]
+    tile: NDArray[np.int64]
+    value: Floats
+    step: Floats
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    def at(self, chosen: NDArray[np.generic]) -> Pixels:
+        """Some of them."""
+        return replace(
+            self,
+            place=self.place[chosen],
+            lamp=self.lamp[chosen],
+            tile=self.tile[chosen],
+            value=self.value[chosen],
+            step=self.step[chosen],
+        )
+
+
+def seen(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
+    """What rays see of a sample under lamps.
+
+    ball  its centre and radius, where they are not the scene's
+    """
+    types = backend.types_like(type(ray))
+    if kind == "ball":
+        if ball is None:
+            assert scene.ball is not None, "a photograph shows it"
+            ball = constant(scene.ball.center, types), backend.float_of(scene.ball.radius, types)
+        return geometry.on_ball(ray, ball[0], ball[1], lamp)
+    base, frame = scene.plane
+    x, y, normal = (constant(axis, types) for axis in frame)
+    return geometry.on_plane(ray, constant(base, types), (x, y, normal), lamp)
+
+
+def constant(vector: Floats, types: backend.Types) -> Array:
+    return types.vec3(*(backend.float_of(float(v), types) for v in vector))
+
+
+def directions(scene: Scene, kind: Kind, place: Floats, lamp: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
+    """(wo, wi, squared distance of the lamp) in float64 at pixel coordinates; NaN beside the ball."""
+    types = backend.types("float64")
+    ray = backend.vector_of(geometry.rays(scene.camera, *place.T), 3, types)
+    found = seen(scene, kind, ray, backend.vector_of(scene.lamps[lamp], 3, types))
+    wo, wi, square = (backend.to_numpy(part, len(place)) for part in found)
+    return wo, wi, square
+
+
+# ---------------------------------------------------------------------- choosing
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The pixels of all photographs that count, how many of the sample's were left out, by why, and a map of each
+    photograph: 0 beside the sample, else 1 + the place in `FATES`."""
+
+    parts: tuple[Pixels, ...]
+    counts: Mapping[str, int]
+    maps: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return sum(map(len, self.parts))
+
+
+def choose(
+    scene: Scene, photographs: Sequence[Photograph], grazing: float, slack: tuple[float, float] = (0.0, 0.0)
+) -> Chosen:
+    """Every pixel of a sample, but the saturated, the shadowed, and those seen or lit from beyond an angle, degrees.
+
+    slack  by how much the ball's outline may be off, relative to its radius, and a lamp's direction, radians: what they
+           could move beyond that angle is left out too
+    Raises InputError, with the file's name, where a photograph shows no sample where there should be one.
+    """
+    counts, maps = dict.fromkeys(FATES, 0), {}
+    gathered: dict[Kind, list[Pixels]] = {"ball": [], "flat": []}
+    tiles = 0
+    for shot in photographs:
+        if shot.shot.sample == "reference":
+            continue
+        kind: Kind = shot.shot.sample
+        lamp = scene.names.index(shot.shot.light)
+        place, own = on_sample(scene, kind)
+        row, column = own
+        wo, wi, _ = directions(scene, kind, place, np.full(len(place), lamp))
+        fine = np.isfinite(wo).all(axis=1) & np.isfinite(wi).all(axis=1)
+        saturated = shot.saturated[row, column]
+        shadowed = fine & (wi[:, 2] <= 0.0)
+        steep = ~shadowed & is_steep(wo, wi, grazing, slack if kind == "ball" else (0.0, slack[1]))
+        kept = ~saturated & ~shadowed & ~steep
+        _check_sample(shot, scene, kind, own, kept | (saturated & ~shadowed & ~steep))
+        if saturated[~shadowed & ~steep].all():
+            raise InputError(
+                "every pixel of the sample is saturated", shot.name, "expose it for a shorter time, or add such one"
+            )
+        fate = np.select([kept, saturated, shadowed], [1, 2, 3], 4).astype(np.uint8)
+        maps[shot.name] = np.zeros(shot.saturated.shape, np.uint8)
+        maps[shot.name][own] = fate
+        for number, name in enumerate(FATES, 1):
+            counts[name] += int(np.sum(fate == number))
+        across = -(-scene.camera.size[0] // TILE)
+        tile = tiles + (row // TILE) * across + column // TILE
+        tiles += across * -(-scene.camera.size[1] // TILE)
+        gathered[kind].append(
+            Pixels(
+                kind,
+                place[kept],
+                np.full(int(kept.sum()), lamp),
+                tile[kept],
+                shot.radiance[row, column][kept],
+                shot.step[row, column][kept],
+            )
+        )
+    parts = tuple(_joined(group) for group in gathered.values() if group)
+    return Chosen(parts, counts, maps)
+
+
+def is_steep(wo: Floats, wi: Floats, grazing: float, slack: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.bool_]:
+    """Whether a pixel is seen or lit from beyond an angle, degrees, or might be: where the outline is off by a share s,
+    the normal turns by as much as takes sin theta_o to (1 + s) sin theta_o."""
+    outline, lamp = slack
+    theta_o, theta_i = (np.arccos(np.clip(np.nan_to_num(w[:, 2], nan=0.0), -1.0, 1.0)) for w in (wo, wi))
+    moved = (1.0 + outline) * np.sin(theta_o)
+    turned = np.where(moved <= 1.0, np.arcsin(np.minimum(moved, 1.0)) - theta_o, np.inf)
+    return np.asarray(np.maximum(theta_o, theta_i + lamp) + turned > np.radians(grazing))
+
+
+def _joined(group: list[Pixels]) -> Pixels:
+    """As one, in the order of the lamps."""
+    whole = Pixels(
+        group[0].kind,
+        np.concatenate([one.place for one in group]),
+        np.concatenate([one.lamp for one in group]),
+        np.concatenate([one.tile for one in group]),
+        np.concatenate([one.value for one in group]),
+        np.concatenate([one.step for one in group]),
+    )
+    return whole.at(np.argsort(whole.lamp, kind="stable"))
+
+
+def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Middles of the pixels that look at a sample, and (row, column) of each."""
+    if kind == "ball":
+        assert scene.ball is not None, "a photograph shows it"
+        inside = geometry.covers(scene.ball, scene.camera)
+    else:
+        assert scene.flat is not None, "a photograph shows it"
+        inside = on_flat(scene.camera, scene.flat)
+    row, column = np.nonzero(inside)
+    return np.stack([column + 0.5, row + 0.5], -1), (row, column)
+
+
+def on_flat(camera: Camera, flat: Flat) -> NDArray[np.bool_]:
+    """Which pixels look at a flat sample, but at its edges."""
+    base, frame = plane_of(flat)
+    ray = geometry.grid_rays(camera)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (base @ frame[2]) / (ray @ frame[2])
+    point = ray * along[:, None] - base
+    edges = np.stack([flat.edge0, flat.edge1], 1)
+    part = point @ np.linalg.pinv(edges).T
+    inside = (along > 0.0) & np.all((part > EDGE) & (part < 1.0 - EDGE), axis=1)
+    return np.asarray(inside.reshape(camera.size[1], camera.size[0]))
+
+
+def _check_sample(
+    shot: Photograph,
+    scene: Scene,
+    kind: Kind,
+    own: tuple[NDArray[np.int64], NDArray[np.int64]],
+    lit: NDArray[np.bool_],
+) -> None:
+    """Raise InputError where a photograph does not show the sample in the place where it should be, and lit."""
+    if int(lit.sum()) < LEAST:
+        what = (
+            f"the light '{shot.shot.light}' reaches {int(lit.sum())} pixels of the {kind} at less than grazing angles"
+        )
+        raise InputError(what, shot.name, "are the lamp's place and the sample's right?")
+    grey = np.where(shot.saturated, np.inf, np.nan_to_num(shot.radiance).mean(axis=-1))
+    inside = np.zeros(grey.shape, bool)
+    inside[own] = True
+    bright = float(np.median(grey[own][lit]))
+    ground = float(np.median(grey[~inside])) if kind == "ball" and not inside.all() else 0.0
+    if not bright > CONTRAST * max(ground, 0.0):
+        what = f"no {kind} in it: where it should be lit, it is no brighter than the ground"
+        raise InputError(what, shot.name, "was the lamp on, and the ground dark?")
+
+
+# ---------------------------------------------------------------------- samples
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """Samples, each the mean of the pixels in a cell of theta_h, theta_d and phi_d.
+
+    table  the samples, without an order
+    error  (N,), standard error of each, relative, by the scatter of its pixels; nan of one pixel
+    count  (N,), pixels of each
+    """
+
+    table: Samples
+    error: Floats
+    count: NDArray[np.int64]
+
+    def confidence(self) -> Floats:
+        """(theta_h by its root, theta_d): how much is known of f there, relative standard error; nan where nothing was
+        seen and the table goes by the nearest samples."""
+        theta_h, theta_d, _ = half_difference(*self.table.pairs())
+        at = (_cell(np.sqrt(theta_h / (0.5 * np.pi)), CELLS[0]), _cell(theta_d / (0.5 * np.pi), CELLS[1]))
+        inverse, found = np.zeros(CELLS[:2]), np.full(CELLS[:2], np.nan)
+        np.add.at(inverse, at, np.where(self.error > 0.0, 1.0 / np.maximum(self.error, 1e-6) ** 2, 0.0))
+        found[inverse > 0.0] = 1.0 / np.sqrt(inverse[inverse > 0.0])
+        return found
+
+
+def half_difference(wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
+    """theta_h, theta_d and phi_d, the last within half a turn: what reciprocity leaves (Rusinkiewicz1998)."""
+    from ...measure import angles
+
+    types = backend.types("float64")
+    found = angles.half_difference(*(backend.vector_of(w, 3, types) for w in (wo, wi)))
+    theta_h, theta_d, phi_d = (backend.to_numpy(part, len(wo)) for part in found)
+    return theta_h, theta_d, phi_d % np.pi
+
+
+def _cell(share: Floats, count: int) -> NDArray[np.int64]:
+    return np.minimum((share * count).astype(np.int64), count - 1)
+
+
+def gather(scene: Scene, chosen: Chosen, title: str) -> Gathered:
+    """The samples that pixels are: f = radiance distance^2 / (intensity cos theta_i), mean by mean."""
+    angles, values = [], []
+    for part in chosen.parts:
+        wo, wi, square = directions(scene, part.kind, part.place, part.lamp)
+        angles.append(np.stack(half_difference(wo, wi), -1))
+        values.append(part.value * square[:, None] / scene.intensities[part.lamp] / wi[:, 2:])
+    theta, value = np.concatenate(angles), np.concatenate(values)
+    share = np.stack([np.sqrt(theta[:, 0] / (0.5 * np.pi)), theta[:, 1] / (0.5 * np.pi), theta[:, 2] / np.pi], -1)
+    index = np.ravel_multi_index(tuple(_cell(share[:, k], CELLS[k]) for k in range(3)), CELLS)
+    _, which, count = np.unique(index, return_inverse=True, return_counts=True)
+
+    def mean(x: Floats) -> Floats:
+        return np.stack([np.bincount(which, weights=column) for column in x.T], -1) / count[:, None]
+
+    middle, level = mean(share), mean(value)
+    scatter = mean((value - level[which]) ** 2)
+    size = np.maximum(np.abs(level).mean(axis=1), 1e-12)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = np.sqrt(scatter.mean(axis=1) / np.maximum(count - 1, 1)) / size
+    wo, wi = pair_at(middle[:, 0] ** 2 * 0.5 * np.pi, middle[:, 1] * 0.5 * np.pi, middle[:, 2] * np.pi)
+    kept = (wo[:, 2] > 0.0) & (wi[:, 2] > 0.0)
+    table = Samples(_angles(wi[kept], wo[kept]), level[kept], title=title, source={"format": "photographs"})
+    return Gathered(table, np.where(count > 1, error, np.nan)[kept], count[kept])
+
+
+def _angles(wi: Floats, wo: Floats) -> Floats:
+    """theta_i, phi_i, theta_r, phi_r of pairs, (N, 4)."""
+    columns = []
+    for w in (wi, wo):
+        columns += [np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]), np.arctan2(w[:, 1], w[:, 0])]
+    return np.stack(columns, -1)

@@ -1,0 +1,172 @@
+"""Which photograph to take next: the place of the lamp that would tell most (D-optimal design, Chaloner1995).
+
+A photograph adds J^T J to what is known of the material, J being the derivatives of its pixels by Dr.Jit, less what it
+must spend on its own lamp's faults. The place that makes the determinant for the material's numbers largest makes the
+volume in which they may lie the smallest, in whatever units they are. Places are taken one by one, each after the ones
+before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...measure.fitting.fit import NORMAL_95
+from ...measure.fitting.parameters import Free, start_of
+from ...models import BSDF
+from . import pixels
+from .calibration import Floats
+from .fitting import Faults, Problem, inverse_of, middle_of
+from .pixels import GRAZING, Kind, Pixels, Scene
+
+PLACES = 96  # candidates all round
+ASIDE, BEHIND = 8.0, 125.0  # degrees from the camera: nearer a lamp is in its way, farther it lights hardly a crescent
+STEEP = 75.0  # degrees from a flat sample's normal
+SEEN = 1500  # pixels that stand for a photograph
+NOTHING = 1.0  # standard deviation of each of the material's numbers before anything is known
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A photograph to take.
+
+    position  of the lamp, in the camera's frame
+    angle     between lamp and camera as seen from the sample, degrees
+    names     of the material's numbers
+    errors    standard errors to be expected with this photograph and those before it, (K,)
+    """
+
+    position: tuple[float, float, float]
+    angle: float
+    names: tuple[str, ...]
+    errors: Floats
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        errors = {name: float(error) for name, error in zip(self.names, self.errors, strict=True)}
+        return {"position": list(self.position), "angle": self.angle, "errors": errors}
+
+    def __str__(self) -> str:
+        place = ", ".join(f"{x:.4g}" for x in self.position)
+        told = ", ".join(f"{n} +- {NORMAL_95 * e:.2g}" for n, e in zip(self.names, self.errors, strict=True))
+        return f"lamp at ({place}), {self.angle:.0f} degrees from the camera: then {told}"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What photographs are to be taken of, and with what.
+
+    scene      camera and sample
+    kind       of the sample
+    material   as far as it is known, or guessed
+    moving     its numbers
+    faults     what stays open of the lamps and the ball
+    intensity  (3,), of the lamp
+    noise      relative, of a pixel; alike: by how many pixels one counts; step: standard deviation of quantisation
+    """
+
+    scene: Scene
+    kind: Kind
+    material: BSDF
+    moving: list[Free]
+    faults: Faults
+    intensity: Floats
+    noise: float = 0.01
+    alike: float = 1.0
+    step: float = 0.0
+
+
+def places(scene: Scene, kind: Kind, distance: float, count: int = PLACES) -> Floats:
+    """Where a lamp might stand, (N, 3): evenly about the sample at a distance, where it lights what the camera sees."""
+    middle = middle_of(scene)
+    many = 4 * count
+    turn = np.arange(many) * np.pi * (3.0 - np.sqrt(5.0))  # a spiral that covers the sphere evenly
+    z = 1.0 - 2.0 * (np.arange(many) + 0.5) / many
+    flat = np.sqrt(1.0 - z * z)
+    toward = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], -1)
+    angle = np.degrees(np.arccos(np.clip(-toward @ middle / np.linalg.norm(middle), -1.0, 1.0)))
+    kept = (angle > ASIDE) & (angle < BEHIND)
+    if kind == "flat":
+        kept &= toward @ scene.plane[1][2] > np.cos(np.radians(STEEP))
+    chosen = np.flatnonzero(kept)
+    return np.asarray(middle + distance * toward[chosen[:: max(1, len(chosen) // count)]])
+
+
+def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = None) -> list[Proposal]:
+    """The best of some places (N, 3) of the lamp for the next photographs, in order.
+
+    known  information that there is of the material's numbers and of what all photographs share (the ball's place, the
+           scale), (K, K); None: nothing yet
+    """
+    if not 1 <= count <= len(lamps):
+        raise InputError(f"{count} photographs asked for, 1 to {len(lamps)} expected", "next")
+    added, own = _told(setting, lamps)
+    total = np.eye(len(added[0])) / NOTHING**2 if known is None else known.copy()
+    total[:own, :own] += 1e-9 * np.eye(own)
+    to_camera = -middle_of(setting.scene)
+    names = tuple(name for one in setting.moving for name in one.names)
+    found: list[Proposal] = []
+    left = list(range(len(lamps)))
+    for _ in range(count):
+        gains = [_volume(total + added[place], own) for place in left]
+        best = left.pop(int(np.argmax(gains)))
+        total = total + added[best]
+        away = lamps[best] + to_camera
+        cos = away @ to_camera / (np.linalg.norm(away) * np.linalg.norm(to_camera))
+        errors = np.sqrt(np.diag(inverse_of(total))[:own])
+        x, y, z = map(float, lamps[best])
+        found.append(Proposal((x, y, z), float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0)))), names, errors))
+    return found
+
+
+def _volume(information: Floats, own: int) -> float:
+    """log det of what is known of the first numbers, the others being open."""
+    return float(np.linalg.slogdet(without(information, own))[1])
+
+
+def without(information: Floats, kept: int) -> Floats:
+    """Information on the first numbers where nothing else is known of the others than it says (Schur's complement)."""
+    if kept == len(information):
+        return information
+    aside = information[:kept, kept:]
+    return np.asarray(information[:kept, :kept] - aside @ inverse_of(information[kept:, kept:]) @ aside.T)
+
+
+def _told(setting: Setting, lamps: Floats) -> tuple[list[Floats], int]:
+    """What a photograph from each place would add for the shared numbers, and how many of these are the material's."""
+    scene = replace(
+        setting.scene,
+        lamps=lamps,
+        intensities=np.tile(setting.intensity, (len(lamps), 1)),
+        names=tuple(f"place {number}" for number in range(len(lamps))),
+    )
+    part, counts = _imagined(scene, setting)
+    problem = Problem(setting.material, setting.moving, scene, [part], setting.faults, setting.noise, setting.alike)
+    numbers = np.concatenate([start_of(setting.material, setting.moving), np.zeros(len(problem.open))])
+    each = len(setting.faults.of_lamp)
+    shared = problem.count - each * len(lamps)
+    found = [np.diag(np.r_[np.zeros(shared), np.ones(each)]) for _ in lamps]
+    for rows in problem.rows(numbers):
+        # shared numbers keep their place, a lamp's own come behind them
+        local = [n if n < shared else shared + (n - shared) % each for n in rows.which]
+        found[rows.lamp][np.ix_(local, local)] += counts * (rows.slope.T @ rows.slope)
+    return [without(one, shared) for one in found], problem.own
+
+
+def _imagined(scene: Scene, setting: Setting) -> tuple[Pixels, float]:
+    """Pixels that stand for a photograph from each lamp, and how many of a photograph's each is."""
+    place, _ = pixels.on_sample(scene, setting.kind)
+    some = place[np.random.default_rng(29).permutation(len(place))[:SEEN]]
+    parts = []
+    slack = setting.faults.slack(scene)
+    for lamp in range(len(scene.names)):
+        which = np.full(len(some), lamp)
+        wo, wi, _ = pixels.directions(scene, setting.kind, some, which)
+        kept = (wi[:, 2] > 0.0) & ~pixels.is_steep(wo, wi, GRAZING, slack)
+        parts.append((some[kept], which[kept]))
+    where, which = np.concatenate([p for p, _ in parts]), np.concatenate([w for _, w in parts])
+    blank = np.zeros((len(where), 3))
+    part = Pixels(setting.kind, where, which, np.zeros(len(where), np.int64), blank, blank + setting.step)
+    return part, len(place) / len(some)

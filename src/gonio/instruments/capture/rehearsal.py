@@ -1,0 +1,125 @@
+"""Photographs that Gonio renders for a calibration: to try a rig, a plan or a fit before anything is built.
+
+rehearsal.take(calibration, go.Conductor(alpha=.2), "photographs", noise=.01)
+go.capture("photographs", "conductor")
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import files
+from ...errors import InputError
+from ...models import BSDF
+from ...owner import public
+from ...render import images, run
+from ...render.request import Request
+from ...render.types import Json
+from .calibration import NAME, Calibration, Floats, made
+
+
+@public
+def take(
+    calibration: Mapping[str, Json],
+    material: BSDF,
+    folder: str | Path,
+    *,
+    noise: float = 0.0,
+    bits: int | None = None,
+    spp: int = 16,
+    seed: int = 1,
+    stated: Mapping[str, Json] | None = None,
+) -> Path:
+    """Render the photographs that a calibration lists into a folder, with a calibration file: the folder.
+
+    calibration  what a calibration file holds; ball and lamps with their places, no lens distortion
+    material     of the sample
+    noise        relative standard deviation of each value
+    bits         8 writes .png files of whole numbers by the calibration's response (linear or srgb), and it
+                 must name them so; None keeps radiance, in .exr, .hdr or .npz
+    spp          samples a pixel
+    stated       the calibration that is written, where it is to differ: for faults
+    """
+    told = made(calibration, Path("calibration"))
+    target = files.check_folder(folder)
+    target.mkdir(exist_ok=True)
+    rng = np.random.default_rng([seed, 41])
+    for shot in told.photographs:
+        radiance = _rendered(told, shot.light, shot.sample, material, spp, seed)
+        for one in shot.pictures:
+            if one.seconds is None:
+                raise InputError(f"no exposure time of '{one.file}'", "calibration", 'add "seconds"')
+            values = radiance * one.seconds * (1.0 + noise * rng.normal(size=radiance.shape))
+            path = target / one.file
+            if bits is None:
+                images.write(path, values.astype(np.float32))
+            elif bits == 8:
+                files.write_whole(path, images.png_bytes(_stored(values, told)))
+            else:
+                raise InputError(f"{bits} bits given, 8 or None expected", "bits")
+    text = json.dumps(dict(stated if stated is not None else calibration), indent=1)
+    files.write_whole(target / NAME, text.encode())
+    return target
+
+
+def _stored(values: Floats, calibration: Calibration) -> np.ndarray:
+    if calibration.response == "srgb":
+        return images.to_screen(values.astype(np.float32))
+    if calibration.response != "linear":
+        raise InputError("a response by a curve cannot be rehearsed", "calibration", '"linear" or "srgb"')
+    return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF, spp: int, seed: int) -> Floats:
+    """Radiance of the sample under one lamp, by Gonio's own renderer."""
+    camera, lamp = calibration.camera, calibration.lights[light]
+    if lamp.position is None or camera.k1 or camera.k2:
+        raise InputError("lamps with positions and a lens without distortion expected", "calibration")
+    width, height = camera.size
+    if camera.centre != (0.5 * width, 0.5 * height):
+        raise InputError("the optical axis must meet the middle of the picture", "calibration")
+    shapes: list[dict[str, Any]] = []
+    if sample == "ball":
+        ball = calibration.ball
+        if ball is None or ball.center is None:
+            raise InputError("a ball with its center expected", "calibration")
+        shapes.append({"type": "sphere", "center": list(ball.center), "radius": ball.radius})
+    else:
+        flat = calibration.flat if sample == "flat" else calibration.reference
+        assert flat is not None, "checked when it was read"
+        edges = {"base": list(flat.base), "edge0": list(flat.edge0), "edge1": list(flat.edge1)}
+        shapes.append({"type": "parallelogram", **edges})
+    intensity = calibration.intensity(light)
+    if intensity is None:
+        raise InputError(f"the light '{light}' has no intensity", "calibration")
+    if sample == "reference":
+        assert calibration.reference is not None, "checked when it was read"
+        albedo = calibration.reference.albedo
+        shapes[0]["material"] = {"type": "matte", "albedo": [albedo] * 3 if isinstance(albedo, float) else list(albedo)}
+    scene = {
+        "output": {"filename": "photograph.npz"},
+        "sampler": {"type": "independent", "samples": spp},
+        "camera": {
+            "type": "pinhole",
+            "transform": {"position": [0, 0, 0], "lookAt": [0, 0, 1], "up": [0, -1, 0]},
+            "verticalFov": float(np.degrees(2.0 * np.arctan(0.5 * height / camera.focal_pixels))),
+            "film": {"size": [width, height]},
+        },
+        "integrator": {"type": "direct"},
+        "scene": {
+            "shapes": shapes,
+            "lights": [{"type": "spotLight", "position": list(lamp.position), "energy": [float(x) for x in intensity]}],
+        },
+    }
+    with tempfile.TemporaryDirectory(prefix="gonio-") as folder:
+        (Path(folder) / "scene.json").write_text(json.dumps(scene))
+        overrides = {} if sample == "reference" else {"shapes.0.material": material}
+        prepared = run.prepare(Request(Path(folder), output=Path(folder) / "p.npz", overrides=overrides, seed=seed))
+        run.work(prepared)
+        return np.asarray(run.finished(prepared.render, False), np.float64)

@@ -1,0 +1,327 @@
+"""Photographs to samples and to a fitted material."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import files
+from ...errors import InputError
+from ...measure import format_of
+from ...measure.fitting.fit import Fit, moving_of
+from ...models import BSDF
+from ...owner import public
+from . import advice, fitting, geometry, pixels, planning
+from . import calibration as calibrations
+from . import photographs as photographs_of
+from .calibration import NAME, Calibration, Floats
+from .photographs import Photograph
+from .pixels import GRAZING, Chosen, Gathered, Kind, Scene
+from .planning import Proposal
+
+
+@dataclass(frozen=True)
+class Capture:
+    """What photographs say of a material.
+
+    scene     camera, ball and lamps, as they were given or found; after a fit with their faults put right
+    samples   BRDF samples, gathered in cells: their table, standard errors, and how many pixels each
+    counts    pixels of the sample: used, saturated, shadowed, grazing
+    fitted    a material fitted to the pixels, None where no model was asked for
+    warnings  what is odd, and what the pictures cannot tell
+    """
+
+    scene: Scene
+    samples: Gathered
+    counts: Mapping[str, int]
+    fitted: fitting.Fitted | None
+    warnings: tuple[str, ...]
+    photographs: tuple[Photograph, ...]
+    chosen: Chosen
+
+    @property
+    def fit(self) -> Fit:
+        """The material with its parameters, their errors and correlations. InputError where none was fitted."""
+        if self.fitted is None:
+            raise InputError("no material was fitted", "model", 'go.capture(photographs, "lambert+ggx")')
+        return self.fitted.fit
+
+    @property
+    def material(self) -> BSDF:
+        """The fitted material."""
+        return self.fit.material
+
+    def next(self, count: int = 1, places: Sequence[Sequence[float]] | None = None) -> list[Proposal]:
+        """Which photographs to take next, the best first: where the lamp should stand.
+
+        places  where it can stand, in the camera's frame; None: anywhere at the distance of the lamps so far
+        """
+        if self.fitted is None:
+            raise InputError("no material was fitted", "model", "a plan needs to know what is to be told")
+        problem, scene = self.fitted.problem, self.scene
+        kind = self.chosen.parts[0].kind
+        away = np.linalg.norm(scene.lamps - fitting.middle_of(scene), axis=1)
+        setting = planning.Setting(
+            scene,
+            kind,
+            self.fit.material,
+            problem.moving,
+            problem.faults,
+            np.median(scene.intensities, axis=0),
+            problem.noise,
+            problem.alike,
+            float(np.median(self.chosen.parts[0].step)),
+        )
+        hessian, _ = problem.information(self.fitted.numbers)
+        shared = problem.count - len(scene.names) * len(problem.faults.of_lamp)
+        known = planning.without(hessian + problem.prior(), shared)
+        lamps = planning.places(scene, kind, float(np.median(away))) if places is None else _points(places)
+        return planning.propose(setting, lamps, count, known)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the samples as a table (.gonio, .binary, .astm, ...), or all that was found as .json."""
+        target = check_output(Path(path))
+        if target.suffix.lower() == ".json":
+            text = json.dumps(self.as_dict(), indent=1)
+            return files.write_whole(target, (text + "\n").encode())
+        form = format_of(target)
+        return files.write_whole(target, form.write(form.resampled(self.samples.table)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        ball = self.scene.ball
+        found: dict[str, Any] = {
+            "pixels": dict(self.counts),
+            "samples": len(self.samples.count),
+            "ball": None if ball is None else {"center": [float(x) for x in ball.center], "radius": ball.radius},
+            "lights": {
+                name: {"position": [float(x) for x in place], "intensity": [float(x) for x in intensity]}
+                for name, place, intensity in zip(
+                    self.scene.names, self.scene.lamps, self.scene.intensities, strict=True
+                )
+            },
+            "warnings": list(self.warnings),
+        }
+        if self.fitted is not None:
+            found |= {
+                "fit": self.fitted.fit.as_dict(),
+                "noise": self.fitted.noise,
+                "faults": {
+                    name: {"deviations": value, "error": error} for name, (value, error) in self.fitted.faults.items()
+                },
+            }
+        return found
+
+    def __str__(self) -> str:
+        counts = self.counts
+        left = ", ".join(f"{counts[why]} {why}" for why in ("saturated", "shadowed", "grazing"))
+        lines = [f"{counts['used']} pixels in {len(self.samples.count)} samples; left out: {left}"]
+        lines += [str(self.fitted.fit)] if self.fitted is not None else []
+        return "\n".join([*lines, *(f"  warning: {text}" for text in self.warnings)])
+
+
+def check_output(path: Path) -> Path:
+    """Raise InputError where the result cannot be written, before anything is computed."""
+    if path.suffix.lower() != ".json":
+        form = format_of(path)
+        if not form.writes:
+            raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
+    return files.check_file(path)
+
+
+@public
+def capture(
+    photographs: str | Path | Sequence[str],
+    model: str | BSDF | None = None,
+    *,
+    calibration: str | Path | None = None,
+    grazing: float = GRAZING,
+    fixed: Mapping[str, object] | None = None,
+    free: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda text: None,
+) -> Capture:
+    """Measure a material from photographs of a ball, or of a flat sample, under a lamp in several places.
+
+        found = go.capture("photographs", "lambert+ggx")
+        found.fit.interval          # 95 % of each parameter
+        found.save("paint.gonio")
+
+    photographs  a folder with a calibration.json, or files that the calibration lists
+    model        what is fitted, as `go.fit` takes it; None: samples alone
+    calibration  the file that says what stood where; None: calibration.json beside the photographs
+    grazing      degrees: pixels seen or lit from beyond are left out
+    fixed        path -> value of parameters that stay
+    free         paths of parameters that move although they stay by themselves
+    Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
+    throughout, or that show no sample.
+    """
+    if not 10.0 <= grazing < 90.0:
+        raise InputError(f"{grazing:g} degrees given, 10 to less than 90 expected", "grazing")
+    path, stated, folder = _calibration(photographs, calibration)
+    shots = []
+    for shot in stated.photographs:
+        progress(f"reads {shot.pictures[0].file}")
+        shots.append(photographs_of.read(shot, stated, folder))
+    scene = _scene(stated, shots)
+    progress("chooses pixels")
+    slack = fitting.Faults.of(stated.uncertainty, scene).slack(scene)
+    chosen = pixels.choose(scene, shots, grazing, slack)
+    if not len(chosen):
+        raise InputError("no pixel is left", str(path), "raise --grazing, or check the calibration")
+    found = None
+    if model is not None:
+        progress("fits")
+        found = fitting.fitted(scene, chosen, model, stated.uncertainty, fixed=fixed, free=free)
+        scene = found.problem.corrected(found.numbers)
+    gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
+    warnings = advice.on(scene, chosen, found)
+    return Capture(scene, gathered, chosen.counts, found, warnings, tuple(shots), chosen)
+
+
+@public
+def plan(
+    calibration: str | Path,
+    model: str | BSDF,
+    count: int = 4,
+    *,
+    places: Sequence[Sequence[float]] | None = None,
+    fixed: Mapping[str, object] | None = None,
+    free: Sequence[str] = (),
+) -> list[Proposal]:
+    """Which photographs to take, before there are any: places of the lamp that tell most of a material like the model.
+
+    calibration  a calibration file; the ball needs its place (or the flat sample), one lamp its place and intensity
+    model        what will be fitted, set to what the material may be like
+    places       where the lamp can stand; None: anywhere at the distance of the calibration's lamps
+    """
+    path = Path(calibration).expanduser()
+    stated = calibrations.read(path)
+    kind: Kind = "ball" if stated.ball is not None else "flat"
+    ball = None if stated.ball is None else geometry.placed(stated.ball, stated.camera, ())
+    lamps = [np.array(lamp.position) for lamp in stated.lights.values() if lamp.position is not None]
+    light = next((found for name in stated.lights if (found := stated.intensity(name)) is not None), None)
+    if not lamps or light is None or (ball is None and stated.flat is None):
+        hint = "a plan needs a ball or a flat sample, and a lamp with its position and intensity"
+        raise InputError("too little is known for a plan", str(path), hint)
+    scene = Scene(stated.camera, ball, stated.flat, np.array(lamps), np.tile(light, (len(lamps), 1)), ())
+    material, moving = moving_of(model, fixed=fixed, free=free)
+    away = np.linalg.norm(scene.lamps - fitting.middle_of(scene), axis=1)
+    setting = planning.Setting(scene, kind, material, moving, fitting.Faults.of(stated.uncertainty, scene), light)
+    stand = planning.places(scene, kind, float(np.median(away))) if places is None else _points(places)
+    return planning.propose(setting, stand, count)
+
+
+def _points(places: Sequence[Sequence[float]]) -> Floats:
+    try:
+        found = np.array(places, np.float64)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():
+        raise InputError("places of the lamp are no (N, 3) numbers", "places", "such as [[0, -300, 200]]")
+    return found
+
+
+def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> Path:
+    """The calibration file that goes with photographs, or with their folder; or which itself is named."""
+    if calibration is not None:
+        return Path(calibration).expanduser()
+    several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
+    if not several:
+        raise InputError("no photographs given", "photographs", "name files, or a folder with a calibration.json")
+    first = Path(several[0]).expanduser()
+    if len(several) == 1 and first.suffix.lower() == ".json":
+        return first
+    return (first if first.is_dir() else first.parent) / NAME
+
+
+def is_blank(named: str | Path | Sequence[str], calibration: str | Path | None = None) -> bool:
+    """Whether the calibration lists no photograph of a sample yet."""
+    stated = calibrations.read(calibration_of(named, calibration))
+    return all(shot.sample == "reference" for shot in stated.photographs)
+
+
+def _calibration(named: str | Path | Sequence[str], calibration: str | Path | None) -> tuple[Path, Calibration, Path]:
+    """The calibration's file, what it says of those photographs that are named, and the folder that they lie in."""
+    path = calibration_of(named, calibration)
+    whole = calibrations.read(path)
+    several = [str(named)] if isinstance(named, str | Path) else [str(one) for one in named]
+    first = Path(several[0]).expanduser()
+    folder = first if first.is_dir() else first.parent
+    kept = whole.photographs
+    if not (len(several) == 1 and (first.is_dir() or first.suffix.lower() == ".json")):
+        known = {Path(one.file).name for shot in whole.photographs for one in shot.pictures}
+        wanted = {Path(one).name for one in several}
+        for name in sorted(wanted - known):
+            what = "the calibration tells neither its exposure nor its light"
+            raise InputError(what, str(folder / name), f"list it under photographs in {path}")
+        # a reference is always read, whatever is named: without it lamps have no intensity
+        kept = [
+            shot
+            for shot in whole.photographs
+            if shot.sample == "reference" or any(Path(one.file).name in wanted for one in shot.pictures)
+        ]
+    if all(shot.sample == "reference" for shot in kept):
+        raise InputError("no photograph of a sample", str(path), 'add some with "sample": "ball" or "flat"')
+    return path, whole.model_copy(update={"photographs": kept}), folder
+
+
+# ---------------------------------------------------------------------- what stood where
+
+
+def _scene(stated: Calibration, shots: Sequence[Photograph]) -> Scene:
+    camera = stated.camera
+    mirrors = []
+    for mirror in stated.mirrors:
+        if mirror.center is None and mirror.outline is None:
+            raise InputError("a mirror ball needs its center or its outline", "mirrors", "read it off the picture")
+        mirrors.append(geometry.placed(mirror, camera, shots))
+    ball = None
+    if stated.ball is not None and any(shot.shot.sample == "ball" for shot in shots):
+        ball = geometry.placed(stated.ball, camera, shots, avoid=mirrors)
+    names = tuple(dict.fromkeys(shot.shot.light for shot in shots))
+    lamps = []
+    for name in names:
+        lamp = stated.lights[name]
+        if lamp.position is not None:
+            lamps.append(np.array(lamp.position))
+            continue
+        if not mirrors:
+            raise InputError(f"no place of the light '{name}'", "lights", 'give its "position", or describe "mirrors"')
+        about = ball.center if ball is not None else np.zeros(3)
+        shot = next(one for one in shots if one.shot.light == name)
+        lamps.append(geometry.lamp_in_mirrors(shot, mirrors, camera, about, lamp.distance))
+    blank = Scene(camera, ball, stated.flat, np.array(lamps), np.ones((len(names), 3)), names)
+    intensities = np.array([_intensity(stated, blank, name, shots) for name in names])
+    return Scene(camera, ball, stated.flat, np.array(lamps), intensities, names)
+
+
+def _intensity(stated: Calibration, scene: Scene, name: str, shots: Sequence[Photograph]) -> Floats:
+    """Of a lamp, as given, or by the white target."""
+    given = stated.intensity(name)
+    if given is not None:
+        return given
+    shot = next((one for one in shots if one.shot.sample == "reference" and one.shot.light == name), None)
+    if shot is None:
+        hint = 'give its "intensity", or photograph a "reference" under it'
+        raise InputError(f"no intensity of the light '{name}'", "lights", hint)
+    target = stated.reference
+    assert target is not None, "checked when it was read"
+    row, column = np.nonzero(pixels.on_flat(stated.camera, target))
+    place = np.stack([column + 0.5, row + 0.5], -1)
+    held = Scene(stated.camera, None, target, scene.lamps, scene.intensities, scene.names)
+    _, wi, square = pixels.directions(held, "flat", place, np.full(len(place), scene.names.index(name)))
+    values = shot.radiance[row, column]
+    fine = ~np.isnan(values).any(axis=1) & (wi[:, 2] > 0.1)
+    if fine.sum() < pixels.LEAST:
+        what = f"{int(fine.sum())} pixels of the reference are lit and not saturated, {pixels.LEAST} expected"
+        raise InputError(what, shot.name, "is the target where the calibration says?")
+    white = np.broadcast_to(np.asarray(target.albedo, float), 3) / np.pi * wi[fine, 2:]
+    found = np.median(values[fine] * square[fine, None] / white, axis=0)
+    if not np.all(found > 0.0):
+        raise InputError("the reference is dark", shot.name, "was the lamp on?")
+    return np.asarray(found)

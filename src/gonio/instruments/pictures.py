@@ -1,0 +1,359 @@
+"""Parameters of a scene's materials fitted to a picture of it, by Mitsuba's differentiable path tracer (`prb`).
+
+Each step renders the picture and its derivative along every number, in forward mode (Vicini2021), and solves for all of
+them at once, as the fit to tables does; so a fit takes some ten steps, and standard errors come with it.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import files
+from ..errors import InputError, did_you_mean
+from ..measure.fitting.fit import NORMAL_95, moving_of, notes_on
+from ..measure.fitting.parameters import CHANNELS, Free, start_of, with_values
+from ..measure.fitting.solver import Linearized, columns_of, solve
+from ..models import BSDF, notation, tree
+from ..owner import public
+from ..render import engine, images, scene
+from ..render.scene.build import Built
+from ..render.scene.schema import SceneDescription
+from ..render.types import Float, MitsubaBSDF
+from ..work import garbage
+
+Floats = NDArray[np.float64]
+SPP, STEPS = 64, 20
+DARK = 0.05  # of the median brightness: below it differences are differences, above it ratios
+TILE = 8  # pixels: errors within a tile are alike
+DEEPEST = 8  # segments of paths, where the scene says nothing
+
+
+@dataclass(frozen=True)
+class PictureFit:
+    """What came of a fit to a picture.
+
+    materials    with the fitted values, by the place of their shape: "shapes.0.material"
+    names        of the numbers that moved: "shapes.0.material.alpha", ...
+    values       theirs, (K,)
+    errors       standard errors, (K,): inf where the picture does not tell
+    correlation  (K, K)
+    losses       mean squared relative difference after each step, the first before any
+    relative     mean |difference| over mean brightness
+    wanted       the picture that was given, fitted the one that was found, (H, W, 3)
+    notes        what is odd about it
+    seconds      that it took
+    """
+
+    materials: Mapping[str, BSDF]
+    names: tuple[str, ...]
+    values: Floats
+    errors: Floats
+    correlation: Floats
+    losses: tuple[float, ...]
+    relative: float
+    wanted: NDArray[np.float32]
+    fitted: NDArray[np.float32]
+    notes: tuple[str, ...]
+    seconds: float
+
+    @property
+    def interval(self) -> Floats:
+        """95 % intervals, (K, 2)."""
+        return np.stack([self.values - NORMAL_95 * self.errors, self.values + NORMAL_95 * self.errors], axis=1)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; an error that is not known is null."""
+        return {
+            "materials": {path: notation.written(one) for path, one in self.materials.items()},
+            "parameters": {
+                name: {"value": float(v), "error": float(e) if np.isfinite(e) else None}
+                for name, v, e in zip(self.names, self.values, self.errors, strict=True)
+            },
+            "correlation": [[round(float(x), 4) for x in row] for row in self.correlation],
+            "losses": list(self.losses),
+            "relative": self.relative,
+            "seconds": round(self.seconds, 3),
+            "notes": list(self.notes),
+        }
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as .json, whole or not at all."""
+        return files.write_whole(Path(path), (json.dumps(self.as_dict(), indent=1) + "\n").encode())
+
+    def __str__(self) -> str:
+        lines = [f"{100.0 * self.relative:.3g} % off on average after {len(self.losses) - 1} steps"]
+        for name, value, error in zip(self.names, self.values, self.errors, strict=True):
+            lines.append(f"  {name} = {value:.5g} +- {NORMAL_95 * error:.2g}")
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+
+@public
+def fit_picture(
+    picture: str | Path,
+    scene_file: str | Path,
+    free: Sequence[str] = ("shapes.0.material",),
+    *,
+    model: str | BSDF | None = None,
+    fixed: Mapping[str, object] | None = None,
+    spp: int = SPP,
+    steps: int = STEPS,
+    seed: int = 1,
+    device: str = "cpu",
+    allow_outside: bool = False,
+    allow_code: bool = False,
+    progress: Callable[[int, float], None] = lambda step, loss: None,
+) -> PictureFit:
+    """Fit parameters of a scene's materials to a picture of the scene.
+
+        found = fit_picture("photo.exr", "scene.json", ["shapes.0.material"])
+
+    picture     .exr, .hdr, .npz or .png, linear radiance as the scene's camera would see it
+    scene_file  of the lab's format; what its materials are set to is where the fit starts
+    free        "shapes.0.material": all of that material's numbers that move; "shapes.0.material.alpha": that one
+    model       a material that is put in the place of the first of `free`
+    fixed       values by their path in the scene, as `gonio study` has them, set before
+    spp         samples a pixel, of each render
+    steps       at most
+    progress    called after each step with its number and the loss
+    Raises InputError for files, paths and pictures that do not fit together.
+    """
+    started = time.perf_counter()
+    wanted = images.read(picture).pixels
+    mi = engine.load(device)
+    if not str(mi.variant()).endswith("ad_rgb"):
+        raise InputError(
+            f"variant {mi.variant()} is set", "device", "a fit to a picture takes llvm_ad_rgb or cuda_ad_rgb"
+        )
+    overrides = dict(fixed or {})
+    if model is not None:
+        overrides[_place(free[0])[0]] = moving_of(model)[0]
+    description = scene.read(scene_file, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides)
+    width, height = description.camera.film.size
+    if wanted.shape[:2] != (height, width):
+        what = f"{wanted.shape[1]}x{wanted.shape[0]} pixels, {width}x{height} expected, as the scene's film has"
+        raise InputError(what, str(picture), "render the scene in that size, or scale neither")
+    if not np.isfinite(wanted).all() or not wanted.max() > 0.0:
+        raise InputError("the picture is dark, or not finite", str(picture))
+    with garbage.kept():
+        built = scene.built(description, mi)
+        problem = Problem(mi, built, _targets(description, built, free), _depth(description), wanted, spp, seed)
+        start = problem.start()
+        losses = [problem.loss(start)]
+        progress(0, losses[0])
+
+        def step(cost: float) -> None:
+            losses.append(cost / wanted.size)
+            progress(len(losses) - 1, losses[-1])
+
+        numbers = solve(problem, start, steps=steps, tolerance=1e-5, progress=step).numbers
+        return _result(problem, numbers, losses, time.perf_counter() - started)
+
+
+def _place(path: str) -> tuple[str, str]:
+    """("shapes.0.material", "base.alpha") of "shapes.0.material.base.alpha"."""
+    steps = path.removeprefix("scene.").split(".")
+    if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdigit() or steps[2] != "material":
+        raise InputError(f"'{path}' names no material of a shape", "free", 'such as "shapes.0.material.alpha"')
+    return ".".join(steps[:3]), ".".join(steps[3:])
+
+
+def _depth(description: SceneDescription) -> int:
+    deep = description.integrator.max_depth
+    return int(deep) if deep is not None else DEEPEST if description.integrator.type == "path" else 2
+
+
+@dataclass(frozen=True)
+class Target:
+    """A material of the scene whose numbers move."""
+
+    path: str
+    plugin: MitsubaBSDF
+    material: BSDF
+    moving: list[Free]
+
+
+def _targets(description: SceneDescription, built: Built, free: Sequence[str]) -> list[Target]:
+    chosen: dict[str, list[str]] = {}
+    for path in free:
+        place, parameter = _place(path)
+        chosen.setdefault(place, []).append(parameter)
+    found: list[Target] = []
+    for place, parameters in chosen.items():
+        index = int(place.split(".")[1])
+        if index >= len(description.shapes):
+            raise InputError(f"no shape {index}", f"free: {place}", f"the scene has {len(description.shapes)}")
+        part = description.shapes[index].material
+        plugin = None if part is None else built.bsdfs.get(part)
+        if plugin is None or not hasattr(plugin, "placed"):
+            raise InputError("no material of Gonio's there, or a normal map over it", f"free: {place}", "name another")
+        if any(plugin is other.plugin for other in found):
+            raise InputError("two shapes share this material", f"free: {place}", "name one of them")
+        material = plugin.placed.model
+        if any(plugin.placed.slots[name].textures for name in plugin.placed.slots):
+            raise InputError("a texture varies this material", f"free: {place}", "give it plain numbers")
+        known = [leaf.path for leaf in tree.leaves(material) if leaf.parameter.numeric]
+        for parameter in filter(None, parameters):
+            if parameter not in known:
+                raise InputError(f"no parameter '{parameter}'", f"free: {place}", did_you_mean(parameter, known))
+        moving = moving_of(material, free=tuple(filter(None, parameters)))[1]
+        if "" not in parameters:
+            moving = [one for one in moving if one.path in parameters]
+        found.append(Target(place, plugin, material, moving))
+    return found
+
+
+class Problem:
+    """Residuals of a picture: (rendered - wanted) / (wanted + c), with their derivatives by `prb`."""
+
+    def __init__(
+        self,
+        mi: ModuleType,
+        built: Built,
+        targets: list[Target],
+        depth: int,
+        wanted: NDArray[np.float32],
+        spp: int,
+        seed: int,
+    ) -> None:
+        from scipy import ndimage
+
+        self.mi, self.scene, self.targets, self.spp, self.seed = mi, built.scene, targets, spp, seed
+        self.integrator = mi.load_dict({"type": "prb", "max_depth": depth, "rr_depth": 1000})
+        self.wanted = wanted.astype(np.float64)
+        # a mean of neighbours: a pixel's own noise must not weigh it
+        level = ndimage.uniform_filter(np.abs(self.wanted), (3, 3, 1))
+        lit = level[level > 0.0]
+        self.weight = 1.0 / (level + DARK * float(np.median(lit)))
+        self.free = [replace(one, path=f"{target.path}.{one.path}") for target in targets for one in target.moving]
+        # numbers that one derivative is taken along, and whose they are
+        self.columns: list[list[int]] = []
+        self.owners: list[int] = []
+        for owner, target in enumerate(targets):
+            before = sum(map(len, self.columns))
+            groups = columns_of(target.material, target.moving)
+            self.columns += [[before + n for n in group] for group in groups]
+            self.owners += [owner] * len(groups)
+
+    @property
+    def count(self) -> int:
+        return sum(one.count for one in self.free)
+
+    def start(self) -> Floats:
+        return np.concatenate([start_of(target.material, target.moving) for target in self.targets])
+
+    def put(self, numbers: Floats) -> list[Float]:
+        """Set the numbers in the plugins: Dr.Jit's values of each, of which derivatives can be taken."""
+        import drjit as dr
+
+        variables, at = [], 0
+        for target in self.targets:
+            for one in target.moving:
+                part = [dr.opaque(self.mi.Float, float(x)) for x in numbers[at : at + one.count]]
+                at += one.count
+                variables += part
+        self._place_in(variables)
+        return variables
+
+    def _place_in(self, variables: list[Float]) -> None:
+        at = 0
+        for target in self.targets:
+            for one in target.moving:
+                *inner, name = one.path.split(".")
+                placed = target.plugin.placed
+                for step in inner:
+                    placed = placed.inner[step][1]
+                slot = placed.slots[name]
+                part = variables[at : at + one.count]
+                at += one.count
+                for key in slot.values:
+                    slot.values[key] = self.mi.Color3f(*part) if one.count > 1 else part[0]
+            target.plugin.placed.derive()
+
+    def render(self, numbers: Floats, spp: int | None = None, seed: int | None = None) -> Floats:
+        """The picture with these numbers."""
+        self.put(numbers)
+        tensor = self.mi.render(
+            self.scene, integrator=self.integrator, spp=spp or self.spp, seed=self.seed if seed is None else seed
+        )
+        return np.asarray(np.array(tensor)[..., :CHANNELS], np.float64)
+
+    def loss(self, numbers: Floats) -> float:
+        return float(np.mean(((self.render(numbers) - self.wanted) * self.weight) ** 2))
+
+    def linearized(self, numbers: Floats) -> list[Linearized]:
+        """By channel."""
+        import drjit as dr
+
+        slopes = []
+        shown = np.zeros(self.wanted.shape)
+        for columns, owner in zip(self.columns, self.owners, strict=True):
+            variables = self.put(numbers)
+            for column in columns:
+                dr.enable_grad(variables[column])
+            self._place_in(variables)
+            held = self.mi.traverse(self.targets[owner].plugin)  # the render looks in here for what is differentiated
+            tensor = self.mi.render(self.scene, held, integrator=self.integrator, spp=self.spp, seed=self.seed)
+            for column in columns:
+                dr.set_grad(variables[column], 1.0)
+            slope = dr.forward_to(tensor)
+            shown = np.asarray(np.array(dr.detach(tensor))[..., :CHANNELS], np.float64)
+            slopes.append(np.asarray(np.array(slope)[..., :CHANNELS], np.float64))
+        residual = (shown - self.wanted) * self.weight
+        found: list[Linearized] = []
+        for channel in range(CHANNELS):
+            which = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
+            jacobian = np.stack([(s[..., channel] * self.weight[..., channel]).ravel() for s in slopes], -1)
+            found.append((residual[..., channel].ravel(), jacobian, which))
+        return found
+
+
+def _result(problem: Problem, numbers: Floats, losses: list[float], seconds: float) -> PictureFit:
+    height, width = problem.wanted.shape[:2]
+    row, column = np.indices((height, width)) // TILE
+    tile = (row * (-(-width // TILE)) + column).ravel()
+    hessian = np.zeros((problem.count, problem.count))
+    pushes = np.zeros((int(tile.max()) + 1, problem.count))
+    for residual, slope, which in problem.linearized(numbers):
+        hessian[np.ix_(which, which)] += slope.T @ slope
+        for place, number in enumerate(which):
+            pushes[:, number] += np.bincount(tile, weights=residual * slope[:, place], minlength=len(pushes))
+    scale = np.sqrt(np.diag(hessian))
+    told = scale > 0.0
+    covariance = np.full(hessian.shape, 0.0)
+    if told.any():
+        s = np.outer(scale[told], scale[told])
+        inverse = np.linalg.pinv(hessian[np.ix_(told, told)] / s, rcond=1e-9) / s
+        covariance[np.ix_(told, told)] = inverse @ (pushes.T @ pushes)[np.ix_(told, told)] @ inverse
+    errors = np.where(told, np.sqrt(np.diag(covariance)), np.inf)
+    size = np.where(told & (errors > 0.0), errors, 1.0)
+    correlation = covariance / np.outer(size, size)
+    np.fill_diagonal(correlation, 1.0)
+    names = tuple(name for one in problem.free for name in one.names)
+    shown = problem.render(numbers)
+    materials, at = {}, 0
+    for target in problem.targets:
+        count = sum(one.count for one in target.moving)
+        materials[target.path] = with_values(target.material, target.moving, numbers[at : at + count])
+        at += count
+    return PictureFit(
+        materials,
+        names,
+        numbers,
+        errors,
+        correlation,
+        tuple(losses),
+        float(np.abs(shown - problem.wanted).mean() / np.abs(problem.wanted).mean()),
+        problem.wanted.astype(np.float32),
+        shown.astype(np.float32),
+        tuple(notes_on(problem.free, numbers, errors, correlation, names)),
+        seconds,
+    )
