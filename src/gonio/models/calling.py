@@ -36,6 +36,9 @@ Given: TypeAlias = Any  # directions as callers have them: arrays, lists, Dr.Jit
 DrJit: TypeAlias = Any  # what only a value's own type could tell, and Dr.Jit's types do not
 
 
+MISSING: Any = object()
+
+
 class EvalMethod(Protocol):
     """`eval` as callers see it: a spectrum a ray, (N, 3)."""
 
@@ -101,14 +104,14 @@ def method(formula: Callable[..., object], /) -> object:
     def enter(
         self: Material,
         wo: Given,
-        other: Given | None = None,
+        other: Given | None = MISSING,
         mode: Mode = "radiance",
         precision: Precision | None = None,
         **named: Given,
     ) -> object:
-        if other is None:
-            other = named.pop(second, None)
-        if other is None or named:
+        if other is MISSING:
+            other = named.pop(second, MISSING)
+        if other is MISSING or named:
             what = f"has no argument '{next(iter(named))}'" if named else f"misses its argument '{second}'"
             raise TypeError(f"{type(self).__name__}.{formula.__name__} {what}: wo, {second}, precision and mode")
         args = (mode,) if takes_mode else ()
