@@ -3,9 +3,9 @@
     python benchmarks/historic_fits.py               # all materials, all fits that Ngan and Low printed: half an hour
     python benchmarks/historic_fits.py --every 10    # one material of ten
 
-Each material's table is its fit of 2012 by Bagher, the closest to the measurement that is public. Both sets of numbers are
-judged by the paper's own metric: the root mean square of the difference of f cos (Ngan2005), of log(1 + f cos) (Low2012),
-over directions up to 80 degrees. A fit starts at the printed numbers too, so that it cannot be worse.
+Each material's table is its fit of 2012 by Bagher, the closest to the measurement that is public. Both sets of numbers
+are judged by the paper's own metric: the root mean square of the difference of f cos (Ngan2005), of log(1 + f cos)
+(Low2012), over directions up to 80 degrees. A fit starts at the printed numbers too, so that it cannot be worse.
 """
 
 from __future__ import annotations
