@@ -445,7 +445,9 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     inverse = inverse_of(hessian + prior)
     # the sandwich (Liang1986), in which each prior counts for what it is
     covariance = inverse @ (spread + prior) @ inverse
-    errors = np.sqrt(np.where(np.diag(hessian + prior) > 0.0, np.diag(covariance), np.inf))
+    # where few tiles tell a number, their residuals are small for that very reason: no smaller than by the noise alone
+    variance = np.maximum(np.diag(covariance), np.diag(inverse))
+    errors = np.sqrt(np.where(np.diag(hessian + prior) > 0.0, variance, np.inf))
     own = slice(0, problem.own)
     correlation = _correlation(covariance[own, own])
     material = with_values(problem.material, problem.moving, numbers[own])
