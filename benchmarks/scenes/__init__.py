@@ -1,7 +1,7 @@
 """The scenes of `benchmarks/suite.py`: what differs between them is what path tracers differ in.
 
-Each is a function that returns a Mitsuba dictionary without camera, film and sampler; `Scene.load` adds those. All are made
-here, textures and environments too, so that the suite needs no file.
+Each is a function that returns a Mitsuba dictionary without camera, film and sampler; `Scene.load` adds those. All are
+made here, textures and environments too, so that the suite needs no file.
 """
 
 from __future__ import annotations

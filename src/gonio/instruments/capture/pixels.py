@@ -219,7 +219,7 @@ def _joined(group: list[Pixels]) -> Pixels:
 
 
 def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Middles of the pixels that look at a sample, and (row, column) of each."""
+    """Middles of the pixels that look at a sample, and (row, column) of each. InputError where none does."""
     if kind == "ball":
         assert scene.ball is not None, "a photograph shows it"
         inside = geometry.covers(scene.ball, scene.camera)
@@ -227,6 +227,9 @@ def on_sample(scene: Scene, kind: Kind) -> tuple[Floats, tuple[NDArray[np.int64]
         assert scene.flat is not None, "a photograph shows it"
         inside = on_flat(scene.camera, scene.flat)
     row, column = np.nonzero(inside)
+    if row.size == 0:
+        hint = "check its place, the camera's and the size of the pictures"
+        raise InputError(f"no pixel looks at the {kind} sample: it lies outside the picture", "calibration", hint)
     return np.stack([column + 0.5, row + 0.5], -1), (row, column)
 
 
