@@ -106,7 +106,7 @@ def draw(found: dict[str, list[tuple[float, float]]], path: Path) -> None:
         axes.loglog(x, [100.0 * value for value in y], "o-" if len(points) > 1 else "s", label=title, markersize=5)
     axes.axvline(GIVEN[0], color="0.7", linewidth=1, zorder=0)
     axes.axhline(100.0 * GIVEN[1], color="0.7", linewidth=1, zorder=0)
-    axes.text(GIVEN[0] * 1.06, axes.get_ylim()[1] * 0.7, "16 KiB", color="0.4")
+    axes.text(GIVEN[0] * 1.06, 0.5, "16 KiB", color="0.4", transform=axes.get_xaxis_transform())
     axes.set(xlabel="bytes a material", ylabel="relative error on a sphere, median [%]")
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)
