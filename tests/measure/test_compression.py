@@ -108,7 +108,10 @@ def test_an_adaptive_table_stays_one_in_few_bytes(folder: Path) -> None:
 @pytest.mark.shared
 @pytest.mark.parametrize("name", ["cc_ibiza_sunset", "chm_mint", "irid_flake_paint1"])
 def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: Path) -> None:
-    row = go.compress(SHARED / "rgl" / f"{name}_rgb.bsdf", tmp_path / "a.gonio", method="rgl")[0]
+    file = SHARED / "rgl" / f"{name}_rgb.bsdf"
+    if not file.is_file():
+        pytest.skip("the shared folder with measured materials is not beside this checkout")
+    row = go.compress(file, tmp_path / "a.gonio", method="rgl")[0]
     assert row.size < 0.21 * 658_952 and row.error < (1e-3 if name.startswith("irid") else 1e-5)
 
 
@@ -149,6 +152,8 @@ def test_a_published_network_says_what_its_table_does() -> None:
     from gonio.measure.tables.network import SHAPES
 
     path = SHARED / "nbrdf" / "merl.npz"
+    if not path.is_file():
+        pytest.skip("the shared folder with measured materials is not beside this checkout")
     parts = arrays(path.read_bytes(), str(path))
     network, table = Network({part: parts[f"nickel/{part}"] for part in SHAPES}), measure.read(f"{path}:nickel")
     wo, wi = (w[::997] for w in centres((90, 90, 180)))

@@ -38,8 +38,8 @@ class Lobe(NamedTuple):
     q_max    largest q of the chart: 2 about the normal, else 4
     full     whether azimuths run all round, from the tangent; else from wo's azimuth, and both halves are alike
     density  over (s, phi), by slice: 1 over all s and phi
-    rows     shares of the hats of the nodes of s as a tree, by slice
-    columns  and of those of phi, by slice and node of s
+    below    its integral over phi up to each node, by slice and node of s
+    rows     its integral over s and phi up to each node of s, by slice
     scales   q0 and 1 / log(1 + q_max / q0)
     centres  sine and cosine of the centre's angle to the normal, by slice: positive on wo's side
     """
@@ -49,8 +49,8 @@ class Lobe(NamedTuple):
     q_max: float
     full: bool
     density: Table
+    below: Table
     rows: Table
-    columns: Table
     scales: Table
     centres: Table
 
@@ -95,19 +95,13 @@ class Lobe(NamedTuple):
         return reflect(wo, v) if self.chart == "half" else v
 
     @property
-    def nodes(self) -> tuple[int, int]:
-        """Of s and of the azimuth."""
-        _, rows, columns = self.density.shape
-        return rows, columns
-
-    @property
     def span(self) -> float:
         """Of the azimuth."""
         return 2.0 * ops.pi if self.full else ops.pi
 
     def at(self, index: Scalar, s: Scalar, phi: Scalar) -> Scalar:
         """The density of a slice at (s, phi)."""
-        rows, columns = self.nodes
+        _, rows, columns = self.density.shape
         row, along = _cell(s * (rows - 1.0), rows)
         column, across = _cell(phi * ((columns - 1.0) / self.span), columns)
         (a,), (b,), (c,), (d,) = (
@@ -116,13 +110,31 @@ class Lobe(NamedTuple):
         return _between(_between(a, b, across), _between(c, d, across), along)
 
     def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
-        """(s, phi) with the density of a slice: a node, by the light of the hat about it, and a place under its hat."""
-        rows, columns = self.nodes
-        row, along = _pick_hat(lambda node: fetch(self.rows, index, node), rows, u1)
-        column, across = _pick_hat(lambda node: fetch(self.columns, index, row, node), columns, u2)
-        return _under_hat(row, along, rows) / (rows - 1.0), _under_hat(column, across, columns) * (
-            self.span / (columns - 1.0)
-        )
+        """(s, phi) with the density of a slice: first s, by the integrals over phi, then phi at that s."""
+        _, rows, columns = self.density.shape
+
+        def row_below(row: Scalar) -> Scalar:
+            return fetch(self.rows, index, row)[0]
+
+        def total(row: Scalar) -> Scalar:
+            return fetch(self.below, index, row, 0.0 * row + (columns - 1.0))[0]
+
+        row = _search(row_below, u1, rows)
+        along = _in_cell((u1 - row_below(row)) * (rows - 1.0), total(row), total(row + 1.0))
+
+        def column_below(column: Scalar) -> Scalar:
+            (low,), (high,) = fetch(self.below, index, row, column), fetch(self.below, index, row + 1.0, column)
+            return _between(low, high, along)
+
+        def height(column: Scalar) -> Scalar:
+            (low,), (high,) = fetch(self.density, index, row, column), fetch(self.density, index, row + 1.0, column)
+            return _between(low, high, along)
+
+        u2 = u2 * column_below(0.0 * row + (columns - 1.0))
+        column = _search(column_below, u2, columns)
+        width = self.span / (columns - 1.0)
+        across = _in_cell((u2 - column_below(column)) / width, height(column), height(column + 1.0))
+        return (row + along) / (rows - 1.0), (column + across) * width
 
 
 class Place(NamedTuple):
@@ -293,43 +305,22 @@ def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
     return low + (high - low) * share
 
 
-def levels_of(count: int) -> int:
-    """How many steps to one of five lead to one of `count` nodes."""
-    levels = 1
-    while 5**levels < count:
-        levels += 1
-    return levels
+def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
+    """The last but one node at most, up to which there is no more than u."""
+    found: Array = 0.0 * u
+    step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
+    while step:
+        ahead = found + float(step)
+        inside = minimum(ahead, count - 2.0)
+        found = where((ahead < count - 1.5) & (below(inside) <= u), ahead, found)
+        step >>= 1
+    return found
 
 
-def _pick_hat(branching: Callable[[Scalar], tuple[Scalar, ...]], count: int, u: Scalar) -> tuple[Scalar, Scalar]:
-    """The node that u falls to by a tree of cumulative shares, and what is left of u, in [0, 1).
-
-    The order of the nodes is kept, unlike by an alias table, which is faster but undoes what a Sobol sampler is for:
-    a quarter more variance. A branching of five is one fetch.
-    """
-    node: Array = 0.0 * u
-    low: Array = 0.0 * u
-    high: Array = 1.0 + 0.0 * u
-    start = 0
-    for level in range(levels_of(count)):
-        bounds = branching(node + float(start))
-        start += 5**level
-        node = 5.0 * node
-        for bound in reversed(bounds):
-            high = where(u < bound, bound, high)
-        for bound in bounds:
-            passed = u >= bound
-            node, low = where(passed, node + 1.0, node), where(passed, bound, low)
-    return node, ops.clamp(ops.safe_div(u - low, minimum(high, 1.0) - low), 0.0, ALMOST_ONE)
-
-
-def _under_hat(node: Scalar, u: Scalar, count: int) -> Scalar:
-    """A place whose density falls linearly from a node to its neighbours; at either end there is but one of them."""
-    up = u < 0.5
-    away = safe_sqrt(2.0 * where(up, u, 1.0 - u))
-    away = where(up, away - 1.0, 1.0 - away)
-    away = where(node == 0.0, ops.abs(away), where(node > count - 1.5, -ops.abs(away), away))
-    return node + away
+def _in_cell(area: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """Share of a cell of width 1 below which lies `area` of a density that goes linearly from low to high."""
+    root = safe_sqrt(low * low + 2.0 * (high - low) * area)
+    return ops.clamp(ops.safe_div(2.0 * area, low + root), 0.0, 1.0)
 
 
 def _pick(place: Place, u: Scalar) -> tuple[Scalar, Scalar]:

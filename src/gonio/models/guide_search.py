@@ -21,7 +21,7 @@ from .. import ops
 from ..errors import InputError
 from ..ops import Scalar, Table, backend, fetch
 from . import tree
-from .guide import Axis, Guide, Lobe, levels_of
+from .guide import Axis, Guide, Lobe
 from .parameters import Material, Parameter, Value, pair_of
 
 Grid: TypeAlias = "NDArray[np.float64]"
@@ -391,17 +391,21 @@ class _Best:
 
     def lobe(self) -> Lobe:
         """For formulas."""
+        span = 2.0 * np.pi if self.full else np.pi
         g = self.density
-        hats = g * _trapezoid(g.shape[-2], 1.0)[:, None] * _trapezoid(g.shape[-1], 1.0)
-        rows = hats.sum(-1)
+        steps = np.cumsum(0.5 * (g[..., 1:] + g[..., :-1]), axis=-1) * (span / (g.shape[-1] - 1))
+        below = np.concatenate([np.zeros_like(g[..., :1]), steps], axis=-1)
+        rows = below[..., -1]
+        over_s = np.cumsum(0.5 * (rows[:, 1:] + rows[:, :-1]), axis=-1) / (rows.shape[-1] - 1)
+        over_s = np.concatenate([np.zeros_like(rows[:, :1]), over_s], axis=-1)
         return Lobe(
             self.across,
             self.chart.name,
             self.chart.q_max,
             self.full,
             _named("density", g[..., None]),
-            _named("rows", _tree(rows)),
-            _named("columns", _tree(hats)),
+            _named("below", below[..., None]),
+            _named("rows", over_s[..., None]),
             _named("scales", np.array([[self.chart.q0, 1.0 / self.chart.span]])),
             _named("centres", self.centres),
         )
@@ -547,21 +551,6 @@ class _Slices:
     def _seen(self, material: Any, across: bool, side: float, wo: tuple[Grid, ...], wi: tuple[Grid, ...]) -> Grid:
         """Light of pairs that are both given above the surface."""
         return _light(material, (wo[0], wo[1], side * wo[2]), (wi[0], wi[1], (-side if across else side) * wi[2]))
-
-
-def _tree(light: Grid) -> Grid:
-    """Cumulative shares of the last axis as a tree of fives: (..., nodes) -> (..., branchings, 4).
-
-    A branching holds what lies before its second to fifth branch; level by level. Beyond the last node stands 2, where
-    no number in [0, 1) gets.
-    """
-    count = light.shape[-1]
-    levels = levels_of(count)
-    total = light.sum(-1, keepdims=True)
-    before = np.full((*light.shape[:-1], 5**levels), 2.0)
-    before[..., :count] = (np.cumsum(light, axis=-1) - light) / np.where(total > 0.0, total, 1.0)
-    parts = [before[..., :: 5 ** (levels - 1 - level)].reshape(*light.shape[:-1], -1, 5) for level in range(levels)]
-    return np.concatenate(parts, axis=-2)[..., 1:]
 
 
 def _trapezoid(count: int, length: float) -> Grid:

@@ -22,7 +22,7 @@ from .base import Method, over_half_vectors
 OFFSET = 0.05  # of the median of f: darker cells are known less well relatively
 FILLS, FILL_STEP = 6, 2.0  # rounds of filling, and how coarse cosines are meanwhile
 STEPS = (1e-3, 300.0)  # between which the step is looked for
-HALVINGS = 12
+HALVINGS = 9
 
 Stored = Mapping[str, NDArray[np.generic]]
 T = TypeVar("T", LogTable, LowRank)
