@@ -145,7 +145,8 @@ class MaterialPart(Part):
 
     @property
     def preset(self) -> str | None:
-        return getattr(self, _attribute("preset"), None)
+        found: str | None = self.__dict__.get(_attribute("preset"))
+        return found
 
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
         """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""

@@ -53,7 +53,7 @@ def read(
     _check_output(description)
     seen: dict[MaterialPart, list[tuple[str, str]]] = {}
     for where, part in parts(description):
-        if (name := getattr(part, "file", None)) is not None:
+        if (name := part.__dict__.get("file")) is not None:
             description.locate(name, f"{where}/file")
         if isinstance(part, MaterialPart):
             if part not in seen:
@@ -138,7 +138,7 @@ def sources(description: SceneDescription) -> tuple[str, dict[str, Path]]:
     """The scene as text, overrides and all, and every file that it names: textures, meshes, and Python that it runs."""
     named: dict[str, Path] = {}
     for where, part in parts(description):
-        if (name := getattr(part, "file", None)) is not None:
+        if (name := part.__dict__.get("file")) is not None:
             named[str(name)] = description.locate(name, f"{where}/file")
         if isinstance(part, MaterialPart) and outside.is_outside(part.model):
             code = Path(inspect.getsourcefile(part.model) or "")

@@ -68,8 +68,10 @@ class _Object(dict[str, Json]):
 
     def __init__(self, pairs: list[tuple[str, Json]]) -> None:
         super().__init__(pairs)
-        seen: set[str] = set()
-        self.twice = [key for key, _ in pairs if key in seen or seen.add(key)]  # type: ignore[func-returns-value]
+        self.twice: list[str] = []
+        if len(self) < len(pairs):
+            seen: set[str] = set()
+            self.twice = [key for key, _ in pairs if key in seen or seen.add(key)]  # type: ignore[func-returns-value]
 
 
 class _NotFinite(str):
@@ -119,9 +121,14 @@ def _check_depth(text: str, path: Path) -> None:
             depth -= 1
 
 
+def _plain(value: Json) -> bool:
+    """Whether a value is a usable number: most of a large file is."""
+    return type(value) is float and math.isfinite(value)
+
+
 def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
     """The value in plain types; raises at the first thing that JSON forbids or that a scene cannot use."""
-    if type(value) is float and math.isfinite(value):  # most of a large file is numbers
+    if _plain(value):
         return value
 
     def refuse(what: str, hint: str) -> NoReturn:
@@ -136,7 +143,7 @@ def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
             refuse(f"the key {value.twice[0]!r} is given twice", "keep one of them")
         return {key: _checked(item, path, (*steps, key)) for key, item in value.items()}
     if isinstance(value, list):
-        return [_checked(item, path, (*steps, index)) for index, item in enumerate(value)]
+        return [v if _plain(v) else _checked(v, path, (*steps, index)) for index, v in enumerate(value)]
     if value is None:
         refuse("expected a value, got null", "leave the key out for its default")
     if isinstance(value, _NotFinite):
@@ -149,6 +156,8 @@ def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
 
 
 def _encodable(text: str) -> bool:
+    if text.isascii():
+        return True
     try:
         text.encode()
     except UnicodeEncodeError:
