@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 CELLS = (60, 45, 36)
-METRICS = {"ngan2005": "linear", "low2012": "log1"}
+METRICS = {"ngan2005": "linear", "low2012": "log1p"}
 console = Console()
 
 
@@ -36,19 +36,20 @@ def error(material: go.BSDF, data: Data, metric: str) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--every", type=int, default=1, help="take one material of so many")
-    every = parser.parse_args().every
+    parser.add_argument("--paper", choices=METRICS, action="append", help="take this paper's alone")
+    given = parser.parse_args()
     ratios: dict[str, list[float]] = defaultdict(list)
     times = []
-    for name in go.materials()[::every]:
+    for name in go.materials()[:: given.every]:
         bagher = go.material(name)
         data = data_of(sampled(lambda wo, wi, m=bagher: np.asarray(m.eval(wo, wi)), CELLS))
         for fit in go.fits(name):
             paper = fit.partition("/")[0]
-            if paper not in METRICS:
+            if paper not in (given.paper or METRICS):
                 continue
             printed, metric = go.material(name, fit=fit), METRICS[paper]
             started = time.perf_counter()
-            found = go.fit(data, printed, metric="linear" if metric == "linear" else "log").material
+            found = go.fit(data, printed, metric=metric).material
             times.append(time.perf_counter() - started)
             ratios[fit].append(error(found, data, metric) / error(printed, data, metric))
     table = Table(title="error of Gonio's fit over that of the printed numbers")

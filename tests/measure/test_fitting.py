@@ -62,7 +62,7 @@ def test_a_sum_of_lobes_is_found_again() -> None:
     )
 
 
-@pytest.mark.parametrize("metric", ["log", "cuberoot", "linear"])
+@pytest.mark.parametrize("metric", ["log", "log1p", "cuberoot", "linear"])
 def test_every_metric_finds_a_noiseless_material(metric: str) -> None:
     found = fit(table(PLASTIC, noise=0.0), "lambert+ggx", metric=metric)
     np.testing.assert_allclose(found.values, truth(PLASTIC, found.names), rtol=2e-3)

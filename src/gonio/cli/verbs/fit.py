@@ -24,7 +24,7 @@ def fit(
         Option("--model", "-m", metavar="NAME", help='What is fitted, such as "lambert+ggx"; repeatable: then ranked.'),
     ] = None,
     lobes: Annotated[int, Option(metavar="N", help="How many of the model's last part are added up.")] = 1,
-    metric: Annotated[str, Option(metavar="NAME", help="relative, log, cuberoot or linear.")] = "relative",
+    metric: Annotated[str, Option(metavar="NAME", help="relative, log, log1p, cuberoot or linear.")] = "relative",
     param: Parameters = None,
     free: Annotated[list[str] | None, Option(metavar="NAME", help="A parameter that moves though it is 1.")] = None,
     grazing: Annotated[float, Option(metavar="DEG", help="Leave out directions beyond this angle.")] = 80.0,

@@ -174,7 +174,7 @@ def fit(
     data     a file of measurements, a table, or `Data`
     model    a material, or its name, or a sum of names such as "lambert+ggx"; what it is set to is where the fit starts
     lobes    how many of the last part are added up
-    metric   "relative", "log", "cuberoot" or "linear" (Ngan2005)
+    metric   "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
     fixed    path -> value of parameters that stay
     free     paths of parameters that move although they stay by themselves: factors that are 1
     grazing  degrees: values beyond, of either direction, are left out

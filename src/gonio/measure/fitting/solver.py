@@ -31,6 +31,7 @@ SMALL = 1e-3  # of the largest value: where "log" turns from relative to absolut
 METRICS = {
     "relative": "difference over the model's own value, which noise of the data cannot bias",
     "log": "log(1 + f cos / c), c a thousandth of the brightest value in the data's median channel: nearly relative",
+    "log1p": "log(1 + f cos), as Low2012",
     "cuberoot": "(f cos)^(1/3), near to what eyes see",
     "linear": "f cos itself, as Ngan2005",
 }
@@ -44,7 +45,7 @@ def metric(name: str, value: Array, floor: Array) -> Array:
     if name == "cuberoot":
         size = dr.maximum(dr.abs(value), 1e-9)
         return dr.copysign(dr.exp(dr.log(size) / 3.0), value)
-    return dr.copysign(dr.log(1.0 + dr.abs(value) / floor), value)
+    return dr.copysign(dr.log(1.0 + dr.abs(value) / (1.0 if name == "log1p" else floor)), value)
 
 
 # --------------------------------------------------------------------------- residuals and their derivatives
