@@ -33,9 +33,9 @@ def directions(n):
 WO, WI, U = directions(300), directions(300), rng.random((300, 3))
 
 def variant():
-    import mitsuba as mi
     from gonio.owner import COMPUTING
-    with COMPUTING:  # between the two, others would compute by the first
+    with COMPUTING:  # between the two, others would compute by the first; and Mitsuba's import is no thread's alone
+        import mitsuba as mi
         mi.set_variant("llvm_ad_spectral")
         mi.set_variant("llvm_ad_rgb")
     return np.zeros(1)
