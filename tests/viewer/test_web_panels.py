@@ -317,9 +317,10 @@ def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
     fresh.tab.evaluate("() => gonio.converge(16)")
     fresh.tab.evaluate(REFERENCE, [1.1])
     fresh.tab.wait_for_function("() => gonio.comparison().figures?.flip > 0", timeout=60_000)
-    figures = fresh.tab.evaluate("gonio.comparison().figures")
-    pair = fresh.tab.evaluate(
-        "{ const p = gonio.comparison().pair; [p.width, p.height, [...p.test], [...p.reference]] }"
+    # Figures and pictures in one call: between two the page may have compared anew, with more samples
+    figures, *pair = fresh.tab.evaluate(
+        "{ const { figures, pair: p } = gonio.comparison();"
+        " [figures, p.width, p.height, [...p.test], [...p.reference]] }"
     )
     test, reference = (np.reshape(x, (pair[1], pair[0], 4))[..., :3] for x in pair[2:])
     assert figures["rmse"] == pytest.approx(metrics.rmse(test, reference), rel=1e-6)
