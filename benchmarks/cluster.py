@@ -5,7 +5,8 @@
 The master hands parts out and takes results in, one after the other: with W workers and parts of s seconds it keeps up
 as long as W / s parts a second are not more than R, what it manages where parts do nothing. A part travels while others
 are worked on, so that only the first and the last cost: a worker waits half a part at the end on average, and `begin`
-seconds at the start, in which it imports Gonio, loads the scene and takes the kernel from the cache. For N parts
+seconds at the start, in which it imports Gonio, loads the scene and takes the kernel from the cache: measured as what a
+worker's first picture takes longer than its second. For N parts
 
     efficiency = T / (T + begin + s / 2),  T = max(N s / W, N / R) + what the bytes take,  relative to N s / W
 """
@@ -13,6 +14,7 @@ seconds at the start, in which it imports Gonio, loads the scene and takes the k
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import pickle
 import statistics
@@ -23,9 +25,10 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 from gonio.render import run, tiles
-from gonio.work import crew
+from gonio.work import cluster, crew
 from gonio.work.cluster import Cluster
 
+PACE = cluster.PACE
 SCENE = Path(__file__).parent.parent / "examples/phong"
 
 
@@ -55,10 +58,12 @@ def main() -> None:
     parser.add_argument("--render", action="store_true", help="also time a render of a minute, alone and by crews")
     options = parser.parse_args()
     rates, bands = [], []
+    cluster.PACE = 0.0  # all at once: the model is of workers that have joined
     print("workers  parts/s  MB/s   s/part: measured efficiency (model)")
     for workers in map(int, options.workers.split(",")):
-        with Cluster(workers=workers):
-            timed(4 * workers, 0.0)  # everybody is there
+        with Cluster(workers=workers) as one:
+            while len(one._alive()) < workers:  # everybody is there
+                timed(4 * workers, 0.1)
             rates.append(1000 / timed(1000, 0.0))
             bands.append(40 * 4e6 / timed(40, 0.0, 4 << 20))
             row = []
@@ -68,6 +73,7 @@ def main() -> None:
                 model = predicted(count, seconds, workers, rates[-1], 0.0, 1024, bands[-1])
                 row.append(f"{seconds:g}: {measured:.0%} ({model:.0%})")
             print(f"{workers:7}  {rates[-1]:7.0f}  {bands[-1] / 1e6:4.0f}   {',  '.join(row)}", flush=True)
+    cluster.PACE = PACE
     rate, band = statistics.median(rates), statistics.median(bands)
     prepared = run.prepare(run.Request(SCENE, spp=1))
     spec, _ = tiles.travelling(prepared)
@@ -76,38 +82,66 @@ def main() -> None:
     back = sum(values[:lanes].nbytes for values in prepared.render.state().values())
     print(f"a part of a picture: {there} bytes there, {back} back ({lanes} lanes)")
 
+    begin = beginning()
+    print(f"a worker begins in {begin:.2f} s")
     speed = 10e6 * (os.cpu_count() or 2) / 2  # samples a second of a worker, as of this machine with two cores
     print("workers  parts  s/part  efficiency of 3840 x 2160 at 4096 samples;  shortest part that keeps 90 %")
     total = 3840 * 2160 * 4096
     for workers in (10, 100, 1000):
         samples = tiles.part_size(total, workers)
         parts, seconds = total // samples, samples / speed
-        share = predicted(parts, seconds, workers, rate, 3.0, back * samples / (1 << 25), band)
+        share = predicted(parts, seconds, workers, rate, begin, back * samples / (1 << 25), band)
         need = next(
             s for s in np.geomspace(1e-3, 100, 400) if predicted(100 * workers, s, workers, rate, 0, 1e5, band) > 0.9
         )
         print(f"{workers:7}  {parts:5}  {seconds:6.2f}  {share:.1%};  {need:.2f} s")
     cards, seconds = 100 * 10, 6.0
-    share = predicted(cards, seconds, 100, rate, 3.0, 1e5, band)
+    share = predicted(cards, seconds, 100, rate, begin, 1e5, band)
     print(f"100 materials x 10 laws, {seconds:g} s each, 100 workers: {share:.1%}")
 
     if options.render:
-        go.render(SCENE, spp=16)
-        spp = 64
-        begun = time.perf_counter()
-        go.render(SCENE, spp=spp)
-        spp = int(spp * 70 / (time.perf_counter() - begun))
-        begun = time.perf_counter()
-        alone = go.render(SCENE, spp=spp)
-        seconds = time.perf_counter() - begun
-        print(f"alone: {seconds:.1f} s, {spp} spp", flush=True)
-        for workers in map(int, options.workers.split(",")):
+        against_one(list(map(int, options.workers.split(","))))
+
+
+def beginning() -> float:
+    """Seconds that a worker which has just joined takes longer for a picture than one that has made it before."""
+    go.render(SCENE, spp=16)
+    with Cluster(workers=2):
+        timed(8, 0.1)
+        took = []
+        for _ in range(3):
             begun = time.perf_counter()
-            with Cluster(workers=workers):
-                together = go.render(SCENE, spp=spp)
-            took = time.perf_counter() - begun
-            same = "same bits" if np.array_equal(alone, together) else "OTHER BITS"
-            print(f"{workers} workers: {took:.1f} s, {took / seconds:.2f} of alone, {same}", flush=True)
+            go.render(SCENE, spp=16)
+            took.append(time.perf_counter() - begun)
+    return took[0] - min(took[1:])
+
+
+def against_one(crews: list[int]) -> None:
+    """A render of over a minute by each crew, and before and after each by one process with two threads."""
+    go.render(SCENE, spp=16)
+    spp = 4000
+    spp = int(spp * 75 / cost(spp)[0])
+    seconds, processor, alone = cost(spp)
+    print(f"alone: {seconds:.1f} s, {processor:.1f} s of processor, {spp} spp", flush=True)
+    for workers in crews:
+        by_crew, by_crew_processor, together = cost(spp, workers)
+        after, after_processor, _ = cost(spp)
+        ratio = 2 * by_crew / (seconds + after), 2 * by_crew_processor / (processor + after_processor)
+        same = "same bits" if np.array_equal(alone, together) else "OTHER BITS"
+        print(
+            f"{workers} workers: {by_crew:.1f} s, {ratio[0]:.2f} of one ({seconds:.1f} s before, {after:.1f} s after); "
+            f"{ratio[1]:.2f} of its processor time; {same}",
+            flush=True,
+        )
+        seconds, processor = after, after_processor
+
+
+def cost(spp: int, workers: int = 0) -> tuple[float, float, np.ndarray]:
+    """Seconds, seconds of the processor, and the picture; the crew's start and end are in it."""
+    begun, before = time.perf_counter(), sum(os.times()[:4])
+    with Cluster(workers=workers) if workers else contextlib.nullcontext():
+        picture = go.render(SCENE, spp=spp)
+    return time.perf_counter() - begun, sum(os.times()[:4]) - before, picture
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ import json
 import os
 import re
 import signal
+import socket
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +23,8 @@ from gonio.work import crew, facts, parts
 from gonio.work.cluster import Cluster
 
 pytest.importorskip("distributed")
+
+LARGE = (120, 80)  # enough lanes for many parts
 
 
 def square(x: float, seconds: float = 0.0) -> dict[str, np.ndarray]:
@@ -196,20 +200,21 @@ def test_a_cluster_that_cannot_be_is_one_clear_error(
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_pictures_survive_workers_that_die_at_random(scene: Path, seed: int) -> None:
-    alone = go.render(scene, spp=20000, seed=seed)
+    alone = go.render(scene, size=LARGE, spp=8000, seed=seed)
     chance = np.random.default_rng(seed)
     with Cluster(workers=2) as cluster:
-        at = time.monotonic() + chance.uniform(1.0, 4.0)
+        at = time.monotonic() + chance.uniform(0.5, 2.0)
 
         def look(progress: object) -> None:
             nonlocal at
             if time.monotonic() > at:
-                at = time.monotonic() + chance.uniform(1.0, 4.0)
+                at = time.monotonic() + chance.uniform(0.5, 2.0)
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(cluster._processes[int(chance.integers(2))].pid, signal.SIGKILL)
 
-        prepared = run.prepare(run.Request(scene, spp=20000, seed=seed))
+        prepared = run.prepare(run.Request(scene, size=LARGE, spp=8000, seed=seed))
         run.work(prepared, report=look)
+        assert cluster.restarts > 0
     assert np.array_equal(prepared.render.image(), alone)
 
 
@@ -223,3 +228,58 @@ def test_a_frozen_worker_loses_nothing() -> None:
                 frozen = True
                 os.kill(cluster._processes[0].pid, signal.SIGSTOP)
         assert count == 12
+
+
+class Link:
+    """A line to a port of this machine that can stall: bytes are no longer carried, and nobody is told."""
+
+    def __init__(self, port: int) -> None:
+        self.stalled = threading.Event()
+        self._target, self._server = port, socket.create_server(("127.0.0.1", 0))
+        self.port = int(self._server.getsockname()[1])
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                near = self._server.accept()[0]
+                far = socket.create_connection(("127.0.0.1", self._target))
+                for ends in ((near, far), (far, near)):
+                    threading.Thread(target=self._carry, args=ends, daemon=True).start()
+
+    def _carry(self, source: socket.socket, target: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while data := source.recv(1 << 16):
+                while self.stalled.is_set():
+                    time.sleep(0.05)
+                target.sendall(data)
+            target.shutdown(socket.SHUT_WR)
+
+    def close(self) -> None:
+        self._server.close()
+
+
+@pytest.mark.slow
+def test_a_worker_whose_link_stalls_loses_nothing(scene: Path) -> None:
+    alone = go.render(scene, size=LARGE, spp=8000)
+    with Cluster(workers=1) as cluster:
+        assert cluster._address is not None
+        direct, port = cluster._address, int(cluster._address.rpartition(":")[2])
+        link = Link(port)
+        cluster._wanted, cluster._address = 2, f"tls://127.0.0.1:{link.port}"
+        cluster._processes.append(cluster._start())
+        cluster._address = direct
+        while len(cluster._alive()) < 2:
+            time.sleep(0.1)
+        prepared = run.prepare(run.Request(scene, size=LARGE, spp=8000))
+        started = time.monotonic()
+
+        def look(progress: object) -> None:
+            if not link.stalled.is_set() and time.monotonic() - started > 3.0:
+                link.stalled.set()
+
+        run.work(prepared, report=look)
+        assert link.stalled.is_set()
+    link.stalled.clear()
+    link.close()
+    assert np.array_equal(prepared.render.image(), alone)

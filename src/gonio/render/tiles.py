@@ -38,7 +38,7 @@ ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the ca
 MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
 LEAST_SAMPLES = 1 << 21  # less is soon lost to sending it
 HANDED_OUT = 1 << 17  # samples that a worker does while one part is handed out
-PARTS = 12  # for each worker at least, so that none waits long for the last
+PARTS = 20  # for each worker at least, so that none waits long for the last
 
 
 class Gathered:

@@ -47,13 +47,15 @@ FETCH = 20.0  # seconds for that
 DEATHS = 3  # of workers while they did a part, after which it is the part's fault
 ANSWER = 10.0  # seconds for a scheduler to answer
 NOBODY = 60.0  # seconds to wait for the first worker
+PACE = 30.0  # seconds between starts of workers that have no core of their own: a start takes one of two cores 2.5 s
 
 
 class Cluster:
     """Workers of this machine, or those of a Dask scheduler; a context manager, inside which they do the parts.
 
     address  of a scheduler, "tcp://host:8786" or "tls://..."
-    workers  so many processes of this machine instead
+    workers  so many processes of this machine instead; as many as it has cores at once, the others one by one while
+             the job goes on, since they take from those at work
     security what Dask wants for a scheduler with TLS; Dask's own configuration where None
     Raises InputError for both or neither, MachineError where Dask is missing or nobody answers.
     """
@@ -71,6 +73,7 @@ class Cluster:
         self._local: LocalCluster | None = None
         self._client: Client | None = None
         self._processes: list[subprocess.Popen[bytes]] = []
+        self._begun = 0.0
         self._sent: set[str] = set()
         self._stack = contextlib.ExitStack()
         self.silent: dict[str, float] = {}  # seconds since each worker gave a sign of life, when it was last looked at
@@ -101,7 +104,8 @@ class Cluster:
                         dashboard_address=None, silence_logs=50,
                     )  # fmt: skip
                 self._address = self._local.scheduler_address
-                self._processes = [self._start() for _ in range(self._wanted)]
+                self._processes = [self._start() for _ in range(min(self._wanted, _cores()))]
+                self._begun = time.monotonic()
             self._client = Client(self._address, security=self._security, timeout=ANSWER, set_as_default=False)
         except (OSError, TimeoutError, ValueError, RuntimeError, ImportError) as error:
             self.close()
@@ -131,14 +135,13 @@ class Cluster:
     def _start(self) -> subprocess.Popen[bytes]:
         """A worker of this machine."""
         assert self._wanted is not None and self._security is not None
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.work import worker; worker.serve()"
         process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, start_new_session=True)
         order: dict[str, object] = {
             "address": self._address,
             "security": self._security.get_tls_config_for_role("worker"),
         }
-        order = {**order, "threads": max(2, cores // self._wanted)}
+        order = {**order, "threads": max(2, _cores() // self._wanted)}
         assert process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             process.stdin.write(json.dumps(order).encode() + b"\n")
@@ -207,7 +210,7 @@ class Cluster:
                 self._sent.add(name)
 
     def _revive(self) -> None:
-        """Start a worker in place of one that has died, and end one that is frozen."""
+        """Start a worker in place of one that has died, end one that is frozen, and start one that is still to come."""
         if any(seconds > FROZEN for seconds in self.silent.values()):
             names = {str(one["name"]) for one in self._workers().values() if time.time() - one["last_seen"] > FROZEN}
             for process in self._processes:
@@ -219,6 +222,13 @@ class Cluster:
             if process.poll() is not None:
                 self.restarts += 1
                 self._processes[index] = self._start()
+        more = len(self._processes) - _cores() + 1
+        if len(self._processes) < (self._wanted or 0) and time.monotonic() - self._begun > more * PACE:
+            self._processes.append(self._start())
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class _Job:

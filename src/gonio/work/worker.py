@@ -129,7 +129,8 @@ def serve() -> None:
             await worker.finished()
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the one who asks is told of errors
-    dask.config.set({"distributed.admin.low-level-log-length": 0})
+    # nor does anybody read Dask's logs and profiles here
+    dask.config.set({"distributed.admin.low-level-log-length": 0, "distributed.worker.profile.enabled": False})
     with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(work())
     os._exit(0)
