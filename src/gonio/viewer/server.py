@@ -56,6 +56,8 @@ MOST_ANSWERS, ANSWER_SECONDS = 32, 120.0  # pages that are on their way at once,
 # For a frame to be taken: a page in a hidden tab draws nothing, and need not come back for it. And for a first wish: a
 # page that shows what the reference cannot, one term alone, wants nothing of it.
 STALL_SECONDS = 600.0
+FULL_SECONDS = 1.0  # after which a newcomer is told that all places are taken
+MOST_WAITING = 200  # newcomers that wait so long
 PATIENCE_SECONDS = 5.0  # the same where another page wants the place
 CLOSE_SECONDS = 2.0  # for the last words to go out
 READ_BYTES = 16 << 10  # of a socket at once
@@ -125,6 +127,7 @@ class Application:
         self.door = door
         self.renderer = Renderer(what, device)
         self.sessions: list[Session] = []
+        self._waiting = 0
         self.fault: GonioError | None = None  # of the user's files, since the stage that is shown
         self.watch = Watch(what.code, self.renew, self.complain) if what.code else None
         self._data = self._written(what, 0)
@@ -171,6 +174,12 @@ class Application:
             await websocket.close(REFUSED)  # before it is accepted: the handshake is answered with 403
             return
         if not self._make_room():
+            if self._waiting < MOST_WAITING:  # who comes again and again comes seldom
+                self._waiting += 1
+                try:
+                    await asyncio.sleep(FULL_SECONDS)
+                finally:
+                    self._waiting -= 1
             await websocket.accept()
             await websocket.close(FULL, "too many pages are open; close one")
             return

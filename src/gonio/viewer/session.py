@@ -23,9 +23,11 @@ from .stage import Stage
 
 PICTURES = 2  # environments kept a session: the one that is shown, and the one that comes
 HIDDEN_SECONDS = 1.0  # after which a page that has not taken a frame is one in a hidden tab: it waits until it does
+MOST_SPARE = 4  # references kept for pages to come
 MOST_WISHES = 16  # shaders that a session waits for
 RATE = 250.0  # messages a second that are read of one page: it sends one a picture that it draws, one a frame it got
 SHARE = 0.1  # of the server's thread, for reading one page's messages
+NONSENSE_SECONDS = 0.005  # that a message without sense counts as, of the server's thread: pages send none
 BURST_SECONDS = 0.5  # saved up by a page that was silent: 125 messages at once
 GIVE_WAY_SECONDS = 5e-4  # after each pass, so that who waits to compute has a turn: a lock by itself is not fair
 MOST_WAITING = 64  # messages to a page that does not take them: answers to what it sends, and one frame
@@ -86,7 +88,7 @@ class Session:
             received = await self.websocket.receive()
             if received["type"] == "websocket.disconnect":
                 return
-            began = time.thread_time()
+            began, more = time.thread_time(), 0.0
             try:
                 if received.get("text") is not None:
                     self._take(messages.parse(received["text"]))
@@ -94,7 +96,8 @@ class Session:
                     await self._take_upload(received["bytes"])
             except GonioError as error:
                 self.send(messages.failure(error))
-            await self._pace(time.thread_time() - began)
+                more = NONSENSE_SECONDS
+            await self._pace(time.thread_time() - began + more)
 
     async def _pace(self, took: float) -> None:
         """Wait where messages come faster than RATE, or want more than SHARE of this thread: others are to be served.
@@ -171,6 +174,7 @@ class Renderer:
         self.revision = 0  # of the stage
         self._sessions: list[Session] = []
         self._jobs: list[_Variant] = []
+        self._spare: list[Reference] = []  # of sessions that have ended: pages that come and go cost little
         self._lock = threading.Condition()
         self._running = False
         self._clock = 0.0  # the least time that a session with work has had
@@ -230,6 +234,8 @@ class Renderer:
             if session in self._sessions:
                 self._sessions.remove(session)
             self._jobs = [job for job in self._jobs if job.session is not session]
+            if session.reference is not None and len(self._spare) < MOST_SPARE:
+                self._spare.append(session.reference)
             session.scene = session.reference = None
 
     def stop(self) -> None:
@@ -299,8 +305,9 @@ class Renderer:
             reference = session.reference
             pictures = dict(session.pictures)
             stage = self.stage
+            spare = self._spare.pop() if reference is None and self._spare else None
         if reference is None:
-            reference = Reference(stage, self.device)
+            reference = spare or Reference(stage, self.device)
             session.reference = reference
             limits = {"upload": messages.UPLOAD_BYTES, "pixels": messages.MOST_PIXELS}
             ready = {"type": "ready", "device": reference.device, "version": __version__, "limits": limits}
