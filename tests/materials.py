@@ -62,6 +62,9 @@ def _rough() -> dict[str, go.BSDF]:
         found[f"metal-{ndf}-schlick"] = go.Conductor.preset("Cu", alpha=0.3, ndf=ndf, fresnel="schlick")
         found[f"glass-{ndf}-schlick"] = go.Dielectric(1.5, 0.3, ndf=ndf, fresnel="schlick")
         found[f"metal-{ndf}-one"] = go.Conductor(alpha=0.6, ndf=ndf, fresnel="one")
+        found[f"metal-{ndf}-f82"] = go.Conductor.preset("Au", alpha=0.3, ndf=ndf, fresnel="f82")
+    found["metal-by-colours"] = go.Metal((1.0, 0.8, 0.4), (0.9, 1.0, 0.7), alpha=(0.1, 0.4), rotation=0.5)
+    found["glass-f82"] = go.Dielectric(1.5, 0.3, fresnel="f82")
     found["glass-turned"] = go.Dielectric(1.33, (0.1, 0.5), rotation=-0.7)
     found["glass-dense"] = go.Dielectric(2.42, 0.2)
     found["glass-bubble"] = go.Dielectric(0.7, 0.2)
@@ -96,7 +99,7 @@ SMALL = {
     **{name: HISTORIC[name] for name in ("ashikhmin-shirley", "cook-torrance", "lafortune", "ward-duer-bounded")},
     **IDEAL,
     **NESTED,
-    **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned")},
+    **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned", "metal-by-colours")},
     **{
         f"{kind}-{ndf}-smith-correlated": ROUGH[f"{kind}-{ndf}-smith-correlated"]
         for kind in ("metal", "glass")
