@@ -169,7 +169,9 @@ def _map(figure: Figure, axes: Axes, lines: Sequence[Index]) -> None:
     etas, angles = np.linspace(low, max(high, *(line.eta * 1.1 for line in lines)), 160), np.linspace(0.0, 90.0, 181)
     errors = schlick_error(etas, angles, k)
     top = float(np.quantile(np.abs(errors), 0.995))  # a few corners are worse, and would pale all others
-    shown = axes.pcolormesh(angles, etas, errors, cmap="RdBu_r", vmin=-top, vmax=top, shading="gouraud")
+    shown = axes.pcolormesh(
+        angles, etas, errors, cmap="RdBu_r", vmin=-top, vmax=top, shading="gouraud", rasterized=True
+    )
     levels = np.linspace(-top, top, 16)  # none at 0, where rounding would draw its own
     contours = axes.contour(angles, etas, errors, levels=levels, colors=figures.INK, linewidths=0.5, alpha=0.5)
     axes.clabel(contours, fontsize=7, fmt="%.3f")
