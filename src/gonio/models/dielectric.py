@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from ..ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
 from ..ops.types import Direction, Mask, Mode, Pair, Scalar, Spectrum
 from ..optics import frame, fresnel, indices, masking
+from ..optics.fresnel.polarization import Diattenuation, reflected_by_glass, refracted
 from ..optics.ndf import distribution
 from . import microfacet
 from .calling import method
 from .material import Delta, InnerAlbedo, Preset
 from .microfacet import Terms
 from .parameters import Angle, Colour, Number, Width, flag, number
+from .polarization import Polarized
 from .sample import Sample
 
 
@@ -187,6 +189,20 @@ class Dielectric(microfacet._Microfacet):
             weight = weight * self._reflectance_at(facet, eta)
         tinted = self.albedo * where(pdf > 0.0, weight, 0.0)
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
+        eta = self._relative_eta(wo)
+        m = self._normal(wo, wi, eta)
+        m = where(delta, frame.upright(wo), m)  # equal indices send light straight on, at no normal of their own
+        cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
+        reflects = wo.z * wi.z > 0.0
+        f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
+        through = 1.0 - f if self.transmission else 0.0 * f
+        ideal = where(reflects, f, through if mode == "importance" else through / sqr(eta))
+        value = where(delta, self.albedo * ideal, self.eval(wo, wi, mode))
+        back, on = reflected_by_glass(cos_o, eta), refracted(cos_o, cos_i, eta)
+        return (Polarized(value, m, Diattenuation(*(where(reflects, *pair) for pair in zip(back, on, strict=True)))),)
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Terms:

@@ -34,6 +34,7 @@ from ..optics import warp
 from . import binding, guide_search, recording, tree
 from .calling import V3, Given, method
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
+from .polarization import Polarized
 from .sample import Sample
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
@@ -179,6 +180,14 @@ class BSDF(Material):
     def terms(self, wo: Direction, wi: Direction) -> tuple[Value, ...]:
         """What `eval` is made of, to be looked at one by one: a NamedTuple, of a microfacet lobe D, G and F."""
         raise InputError(f"{type(self).__name__} has no terms", "terms", "`has_terms` tells")
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The parts of the light from wi to wo whose polarization is known: what single smooth facets have sent there.
+        What `eval` has beyond them leaves unpolarized; here all of it.
+
+        delta  lanes where the two directions are joined by delta lobes, whose weights are then the values
+        """
+        return ()
 
     def tint(self, wo: Direction) -> Spectrum:
         """A colour for denoisers to tell materials apart by: near the albedo seen from wo, without noise."""
