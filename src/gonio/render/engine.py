@@ -38,6 +38,11 @@ def variant_for(device: str = "cpu", spectral: bool = False) -> str:
     return ("cuda_ad_" if has_cuda else "llvm_ad_") + ("spectral" if spectral else "rgb")
 
 
+def polarized(variant: str) -> str:
+    """The variant that knows polarization, and colours, on the device of another."""
+    return "_".join([*variant.split("_")[:2], "spectral_polarized"])
+
+
 @alone
 def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
     """Mitsuba, with a variant set: the current one where `device` is None and one is set, else `variant_for`.

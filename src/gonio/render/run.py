@@ -88,7 +88,7 @@ def _nearby(path: Path) -> str:
 
 
 def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
-    from . import integrators, scene
+    from . import integrators, polarizer, scene
 
     overrides: dict[str, object] = dict(request.overrides)
     if request.size is not None:
@@ -109,17 +109,29 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     settings = _settings(of_scene, request)
     output = request.output or Path(description.output.filename)
     images.check_writable(output)
-    render = integrators.Render(scene.build(description, mi), settings, aovs=request.denoise)
-    return Prepared(
-        request,
-        render,
-        request.spp or description.spp,
-        (render.width, render.height),
-        output,
-        _metadata(request, mi, **_own(settings)),
-        Sources.of(mi, *scene.sources(description), _how(settings, request)),
-        tuple(description.warnings),
-    )
+    spp, degrees, how = request.spp or description.spp, description.camera.polarizer, _own(settings)
+    variant = str(mi.variant())
+    if degrees is not None:
+        polarizer.check(settings, description.where("/camera/polarizer"))
+        variant = engine.polarized(variant)
+        how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
+    with engine.using(variant):
+        built = scene.build(description, mi)
+        render: Renders = (
+            integrators.Render(built, settings, aovs=request.denoise)
+            if degrees is None
+            else polarizer.PolarizedRender(mi, built, spp, settings, degrees)
+        )
+        return Prepared(
+            request,
+            render,
+            spp,
+            description.camera.film.size,
+            output,
+            _metadata(request, mi, **how),
+            Sources.of(mi, *scene.sources(description), _how(settings, request)),
+            tuple(description.warnings),
+        )
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
