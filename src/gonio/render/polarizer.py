@@ -41,8 +41,8 @@ class PolarizedRender(MitsubaRender):
             super().advance(count)
 
     def image(self) -> NDArray[np.float32]:
-        I, Q, U = (self.stokes[..., part, :] for part in range(3))
-        seen = 0.5 * (I + np.cos(2.0 * self._angle) * Q + np.sin(2.0 * self._angle) * U)
+        intensity, Q, U = (self.stokes[..., part, :] for part in range(3))
+        seen = 0.5 * (intensity + np.cos(2.0 * self._angle) * Q + np.sin(2.0 * self._angle) * U)
         return seen.astype(np.float32)
 
     @property

@@ -110,28 +110,26 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     output = request.output or Path(description.output.filename)
     images.check_writable(output)
     spp, degrees, how = request.spp or description.spp, description.camera.polarizer, _own(settings)
-    variant = str(mi.variant())
     if degrees is not None:
         polarizer.check(settings, description.where("/camera/polarizer"))
-        variant = engine.polarized(variant)
+        mi.set_variant(engine.polarized(str(mi.variant())))
         how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
-    with engine.using(variant):
-        built = scene.build(description, mi)
-        render: Renders = (
-            integrators.Render(built, settings, aovs=request.denoise)
-            if degrees is None
-            else polarizer.PolarizedRender(mi, built, spp, settings, degrees)
-        )
-        return Prepared(
-            request,
-            render,
-            spp,
-            description.camera.film.size,
-            output,
-            _metadata(request, mi, **how),
-            Sources.of(mi, *scene.sources(description), _how(settings, request)),
-            tuple(description.warnings),
-        )
+    built = scene.build(description, mi)
+    render: Renders
+    if degrees is None:
+        render = integrators.Render(built, settings, aovs=request.denoise)
+    else:
+        render = polarizer.PolarizedRender(mi, built, spp, settings, degrees)
+    return Prepared(
+        request,
+        render,
+        spp,
+        description.camera.film.size,
+        output,
+        _metadata(request, mi, **how),
+        Sources.of(mi, *scene.sources(description), _how(settings, request)),
+        tuple(description.warnings),
+    )
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:

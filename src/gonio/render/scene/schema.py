@@ -147,7 +147,7 @@ class Camera(Part):
     """Nothing farther is seen."""
     polarizer: Number | None = None
     """An ideal linear polarizer over the lens, degrees: the direction that it lets through, counterclockwise from the
-    picture's horizontal. It halves light that is not polarized. Rendered by Mitsuba's path tracer, in a polarized variant.
+    picture's horizontal. It halves light that is not polarized. Mitsuba's path tracer renders, in a polarized variant.
     """
     time_start: Number = Field(0.0, alias="timeStart")
     """Without effect: nothing moves."""
