@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..ops import Direction, Mask, Mode, Scalar, Spectrum, abs, dot, function, where
 from ..optics import frame, fresnel, indices
 from ..optics.fresnel.artist import edge_tint, imageworks
-from ..optics.fresnel.polarization import reflected_by_metal
+from ..optics.fresnel.polarization import Diattenuation, reflected_by_metal
 from . import microfacet
 from .material import Preset
 from .parameters import Angle, Colour, Width, spectrum
@@ -46,12 +46,16 @@ class Conductor(_Reflector):
         """F by name, times albedo, at a facet seen under cos_theta."""
         return self.albedo * fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, self.k)
 
+    def _polarization(self, cos_theta: Scalar) -> Diattenuation[Spectrum]:
+        """What a facet does to polarization."""
+        return reflected_by_metal(cos_theta, self.eta, self.k)
+
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
         """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
         m = frame.half_vector(wo, wi)
         cos = abs(dot(wo, m))
         value = where(delta, self.reflectance(cos), self.eval(wo, wi, mode))
-        return (Polarized(value, m, reflected_by_metal(cos, self.eta, self.k)),)
+        return (Polarized(value, m, self._polarization(cos)),)
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
         """By the kind of Fresnel, or by the fit of `artist.imageworks`."""
