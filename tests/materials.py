@@ -62,6 +62,14 @@ def _rough() -> dict[str, go.BSDF]:
         found[f"metal-{ndf}-schlick"] = go.Conductor.preset("Cu", alpha=0.3, ndf=ndf, fresnel="schlick")
         found[f"glass-{ndf}-schlick"] = go.Dielectric(1.5, 0.3, ndf=ndf, fresnel="schlick")
         found[f"metal-{ndf}-one"] = go.Conductor(alpha=0.6, ndf=ndf, fresnel="one")
+        found[f"metal-{ndf}-f82"] = go.Conductor.preset("Au", alpha=0.3, ndf=ndf, fresnel="f82")
+    found["metal-by-colours"] = go.Metal((1.0, 0.8, 0.4), (0.9, 1.0, 0.7), alpha=(0.1, 0.4), rotation=0.5)
+    found["glass-f82"] = go.Dielectric(1.5, 0.3, fresnel="f82")
+    metal, glass = go.model("film-conductor"), go.model("film-dielectric")
+    found["film-on-metal"] = metal.preset("Cr", alpha=(0.1, 0.4), rotation=0.5, thickness=420.0, form="belcour-barla")
+    found["film-on-gold"] = metal.preset("Au", alpha=0.3, thickness=650.0, film_eta=1.6)
+    found["film-on-glass"] = glass(1.5, 0.3, thickness=350.0, film_eta=2.0)
+    found["film-bubble"] = glass(1.0001, 0.2, thickness=500.0, film_eta=1.33, form="belcour-barla")
     found["glass-turned"] = go.Dielectric(1.33, (0.1, 0.5), rotation=-0.7)
     found["glass-dense"] = go.Dielectric(2.42, 0.2)
     found["glass-bubble"] = go.Dielectric(0.7, 0.2)
@@ -96,7 +104,8 @@ SMALL = {
     **{name: HISTORIC[name] for name in ("ashikhmin-shirley", "cook-torrance", "lafortune", "ward-duer-bounded")},
     **IDEAL,
     **NESTED,
-    **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned")},
+    **{name: ROUGH[name] for name in ("glass-turned", "glass-bubble", "metal-bounded-turned", "metal-by-colours")},
+    **{name: ROUGH[name] for name in ("film-on-metal", "film-on-glass")},
     **{
         f"{kind}-{ndf}-smith-correlated": ROUGH[f"{kind}-{ndf}-smith-correlated"]
         for kind in ("metal", "glass")

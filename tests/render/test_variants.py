@@ -128,18 +128,6 @@ def test_plugins_give_what_mitsubas_give(variant: str, name: str) -> None:
         assert native[0].max() > 0.1, "both would be black"
 
 
-def test_polarized_plugins_depolarize(variant: str) -> None:
-    if not mi.is_polarized:
-        pytest.skip("this variant has no Mueller matrices")
-    bsdf = mi.load_dict(
-        {"type": "gonio_mix", "a": {"type": "gonio_conductor", "preset": "Au"}, "b": PAIRS["diffuse"][0]}
-    )
-    value = np.array(bsdf.eval(mi.BSDFContext(), _interaction(), mi.Vector3f(WI.T)))
-    assert value.shape[:2] == (4, 4) and value[0, 0].max() > 0.1
-    value[0, 0] = 0.0
-    assert not value.any()
-
-
 @pytest.mark.parametrize("polarized", [name for name in LLVM if name.endswith("polarized")])
 def test_pictures_of_unpolarized_light_are_those_of_the_plain_variant(polarized: str) -> None:
     pictures = []

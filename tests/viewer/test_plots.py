@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.models import models, notation
-from gonio.viewer import curves, lobes, plots
+from gonio.viewer import curves, fresnel_figure, lobes, plots
 
 METAL = '{"type": "conductor", "preset": "Au", "alpha": 0.3}'
 
@@ -130,3 +131,39 @@ def test_what_cannot_be_plotted_is_one_clear_error(
         plots.plot(*materials, **options)  # type: ignore[arg-type]
     assert hint in caught.value.hint
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("index", [{"eta": 1.5}, {"eta": 0.7}, {"eta": 2.7, "k": 3.0}, {"metal": "Au"}, {}])
+def test_fresnel_is_drawn_with_the_angles_that_have_names(index: dict[str, Any], tmp_path: Path) -> None:
+    path = go.plot("fresnel", output=tmp_path / "a.svg", **index).path
+    assert path is not None
+    text = path.read_text()
+    assert "Schlick minus exact" in text and "from outside" in text
+    if index == {"eta": 1.5}:
+        assert "Brewster 56.3" in text and "Brewster 33.7" in text and "critical 41.8" in text
+
+
+def test_the_map_of_schlicks_error_is_the_difference_of_both() -> None:
+    angles = np.linspace(0, 90, 31)
+    errors = fresnel_figure.schlick_error(np.array([1.5]), angles)[0]
+    line = fresnel_figure.Index("", "", 1.5, 0.0)
+    assert errors == pytest.approx(
+        fresnel_figure.approximation("schlick", angles, line) - go.fresnel(np.radians(angles), 1.5).R, abs=1e-12
+    )
+    assert np.abs(errors).max() == pytest.approx(0.035, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"eta": 0.0}, "eta = 0, a positive index expected"),
+        ({"eta": 1.5, "k": -1.0}, "k = -1, which would give light"),
+        ({"eta": 1.5, "metal": "Au"}, "an index and a metal"),
+        ({"metal": "Aurum"}, "unknown metal 'Aurum'"),
+    ],
+)
+def test_an_index_that_cannot_be_drawn_is_an_error(arguments: dict[str, Any], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        go.plot("fresnel", **arguments)
+    with pytest.raises(InputError, match="no fresnel to draw"):
+        go.plot("lambert", eta=1.5)

@@ -11,34 +11,12 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ..optics.colour import D65, LUMINANCE, XYZ_TO_RGB, Floats, observer
 
-# CIE standard illuminant D65 at 380, 390, ... 780 nm, relative to 560 nm (CIE 15).
-D65 = np.array([
-    49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.865, 117.008, 117.812, 114.861, 115.923, 108.811, 109.354,
-    107.802, 104.790, 107.689, 104.405, 104.046, 100.000, 96.3342, 95.7880, 88.6856, 90.0062, 89.5991, 87.6987, 83.2886,
-    83.6992, 80.0268, 80.2146, 82.2778, 78.2842, 69.7213, 71.6091, 74.3490, 61.6040, 69.8856, 75.0870, 63.5927, 46.4182,
-    66.8054, 63.3828,
-])  # fmt: skip
-XYZ_TO_RGB = np.array([
-    [3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252],
-])  # fmt: skip
+__all__ = ["D65", "LUMINANCE", "XYZ_TO_RGB", "observer", "to_rgb", "to_spectrum"]
+
 STEPS = 4  # points between two wavelengths, over which what was measured is taken as linear
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
-
-def observer(nm: Floats) -> Floats:
-    """The curves x, y, z of the CIE 1931 observer, (3, N) (Wyman2013, table 1)."""
-
-    def bell(centre: float, low: float, high: float) -> Floats:
-        return np.exp(-0.5 * ((nm - centre) * np.where(nm < centre, low, high)) ** 2)
-
-    x = 0.362 * bell(442.0, 0.0624, 0.0374) + 1.056 * bell(599.8, 0.0264, 0.0323) - 0.065 * bell(501.1, 0.0490, 0.0382)
-    y = 0.821 * bell(568.8, 0.0213, 0.0247) + 0.286 * bell(530.9, 0.0613, 0.0322)
-    z = 1.217 * bell(437.0, 0.0845, 0.0278) + 0.681 * bell(459.0, 0.0385, 0.0725)
-    return np.stack([x, y, z])
 
 
 @lru_cache

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ..ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, function, safe_div, where
-from ..optics import frame, fresnel, indices, masking
+from ..ops import Direction, Mask, Mode, Scalar, Spectrum, abs, dot, function, where
+from ..optics import frame, fresnel, indices
 from ..optics.fresnel.artist import edge_tint, imageworks
-from ..optics.ndf import distribution
+from ..optics.fresnel.polarization import Diattenuation, reflected_by_metal
 from . import microfacet
-from .calling import method
 from .material import Preset
-from .microfacet import Terms
 from .parameters import Angle, Colour, Width, spectrum
-from .sample import Sample
+from .polarization import Polarized
+from .reflector import _Reflector
 
 
-class Conductor(microfacet._Microfacet):
+class Conductor(_Reflector):
     """Rough metal: f = albedo F D G / (4 (n.o)(n.i)), F at the half vector (Torrance1967; course sheet, eq. 4 to 11).
 
     D, G and F are chosen by name. alpha below 1e-4 is a perfect mirror. Light that a second facet would reflect is
@@ -47,57 +46,16 @@ class Conductor(microfacet._Microfacet):
         """F by name, times albedo, at a facet seen under cos_theta."""
         return self.albedo * fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, self.k)
 
-    def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Direction, Pair, Mask]:
-        """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all
-        along the axes of the anisotropy; turned last, as wo + wi would cancel with the rounding of the turn."""
+    def _polarization(self, cos_theta: Scalar) -> Diattenuation[Spectrum]:
+        """What a facet does to polarization."""
+        return reflected_by_metal(cos_theta, self.eta, self.k)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
         m = frame.half_vector(wo, wi)
-        alpha, smooth = microfacet.widths(self.alpha)
-        wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
-        return wo, wi, m, alpha, _above(wo, wi) & ~smooth
-
-    @method
-    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """albedo F D G / (4 cos theta_o); 0 where alpha makes it a mirror."""
-        wo, wi, m, alpha, lit = self._facet(wo, wi)
-        return self.reflectance(abs(dot(wo, m))) * where(lit, microfacet.reflection(self, wo, wi, m, alpha), 0.0)
-
-    @method
-    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """Density of the sampled normal over 4 (o.m) (Walter2007, eq. 14)."""
-        wo, wi, m, alpha, lit = self._facet(wo, wi)
-        return where(lit, 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha), 0.0)
-
-    @method
-    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
-        alpha, smooth = microfacet.widths(self.alpha)
-        turned = frame.rotate(wo, self.rotation)
-        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
-        wi = frame.rotate_back(frame.reflect(turned, m), self.rotation)
-        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
-        wo, turned, m, alpha, lit = self._facet(wo, wi)
-        density = 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha)
-        facets = where(lit, safe_div(microfacet.reflection(self, wo, turned, m, alpha), density), 0.0)
-        mirrors = smooth & _above(wo, turned)
-        weight = self.reflectance(abs(dot(wo, m))) * where(mirrors, 1.0, facets)
-        pdf = where(mirrors, 1.0, where(lit, density, 0.0))
-        return Sample(wi, weight, pdf, mirrors, 1.0 + 0.0 * pdf)
-
-    @method
-    def terms(self, wo: Direction, wi: Direction) -> Terms:
-        """D, G and F of the pair; eval is F D G / (4 cos theta_o)."""
-        wo, wi, m, alpha, _ = self._facet(wo, wi)
-        ndf = distribution(self.ndf)
-        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
-        return Terms(ndf.D(m, alpha), g, self.reflectance(abs(dot(wo, m))))
-
-    def tint(self, wo: Direction) -> Spectrum:
-        """F at the surface's own normal."""
-        return self.reflectance(abs(wo.z))
-
-    def normal_reflectance(self) -> Spectrum:
-        """F at normal incidence."""
-        return self.reflectance(1.0 + 0.0 * self.alpha.x)
+        cos = abs(dot(wo, m))
+        value = where(delta, self.reflectance(cos), self.eval(wo, wi, mode))
+        return (Polarized(value, m, self._polarization(cos)),)
 
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
         """By the kind of Fresnel, or by the fit of `artist.imageworks`."""
@@ -105,7 +63,3 @@ class Conductor(microfacet._Microfacet):
         if average == "imageworks" and not kind.white:
             return imageworks(*edge_tint(self.eta, self.k))
         return kind.conductor_average(self.eta, self.k)
-
-
-def _above(wo: Direction, wi: Direction) -> Mask:
-    return (wo.z > 0.0) & (wi.z > 0.0)

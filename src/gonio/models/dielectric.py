@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from ..ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
 from ..ops.types import Direction, Mask, Mode, Pair, Scalar, Spectrum
 from ..optics import frame, fresnel, indices, masking
+from ..optics.fresnel.polarization import Diattenuation, reflected_by_glass, refracted
 from ..optics.ndf import distribution
 from . import microfacet
 from .calling import method
 from .material import Delta, InnerAlbedo, Preset
 from .microfacet import Terms
 from .parameters import Angle, Colour, Number, Width, flag, number
+from .polarization import Polarized
 from .sample import Sample
 
 
@@ -138,6 +140,10 @@ class Dielectric(microfacet._Microfacet):
         """Probability of choosing reflection."""
         return f if self.transmission else 1.0 + 0.0 * f
 
+    def _over_chance(self, facet: _Facet, eta: Scalar, share: Scalar) -> Spectrum:
+        """albedo F or 1 - F of the lobe over the probability with which it is chosen, which is that where both are."""
+        return self.albedo if self.transmission else self.albedo * self._reflectance_at(facet, eta)
+
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The sum of both lobes times |cos theta_i|; 0 where alpha makes them deltas."""
@@ -182,11 +188,29 @@ class Dielectric(microfacet._Microfacet):
             value = value * squeeze
         chance = where(reflects, share, 1.0 - share)
         pdf = where(right_side, chance * density, 0.0)
-        weight = safe_div(value, density)
-        if not self.transmission:  # else F cancels against the probability of the lobe
-            weight = weight * self._reflectance_at(facet, eta)
-        tinted = self.albedo * where(pdf > 0.0, weight, 0.0)
+        tinted = self._over_chance(facet, eta, share) * where(pdf > 0.0, safe_div(value, density), 0.0)
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
+        eta = self._relative_eta(wo)
+        m = self._normal(wo, wi, eta)
+        m = where(delta, frame.upright(wo), m)  # equal indices send light straight on, at no normal of their own
+        cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
+        reflects = wo.z * wi.z > 0.0
+        f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
+        through = 1.0 - f if self.transmission else 0.0 * f
+        ideal = where(reflects, f, through if mode == "importance" else through / sqr(eta))
+        value = where(delta, self.albedo * ideal, self.eval(wo, wi, mode))
+        back, on = self._polarization(cos_o, cos_i, eta)
+        both = [where(reflects, one, other) for one, other in zip(back, on, strict=True)]
+        return (Polarized(value, m, Diattenuation(*both)),)
+
+    def _polarization(
+        self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
+    ) -> tuple[Diattenuation[Scalar], Diattenuation[Scalar]]:
+        """What a facet does to the polarization of what it reflects, and of what it lets through."""
+        return reflected_by_glass(cos_o, eta), refracted(cos_o, cos_i, eta)
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Terms:

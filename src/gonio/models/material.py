@@ -34,6 +34,7 @@ from ..optics import warp
 from . import binding, guide_search, recording, tree
 from .calling import V3, Given, method
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
+from .polarization import Polarized
 from .sample import Sample
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
@@ -96,6 +97,7 @@ class BSDF(Material):
     breaks      law -> Breach, for laws that the model breaks by nature (Phong: reciprocity, energy)
     only_rgb    whether eval gives red, green and blue, whatever channels the renderer has
     stochastic  whether eval, pdf and weight are random numbers that only in the mean are what they are called
+    reads_wavelengths  whether it wants to know the rays' wavelengths, as `wavelengths` of its bound copy
     lossless    the greatest loss that a white furnace may find (where F = 1 and every albedo 1); None claims nothing
     """
 
@@ -104,6 +106,8 @@ class BSDF(Material):
     breaks: ClassVar[Mapping[str, Breach]] = {}
     stochastic: ClassVar[bool] = False
     only_rgb: ClassVar[bool] = False
+    reads_wavelengths: ClassVar[bool] = False
+    wavelengths: ClassVar[Spectrum | None] = None  # nm, one for each channel, on copies bound in spectral variants
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
     gives_way: ClassVar[bool] = False  # whether a user's own class may take its name: of Gonio's, those of papers do
@@ -179,6 +183,14 @@ class BSDF(Material):
     def terms(self, wo: Direction, wi: Direction) -> tuple[Value, ...]:
         """What `eval` is made of, to be looked at one by one: a NamedTuple, of a microfacet lobe D, G and F."""
         raise InputError(f"{type(self).__name__} has no terms", "terms", "`has_terms` tells")
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The parts of the light from wi to wo whose polarization is known: what single smooth facets have sent there.
+        What `eval` has beyond them leaves unpolarized; here all of it.
+
+        delta  lanes where the two directions are joined by delta lobes, whose weights are then the values
+        """
+        return ()
 
     def tint(self, wo: Direction) -> Spectrum:
         """A colour for denoisers to tell materials apart by: near the albedo seen from wo, without noise."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ops import Direction, Mode, Scalar, Spectrum, where
+from ..ops import Direction, Mask, Mode, Scalar, Spectrum, where
 from ..optics import frame
+from ..optics.fresnel.polarization import Diattenuation
 from .calling import method
 from .material import BSDF, Delta, InnerAlbedo
 from .parameters import Colour, spectrum
+from .polarization import Polarized
 from .sample import Sample
 
 
@@ -34,6 +36,12 @@ class Mirror(BSDF):
         above = wo.z > 0.0
         one = where(above, 1.0 + 0.0 * wo.z, 0.0)
         return Sample(frame.mirror(wo), self.albedo * one, one, above, 1.0 + 0.0 * wo.z)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """All of it: s turns over and p does not, as at a perfect conductor."""
+        zero = 0.0 * wo.z
+        value = self.albedo * where(delta & (wo.z > 0.0), 1.0 + zero, 0.0)
+        return (Polarized(value, frame.upright(wo), Diattenuation(zero, zero - 1.0, zero)),)
 
     @property
     def delta(self) -> Delta:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ops import Direction, Mode, Scalar, Spectrum, safe_div, vec3, where
+from ..ops import Direction, Mask, Mode, Scalar, Spectrum, safe_div, vec3, where
 from .calling import method
 from .material import BSDF, Delta, InnerAlbedo
 from .parameters import Number, bsdf, number
+from .polarization import Polarized
 from .sample import Sample
 
 
@@ -46,6 +47,11 @@ class Mix(BSDF):
         density_weight = self.eval(wo, wi, mode) * where(valid & ~delta, safe_div(1.0, pdf), 0.0)
         delta_weight = where(pick_b, sb.weight, sa.weight)
         return Sample(wi, where(delta, delta_weight, density_weight), pdf, delta, where(pick_b, sb.eta, sa.eta))
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The parts of both."""
+        a, b = self.a.polarized(wo, wi, delta, mode), self.b.polarized(wo, wi, delta, mode)
+        return (*(part.times(1.0 - self.weight) for part in a), *(part.times(self.weight) for part in b))
 
     def tint(self, wo: Direction) -> Spectrum:
         """The average of both."""

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ..errors import InputError
-from ..ops import Direction, Mode, Spectrum
+from ..ops import Direction, Mask, Mode, Spectrum
 from .calling import method
 from .material import BSDF, Breach
 from .parameters import bsdf
+from .polarization import Polarized
 
 
 class Sum(BSDF):
@@ -37,6 +38,10 @@ class Sum(BSDF):
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """a + b."""
         return self.a.eval(wo, wi, mode) + self.b.eval(wo, wi, mode)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The parts of both."""
+        return (*self.a.polarized(wo, wi, delta, mode), *self.b.polarized(wo, wi, delta, mode))
 
     def tint(self, wo: Direction) -> Spectrum:
         """That of both."""

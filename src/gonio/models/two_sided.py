@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..ops import Direction, Mode, Scalar, Spectrum, function, vec3, where
+from ..ops import Direction, Mask, Mode, Scalar, Spectrum, function, vec3, where
 from .calling import method
 from .material import BSDF, Delta, InnerAlbedo
 from .parameters import bsdf
+from .polarization import Polarized
 from .sample import Sample
 
 
@@ -42,6 +43,11 @@ class TwoSided(BSDF):
         """The base's sample, turned back."""
         s = self.base.sample(_turned(wo, wo), u, mode)
         return Sample(_turned(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The base's, turned back."""
+        parts = self.base.polarized(_turned(wo, wo), _turned(wi, wo), delta, mode)
+        return tuple(part._replace(normal=_turned(part.normal, wo)) for part in parts)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base's."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar, overload
 
 from ..errors import InputError
@@ -25,10 +25,11 @@ from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Val
 
 __all__ = [
     "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum",
-    "Table", "Vector", "Vector3", "abs", "atan2", "clamp", "copysign", "cos", "dot", "erf", "exp", "fetch", "floor",
-    "fma", "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log", "lookup", "max_component",
-    "maximum", "mean", "minimum", "norm", "normalize", "pi", "pow", "record", "rsqrt", "safe_div", "safe_sqrt",
-    "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3", "where",
+    "Table", "Vector", "Vector3", "abs", "atan2", "channels", "clamp", "copysign", "cos", "dot", "erf", "exp",
+    "fetch", "floor", "fma", "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log",
+    "lookup", "max_component", "maximum", "mean", "minimum", "norm", "normalize", "of_channels", "pi", "pow",
+    "record", "rsqrt", "safe_div", "safe_sqrt", "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3",
+    "where",
 ]  # fmt: skip
 
 pi = math.pi
@@ -261,6 +262,21 @@ def norm(v: Vector) -> Scalar:
 def normalize(v: V) -> V:
     """v / |v|; v must not be 0."""
     return v * rsqrt(dot(v, v))
+
+
+def channels(spectrum: Spectrum) -> tuple[Scalar, ...]:
+    """The channels of a spectrum: three where it is recorded."""
+    if isinstance(spectrum, Node):
+        return tuple(graph.emit("component", "float", spectrum, static=place) for place in range(3))
+    return tuple(spectrum)
+
+
+def of_channels(like: Spectrum, values: Sequence[Scalar]) -> Spectrum:
+    """A spectrum of these channels, as many as `like` has."""
+    if isinstance(like, Node) or any(isinstance(value, Node) for value in values):
+        return graph.emit("vector", "spectrum", *values)  # type: ignore[return-value]
+    made: Value = type(like)(*values)
+    return made
 
 
 def mean(spectrum: Spectrum) -> Scalar:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
+import sys
 from collections.abc import Iterator
 from types import ModuleType
 
@@ -36,6 +37,11 @@ def variant_for(device: str = "cpu", spectral: bool = False) -> str:
     if device == "cuda" and not has_cuda:
         raise MachineError("no CUDA device answers", "--device cuda", "use --device cpu, or install an NVIDIA driver")
     return ("cuda_ad_" if has_cuda else "llvm_ad_") + ("spectral" if spectral else "rgb")
+
+
+def polarized(variant: str) -> str:
+    """The variant that knows polarization, and colours, on the device of another."""
+    return "_".join([*variant.split("_")[:2], "spectral_polarized"])
 
 
 @alone
@@ -92,6 +98,21 @@ def using(variant: str) -> Iterator[None]:
             yield
         finally:
             mi.set_variant(before)
+
+
+@contextlib.contextmanager
+def put_back() -> Iterator[None]:
+    """Whatever spectral variant is set in here, afterwards the one from before is, or RGB's of the same device: what
+    else a program does counts on three colours."""
+    loaded = sys.modules.get("mitsuba")
+    before = None if loaded is None else loaded.variant()
+    try:
+        yield
+    finally:
+        mi = sys.modules.get("mitsuba")
+        now = mi and mi.variant()
+        if mi and now and now != before and "spectral" in now:
+            mi.set_variant(before or "_".join([*now.split("_")[:2], "rgb"]))
 
 
 @contextlib.contextmanager

@@ -31,18 +31,27 @@ class MitsubaRender:
     samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
     """
 
-    def __init__(self, mi: ModuleType, scene: Scene, spp: int, seed: int = 0) -> None:
+    def __init__(
+        self,
+        mi: ModuleType,
+        scene: Scene,
+        spp: int,
+        seed: int = 0,
+        integrator: Plugin = None,
+        wavefront: int = WAVEFRONT,
+    ) -> None:
         self._mi, self._scene, self._seed = mi, scene, seed
+        self._integrator = scene.integrator() if integrator is None else integrator
         self._sensor = scene.sensors()[0]
         width, height = self._sensor.film().crop_size()
-        self.pass_size = min(spp, power_of_two(max(1, WAVEFRONT // (int(width) * int(height)))))
+        self.pass_size = min(spp, power_of_two(max(1, wavefront // (int(width) * int(height)))))
         self._sum: NDArray[np.float64] | None = None
         self._passes = 0
         self.done = 0
 
     def advance(self, count: int) -> None:
         seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
-        picture = self._render(self._scene.integrator(), count, seed)
+        picture = self._render(self._integrator, count, seed)
         taken = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * taken

@@ -88,7 +88,7 @@ def _nearby(path: Path) -> str:
 
 
 def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
-    from . import integrators, scene
+    from . import integrators, polarizer, scene
 
     overrides: dict[str, object] = dict(request.overrides)
     if request.size is not None:
@@ -109,14 +109,24 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     settings = _settings(of_scene, request)
     output = request.output or Path(description.output.filename)
     images.check_writable(output)
-    render = integrators.Render(scene.build(description, mi), settings, aovs=request.denoise)
+    spp, degrees, how = request.spp or description.spp, description.camera.polarizer, _own(settings)
+    if degrees is not None:
+        polarizer.check(settings, description.where("/camera/polarizer"))
+        mi.set_variant(engine.polarized(str(mi.variant())))
+        how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
+    built = scene.build(description, mi)
+    render: Renders
+    if degrees is None:
+        render = integrators.Render(built, settings, aovs=request.denoise)
+    else:
+        render = polarizer.PolarizedRender(mi, built, spp, settings, degrees)
     return Prepared(
         request,
         render,
-        request.spp or description.spp,
-        (render.width, render.height),
+        spp,
+        description.camera.film.size,
         output,
-        _metadata(request, mi, **_own(settings)),
+        _metadata(request, mi, **how),
         Sources.of(mi, *scene.sources(description), _how(settings, request)),
         tuple(description.warnings),
     )

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..models import BSDF, notation, outside
 from ..owner import public
-from . import curves, energy_figures, figures, image_slices, lobes
+from . import curves, energy_figures, figures, fresnel_figure, image_slices, lobes
 from .curves import Curve
 from .figures import Drawing
 
@@ -33,23 +33,34 @@ def plot(
     *materials: BSDF | str | Path,
     kind: str = "lobe",
     angles: Sequence[float] | None = None,
+    eta: float | None = None,
+    k: float = 0.0,
+    metal: str | None = None,
     output: str | Path | None = None,
 ) -> Drawing:
     """Draw materials over each other: their lobes, a slice over angle, their albedo, or image slices side by side.
 
         go.plot(go.Conductor.preset("Au", alpha=0.2), "lambert", kind="slice", output="two.png")
+        go.plot("fresnel", eta=1.5)
 
-    materials  materials, or their text as the command line takes it; or one folder that `go.bake` wrote
+    materials  materials, or their text as the command line takes it; or one folder that `go.bake` wrote; or "fresnel",
+               the reflectance of an interface over angle, from both sides, beside its approximations and their errors
     kind       "lobe" (polar), "slice" (over the angle of wi), "albedo" (over the angle of wo) or "image" (over half
                vector and difference angle)
     angles     of wo from the normal, degrees, 0 to below 90; up to 8; not for "albedo" and "image"
+    eta, k     of "fresnel": the index inside over that outside, 1.5 where None; and its imaginary part
+    metal      of "fresnel", in place of an index: "Au", at red, green and blue
     output     file to write, .png, .pdf or .svg; None writes nothing
     Returns a Drawing, which a notebook shows; `.figure` is Matplotlib's.
     Raises InputError for a material, kind, angle or file that cannot be.
     """
     if output is not None:
         figures.check_output(Path(output))
-    if len(materials) == 1 and not isinstance(materials[0], BSDF) and is_tables(materials[0]):
+    if materials == ("fresnel",):
+        drawing = fresnel_figure.draw(eta, k, metal)
+    elif eta is not None or k or metal is not None:
+        raise InputError("an index is given, and no fresnel to draw", "plot", "name fresnel, or use -p eta=1.5")
+    elif len(materials) == 1 and not isinstance(materials[0], BSDF) and is_tables(materials[0]):
         drawing = energy_figures.draw_tables(materials[0])
     else:
         drawing = _drawn([_named(material) for material in materials], kind, _views(angles))

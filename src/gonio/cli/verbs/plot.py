@@ -18,7 +18,7 @@ def plot(
         list[str],
         Argument(
             metavar="MODEL...",
-            help="Materials' names; see `gonio models`. Or a baked folder.",
+            help="Materials' names; see `gonio models`. Or a baked folder, or fresnel.",
             autocompletion=completion.materials,
         ),
     ],
@@ -26,9 +26,13 @@ def plot(
     made: Material,
     kind: Annotated[str, Option(metavar="lobe|slice|albedo|image", help="What to draw.")] = "lobe",
     angles: Annotated[str | None, Option(metavar="A,B,..", help="Directions of view, degrees from the normal.")] = None,
+    eta: Annotated[float | None, Option(metavar="ETA", help="Of fresnel: index inside over outside.")] = None,
+    k: Annotated[float, Option("--k", metavar="K", help="Of fresnel: imaginary part of the index.")] = 0.0,
+    metal: Annotated[str | None, Option(metavar="NAME", help="Of fresnel: a metal, such as Au.")] = None,
     output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help=".png, .pdf, .svg.")] = None,
 ) -> None:
-    """Draw materials: their lobes (polar), slices over angle, albedo, or image slices; or the tables in a baked folder.
+    """Draw materials: their lobes (polar), slices over angle, albedo, or image slices; or the tables in a baked folder;
+    or, as `fresnel`, the reflectance of an interface.
 
     The density that a material is sampled with is drawn dashed over its values. Several materials share their axes.
 
@@ -40,6 +44,8 @@ def plot(
       gonio plot dielectric -p alpha=.2 --kind albedo
       gonio plot gold.binary "conductor(preset=Au,alpha=.2)" --kind image
       gonio plot ./tables -o tables.png
+      gonio plot fresnel --eta 1.5
+      gonio plot fresnel --metal Au
     """
     from ...viewer import figures, plots
 
@@ -48,10 +54,14 @@ def plot(
         output = output or Path(f"{Path(model[0]).resolve().stem}-tables.png")
         print(plots.plot(model[0], output=output).path)
         return
+    if model == ["fresnel"]:
+        output = output or Path("fresnel.png")
+        print(plots.plot("fresnel", eta=eta, k=k, metal=metal, output=output).path)
+        return
     texts = made.texts(model)
     heads = dict.fromkeys(text.partition("(")[0] for text in texts)
     output = output or Path(f"{'-'.join(map(_file_name, heads))}-{kind}.png")
-    print(plots.plot(*texts, kind=kind, angles=views, output=output).path)
+    print(plots.plot(*texts, kind=kind, angles=views, eta=eta, k=k, metal=metal, output=output).path)
 
 
 def _file_name(head: str) -> str:

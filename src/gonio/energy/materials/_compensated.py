@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ... import ops
 from ...models import BSDF, Sample, bsdf, method
 from ...models.material import Delta, InnerAlbedo
-from ...ops import Direction, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
+from ...models.polarization import Polarized
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
 from ...ops.backend import Array
 from ...optics.special import gauss
 from ..compensation import missing, reflecting
@@ -65,6 +66,10 @@ class _OnBase(BSDF):
     @property
     def delta(self) -> Delta:
         return self.base.delta
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The base's: light that was scattered once. What is given back has lost its polarization among the facets."""
+        return self.base.polarized(wo, wi, delta, mode)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base's."""

@@ -3,7 +3,8 @@
 A plugin's properties carry the names of the model's parameters. Every plugin takes two properties more: `two_sided`
 (shade both sides; no nested call as in Mitsuba's own `twosided`) and, where the model has presets, `preset`.
 
-In polarized variants a plugin depolarizes: pictures of unpolarized light are right, polarization is lost.
+In polarized variants a plugin hands out Mueller matrices of what single facets have reflected or refracted; all else
+leaves unpolarized.
 """
 
 from __future__ import annotations

@@ -85,9 +85,16 @@ class PlacedMaterial:
     def varies(self) -> bool:
         """Whether a parameter, here or further in, has not the same value at every hit: textures, and spectra, which
         are looked up at a ray's wavelengths."""
-        return any(slot.textures for slot in self.slots.values()) or any(
-            isinstance(held, Native) or held.varies for _, held in self.inner.values()
+        return (
+            self._by_wavelength
+            or any(slot.textures for slot in self.slots.values())
+            or any(isinstance(held, Native) or held.varies for _, held in self.inner.values())
         )
+
+    @property
+    def _by_wavelength(self) -> bool:
+        """Whether the model is told the rays' wavelengths."""
+        return self.variant.spectral and self.model.reads_wavelengths
 
     def at(self, si: SurfaceInteraction, active: Mask, inner: bool = False) -> BSDF:
         """The model, its parameters bound to their values at a surface interaction.
@@ -97,6 +104,8 @@ class PlacedMaterial:
         values = {name: slot.at(si, active) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
             values[name] = held.at(si, active) if isinstance(held, Native) else held.at(si, active, inner=True)
+        if self._by_wavelength:
+            values["wavelengths"] = self.variant.spectrum(si.wavelengths)
         bound = binding.bound_copy(self.model, values, self.derived)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 

@@ -49,6 +49,16 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         same = wo.z * wi.z > 0.0
         return active & ((same & reflect) | (~same & transmit))
 
+    def mueller(
+        model: BSDF, ctx: BSDFContext, wo: Vector, wi: Vector, value: Radiance, whole: Radiance, delta: Mask
+    ) -> Radiance:
+        """The value as a Mueller matrix. In importance mode light goes the other way, from Gonio's wo to wi."""
+        mode = mode_of(ctx)
+        parts = model.polarized(wo, wi, delta, mode)
+        whole = dr.select(delta, sum((part.value for part in parts), dr.zeros(variant.spectrum)), whole)
+        toward, away = (wi, wo) if mode == "radiance" else (wo, wi)
+        return variant.mueller(value, whole, parts, toward, away)
+
     class GonioBSDF(base):
         """A Gonio model in a Mitsuba scene."""
 
@@ -116,8 +126,10 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             return value, pdf, *self._sample(model, ctx, si, sample1, sample2, active)
 
         def _eval(self, model: BSDF, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask) -> Radiance:
-            value = variant.handed_out(model.eval(si.wi, wo, mode_of(ctx)))
-            return dr.select(enabled(ctx, si.wi, wo, active), value, 0.0)
+            value = model.eval(si.wi, wo, mode_of(ctx))
+            if mi.is_polarized:
+                value = mueller(model, ctx, si.wi, wo, value, value, mi.Bool(False))
+            return dr.select(enabled(ctx, si.wi, wo, active), variant.handed_out(value), 0.0)
 
         def _pdf(self, model: BSDF, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask) -> Float:
             return dr.select(enabled(ctx, si.wi, wo, active), model.pdf(si.wi, wo), 0.0)
@@ -136,7 +148,11 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             ideal = dr.select(through, mi.UInt32(+kinds.DeltaTransmission), mi.UInt32(+kinds.DeltaReflection))
             bs.sampled_type = dr.select(s.delta, ideal, glossy)
             bs.sampled_component = mi.UInt32(0)
-            return bs, dr.select(active, variant.handed_out(s.weight), 0.0)
+            weight = s.weight
+            if mi.is_polarized:
+                whole = model.eval(si.wi, bs.wo, mode_of(ctx))
+                weight = mueller(model, ctx, si.wi, bs.wo, weight, whole, s.delta)
+            return bs, dr.select(active, variant.handed_out(weight), 0.0)
 
         # -------------------------------------------------------------- colours
 

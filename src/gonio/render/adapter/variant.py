@@ -11,8 +11,9 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from ...models.polarization import Polarized
 from ...optics.indices import RGB_WAVELENGTHS
-from ..types import Radiance, Texture
+from ..types import Radiance, Texture, Vector
 
 Floats: TypeAlias = NDArray[np.float64]
 
@@ -30,9 +31,40 @@ class Variant:
         self.spectral = bool(mi.is_spectral)  # colours depend on the ray's wavelengths: they are textures
 
     def handed_out(self, value: Radiance) -> Radiance:
-        """A material's value as Mitsuba takes it; in polarized variants the matrix that depolarizes all light."""
+        """A material's value as Mitsuba takes it, where it is no Mueller matrix."""
+        return self.mi.Spectrum(value)
+
+    def mueller(
+        self, value: Radiance, whole: Radiance, parts: Sequence[Polarized], toward: Vector, away: Vector
+    ) -> Radiance:
+        """A material's value as a Mueller matrix: of each part as its facets have it, and what is left unpolarized.
+
+        value   what unpolarized light gives
+        whole   what the parts are parts of
+        toward  from where light arrives, and
+        away    where it goes to; both away from the surface. As in Mitsuba the matrix is one from the Stokes basis of
+                the one ray to that of the other (`mi.mueller.stokes_basis`)
+        """
         mi = self.mi
-        return mi.depolarizer(mi.Spectrum(self.spectrum(value))) if mi.is_polarized else mi.Spectrum(value)
+        matrix, rest = dr.zeros(mi.Spectrum), self.spectrum(value)
+        for part in parts:
+            size = dr.select(whole != 0.0, value * part.value / whole, 0.0)
+            rest -= size
+            d, c, s = (size * self.spectrum(x) for x in part.matrix)
+            zero = dr.zeros(self.spectrum)
+            own = mi.Spectrum(size, d, zero, zero, d, size, zero, zero, zero, zero, c, -s, zero, zero, s, c)
+            axes = [self._across(part.normal, ray) for ray in (-toward, away)]
+            bases = [mi.mueller.stokes_basis(ray) for ray in (-toward, away)]
+            matrix += mi.mueller.rotate_mueller_basis(own, -toward, axes[0], bases[0], away, axes[1], bases[1])
+        matrix[0, 0] = matrix[0, 0] + rest
+        return matrix
+
+    def _across(self, normal: Vector, ray: Vector) -> Vector:
+        """The direction of s on a ray: perpendicular to the plane of incidence; any where the ray is the normal."""
+        across = dr.cross(self.mi.Vector3f(normal), ray)
+        length2 = dr.squared_norm(across)
+        any_ = self.mi.coordinate_system(ray)[0]
+        return dr.select(length2 > 1e-12, across * dr.rsqrt(dr.maximum(length2, 1e-30)), any_)
 
     def constant(self, value: float | Sequence[float]) -> Radiance:
         """A number (grey), or r, g, b where the variant is not spectral; alone, r, g, b is its luminance."""

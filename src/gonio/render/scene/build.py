@@ -104,6 +104,10 @@ class _Builder:
         camera = self.description.camera
         placed = camera.transform
         width, height = camera.film.size
+        if camera.polarizer is not None and not self.mi.is_polarized:
+            what = f"a polarizer, in the variant {self.mi.variant()} that knows no polarization"
+            hint = "`gonio render` and go.render choose one that does; here set llvm_ad_spectral_polarized before"
+            raise InputError(what, self.description.where("/camera/polarizer"), hint)
         return {
             "type": "perspective",
             "fov": camera.vertical_fov,

@@ -145,6 +145,10 @@ class Camera(Part):
     """Nothing nearer is seen."""
     t_far: Positive = Field(1e10, alias="tFar")
     """Nothing farther is seen."""
+    polarizer: Number | None = None
+    """An ideal linear polarizer over the lens, degrees: the direction that it lets through, counterclockwise from the
+    picture's horizontal. It halves light that is not polarized. Mitsuba's path tracer renders, in a polarized variant.
+    """
     time_start: Number = Field(0.0, alias="timeStart")
     """Without effect: nothing moves."""
     time_end: Number = Field(0.0, alias="timeEnd")

@@ -1,0 +1,42 @@
+"""Schlick's curve, bent to meet a second value near grazing: the F82 of Adobe's standard material."""
+
+from __future__ import annotations
+
+from ...ops import Scalar, Spectrum, function, maximum, minimum, sqr, where
+from . import exact
+from .base import Fresnel, R, cos_transmitted, r0_conductor, r0_dielectric
+from .schlick import schlick
+
+GRAZING = 1.0 / 7.0  # the cosine of 82 degrees, nearly: where x (1 - x)^6 is greatest
+GREATEST = GRAZING * (1.0 - GRAZING) ** 6
+
+
+class F82(Fresnel):
+    """Schlick's curve through the exact values at 0 and 82 degrees (Kutz2021)."""
+
+    name = "f82"
+
+    def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
+        """The curve through the exact reflectances of a metal."""
+        return f82(cos_i, r0_conductor(eta, k), exact.conductor(GRAZING, eta, k))
+
+    def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
+        """The curve through the exact reflectances of a dielectric; from the denser side at the transmitted angle."""
+        mu = where(eta < 1.0, cos_t, cos_i)
+        return where(cos_t > 0.0, f82(mu, r0_dielectric(eta), _edge(eta)), 1.0)
+
+
+def _edge(eta: Scalar) -> Scalar:
+    """The exact reflectance of a dielectric at 82 degrees from its less dense side."""
+    eta = maximum(eta, 1.0 / eta)
+    cos = GRAZING + 0.0 * eta
+    return exact.dielectric(cos, cos_transmitted(cos, eta), eta)
+
+
+@function
+def f82(cos_i: Scalar | float, r0: R, edge: R) -> R:
+    """Schlick's curve from r0, less c x (1 - x)^6 with the c that makes it `edge` at cosine 1/7 (Kutz2021), held
+    above 0, where a dark edge over a dark r0 would pull it."""
+    x = minimum(maximum(cos_i, 0.0), 1.0)
+    dip = x * sqr(1.0 - x) * sqr(sqr(1.0 - x)) * (1.0 / GREATEST)
+    return maximum(schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip, 0.0)

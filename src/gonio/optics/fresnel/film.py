@@ -1,0 +1,297 @@
+"""Light reflected by a thin film on a surface: waves from its two faces add up, and colours come of it.
+
+With the amplitudes r12 of the film's face and r23 of the surface under it, and delta = 4 pi d w2 / lambda that a round
+trip adds, w2 = sqrt(eta2^2 - sin^2), all waves together are (Airy's sum; Born1999, sec. 7.6)
+
+    r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)).
+
+That is for one wavelength, and is what spectral variants evaluate. Three colours can follow from it in two ways, the
+members of `FORMS`. Indices are over that of the outside.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...ops import (
+    Scalar,
+    Spectrum,
+    abs,
+    channels,
+    clamp,
+    exp,
+    floor,
+    function,
+    maximum,
+    of_channels,
+    sincos,
+    sqr,
+    sqrt,
+    where,
+)
+from .. import colour
+from ..indices import RGB_WAVELENGTHS
+from .polarization import Diattenuation
+
+FORMS = {
+    "local": "the sum of waves at 20 wavelengths, seen under D65 (locally spectral, OpenPBR)",
+    "belcour-barla": "the interference as Gaussians in Fourier space (Belcour2017)",
+}
+
+# 390 to 770 nm by 20: fringes of a film of 1 um are 100 nm apart, of 3 um 35 nm
+NODES = np.arange(390.0, 771.0, 20.0)
+WEIGHTS = colour.weights(NODES)
+
+# Fits of the observer's curves over wave numbers (Belcour2017, supplemental code): height, place and variance, the
+# second bell of x last. Divided by the integral of y
+BELLS = ((5.4856e-13, 1.6810e6, 4.3278e9), (4.4201e-13, 1.7953e6, 9.3046e9), (5.2481e-13, 2.2084e6, 6.6121e9))
+SECOND_X = (9.7470e-14, 2.2399e6, 4.5282e9)
+INTEGRAL_Y = 1.0685e-7
+HARMONICS = 3  # the next is r^4 of the first, and the eye's curves have blurred it
+WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted under even light
+
+
+class Complex(NamedTuple):
+    """A complex number, of symbols too."""
+
+    re: Scalar
+    im: Scalar
+
+    def plus(self, other: Complex) -> Complex:
+        return Complex(self.re + other.re, self.im + other.im)
+
+    def times(self, other: Complex) -> Complex:
+        return Complex(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
+
+    def scaled(self, factor: Scalar | float) -> Complex:
+        return Complex(self.re * factor, self.im * factor)
+
+    @property
+    def conjugate(self) -> Complex:
+        return Complex(self.re, -self.im)
+
+    @property
+    def square(self) -> Scalar:
+        """Its absolute value, squared."""
+        return sqr(self.re) + sqr(self.im)
+
+    def over(self, other: Complex) -> Complex:
+        return self.times(other.conjugate).scaled(1.0 / maximum(other.square, 1e-30))
+
+
+class Faces(NamedTuple):
+    """The amplitudes of a film's faces, and half the way of a round trip through it.
+
+    top_s, top_p    of the face toward the light, real
+    base_s, base_p  of the surface under the film
+    way             d w2, in the unit of d
+    """
+
+    top_s: Scalar
+    top_p: Scalar
+    base_s: Complex
+    base_p: Complex
+    way: Scalar
+
+
+@function
+def faces(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar) -> Faces:
+    """Of a film of real index film_eta >= 1 on a base of index eta + i k."""
+    sin2 = 1.0 - sqr(cos_i)
+    w2 = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
+    square = Complex(sqr(eta) - sqr(k), 2.0 * eta * k)
+    w = _root(square.re - sin2, eta * k)
+    n2 = sqr(film_eta)
+    base_s = Complex(w2 - w.re, -w.im).over(Complex(w2 + w.re, w.im))
+    down, up = square.scaled(w2), w.scaled(n2)
+    base_p = Complex(down.re - up.re, down.im - up.im).over(down.plus(up))
+    top_s = (cos_i - w2) / (cos_i + w2)
+    top_p = (n2 * cos_i - w2) / (n2 * cos_i + w2)
+    return Faces(top_s, top_p, base_s, base_p, thickness * w2)
+
+
+def _root(real: Scalar, half_imaginary: Scalar) -> Complex:
+    """sqrt(real + 2 i half_imaginary), both parts >= 0; the smaller is found from the larger, which cancels nothing."""
+    size = sqrt(maximum(sqr(real) + 4.0 * sqr(half_imaginary), 1e-30))
+    larger = sqrt(maximum(0.5 * (size + abs(real)), 1e-24))
+    other = half_imaginary / larger
+    return Complex(where(real > 0.0, larger, other), where(real > 0.0, other, larger))
+
+
+class Amplitudes(NamedTuple):
+    """Of all waves together at one wavelength: reflected fields, and what both are divided by."""
+
+    s: Complex
+    p: Complex
+    under_s: Complex
+    under_p: Complex
+
+
+@function
+def airy(film: Faces, wavelength: Scalar | float) -> Amplitudes:
+    """The sum of all waves at a wavelength, in the unit of the thickness."""
+    turns = 2.0 * film.way / wavelength
+    sin, cos = sincos((turns - floor(turns)) * (2.0 * math.pi))  # a shader's sine is good near 0 only
+    around = Complex(cos, sin)
+    s, p = film.base_s.times(around), film.base_p.times(around)
+    under_s = Complex(1.0 + film.top_s * s.re, film.top_s * s.im)
+    under_p = Complex(1.0 + film.top_p * p.re, film.top_p * p.im)
+    over_s, over_p = Complex(film.top_s + s.re, s.im), Complex(film.top_p + p.re, p.im)
+    return Amplitudes(over_s.over(under_s), over_p.over(under_p), under_s, under_p)
+
+
+class Film(NamedTuple):
+    """A film on a base, as a material has it.
+
+    eta, k      of the base, colours
+    film_eta    index of the film
+    thickness   nm
+    form        a name of `FORMS`
+    wavelengths of the rays, nm, one for each channel, in spectral variants; else None
+    """
+
+    eta: Spectrum
+    k: Spectrum
+    film_eta: Scalar
+    thickness: Scalar
+    form: str
+    wavelengths: Spectrum | None
+
+
+def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
+    """R of unpolarized light under cos_i, by the form of the film; at the rays' wavelengths where these are known."""
+    if film.wavelengths is None and film.form == "belcour-barla":
+        return _in_fourier_space(cos_i, film)
+    seen = _seen(film, lambda eta, k, nm: _unpolarized(cos_i, eta, k, film.film_eta, film.thickness, nm))
+    # colours that no three lights mix would be more than all, or less than nothing
+    return seen if film.wavelengths is not None else clamp(seen, 0.0, 1.0)
+
+
+def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
+    """What reflection and refraction do to polarization, from outside, summed over wavelengths whatever the form is."""
+
+    def seen(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
+        def at(eta: Scalar, k: Scalar, nm: Scalar | float) -> Scalar:
+            return what(airy(faces(cos_i, eta, k, film.film_eta, film.thickness), nm))
+
+        return _seen(film, at)
+
+    def reflected(waves: Amplitudes) -> Complex:
+        return waves.s.times(waves.p.conjugate)
+
+    def transmitted(waves: Amplitudes) -> Complex:
+        """t_s times the conjugate of t_p: only what both are divided by turns them apart."""
+        phase = waves.under_s.conjugate.times(waves.under_p)
+        size = maximum(1.0 - waves.s.square, 0.0) * maximum(1.0 - waves.p.square, 0.0)
+        return phase.scaled(sqrt(size / maximum(phase.square, 1e-30)))
+
+    s, p = seen(lambda waves: waves.s.square), seen(lambda waves: waves.p.square)
+    back = seen(lambda waves: reflected(waves).re), seen(lambda waves: reflected(waves).im)
+    on = seen(lambda waves: transmitted(waves).re), seen(lambda waves: transmitted(waves).im)
+    return _over_sum(s, p, *back), _over_sum(1.0 - s, 1.0 - p, *on)
+
+
+def _over_sum(s: Spectrum, p: Spectrum, real: Spectrum, imaginary: Spectrum) -> Diattenuation[Spectrum]:
+    one = 1.0 / maximum(s + p, 1e-12)
+    return Diattenuation((s - p) * one, 2.0 * real * one, 2.0 * imaginary * one)
+
+
+@function
+def _unpolarized(
+    cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar, wavelength: Scalar | float
+) -> Scalar:
+    """R at one wavelength."""
+    waves = airy(faces(cos_i, eta, k, film_eta, thickness), wavelength)
+    return 0.5 * (waves.s.square + waves.p.square)
+
+
+def _seen(film: Film, at: Callable[[Scalar, Scalar, Scalar | float], Scalar]) -> Spectrum:
+    """What `at` gives for eta, k and a wavelength: one for each channel of a spectrum, else as a colour under daylight.
+
+    The indices of red, green and blue stand for `RGB_WAVELENGTHS`; between them they are straight, beyond them level.
+    """
+    etas, ks = channels(film.eta), channels(film.k)
+    if film.wavelengths is not None:
+        values = [at(*one) for one in zip(etas, ks, channels(film.wavelengths), strict=True)]
+        return of_channels(film.eta, values)
+    mixing = WEIGHTS if len(etas) == 3 else (WEIGHTS @ colour.LUMINANCE)[:, None]
+    totals: list[Scalar] = []
+    for nm, shares in zip(NODES, mixing, strict=True):
+        found = at(_between(etas, float(nm)), _between(ks, float(nm)), float(nm))
+        terms = [found * float(share) for share in shares]
+        totals = [total + term for total, term in zip(totals, terms, strict=True)] if totals else terms
+    return of_channels(film.eta, totals)
+
+
+def _between(values: Sequence[Scalar], nm: float) -> Scalar:
+    """The value at a wavelength of one that is known at `RGB_WAVELENGTHS`."""
+    if len(values) != 3:
+        return values[0]
+    red, green, blue = RGB_WAVELENGTHS
+    if not blue < nm < red:
+        return values[0] if nm >= red else values[2]
+    (a, low), (b, high) = ((2, blue), (1, green)) if nm < green else ((1, green), (0, red))
+    share = (nm - low) / (high - low)
+    return values[a] * (1.0 - share) + values[b] * share
+
+
+# ---------------------------------------------------------------------- in Fourier space
+
+
+def _in_fourier_space(cos_i: Scalar, film: Film) -> Spectrum:
+    """Belcour2017, eq. 6 to 10, the mean term kept as a colour; harmonics of red, green and blue indices are taken for
+    those of x, y and z."""
+    etas, ks = channels(film.eta), channels(film.k)
+    means: list[Scalar] = []
+    waves: list[Scalar] = []
+    for band, (eta, k) in enumerate(zip(etas, ks, strict=True)):
+        mean, wave = _band(cos_i, eta, k, film.film_eta, film.thickness, band if len(etas) == 3 else 1)
+        means.append(mean)
+        waves.append(wave)
+    if len(etas) == 3:
+        scaled = [wave * white for wave, white in zip(waves, WHITE, strict=True)]
+        waves = [sum((w * float(m) for w, m in zip(scaled[1:], row[1:], strict=True)), scaled[0] * float(row[0]))
+                 for row in colour.XYZ_TO_RGB]  # fmt: skip
+    total = [mean + wave for mean, wave in zip(means, waves, strict=True)]
+    return clamp(of_channels(film.eta, total), 0.0, 1.0)
+
+
+def _band(
+    cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar, band: int
+) -> tuple[Scalar, Scalar]:
+    """(the mean of R over wavelengths, what the observer's curve sees of its waves), mean of both polarizations."""
+    film = faces(cos_i, eta, k, film_eta, thickness)
+    bells = [BELLS[band], SECOND_X] if band == 0 else [BELLS[band]]
+    curves = [_curve(film.way, order, bells) for order in range(1, HARMONICS + 1)]
+    mean, wave = 0.0 * cos_i, 0.0 * cos_i
+    for top, base in ((film.top_s, film.base_s), (film.top_p, film.base_p)):
+        outer, inner = sqr(top), base.square
+        passed = 1.0 - outer
+        all_ = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
+        mean = mean + 0.5 * (outer + all_)
+        once = base.scaled(-top)  # one round trip, without its way
+        power = once
+        for order, curve in enumerate(curves):
+            if order:
+                power = power.times(once)
+            wave = wave + (all_ - passed) * power.times(curve).re
+    return mean, wave
+
+
+def _curve(way: Scalar, order: int, bells: Sequence[tuple[float, float, float]]) -> Complex:
+    """The Fourier transform of an observer's curve at `order` round trips: bells over wave numbers are waves that die
+    out."""
+    path = way * (2.0 * order * 1e-9)  # metres
+    found: list[Complex] = []
+    for height, place, variance in bells:
+        turns = path * place
+        sin, cos = sincos((turns - floor(turns)) * (2.0 * math.pi))
+        size = exp(sqr(path) * (-variance * (2.0 * math.pi) ** 2)) * (
+            height * math.sqrt(2.0 * math.pi * variance) / INTEGRAL_Y
+        )
+        found.append(Complex(cos, sin).scaled(size))
+    return found[0] if len(found) == 1 else found[0].plus(found[1])
