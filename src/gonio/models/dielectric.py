@@ -16,7 +16,7 @@ from . import microfacet
 from .calling import method
 from .material import Delta, InnerAlbedo, Preset
 from .microfacet import Terms
-from .parameters import Angle, Colour, Number, Width, flag, number
+from .parameters import Angle, Colour, Index, Width, flag, index
 from .sample import Sample
 
 
@@ -52,7 +52,7 @@ class Dielectric(microfacet._Microfacet):
     eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
     """
 
-    eta: Number = number(default=1.5, doc="index inside over index outside", low=0.2, high=5.0)
+    eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()
     ndf: str = microfacet.ndf_choice()
@@ -67,7 +67,8 @@ class Dielectric(microfacet._Microfacet):
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
         """Transparent media by name: eta."""
-        return {name: Preset(m.name, {"eta": m.eta}, m.source) for name, m in indices.MEDIA.items()}
+        media = indices.MEDIA.items()
+        return {name: Preset(m.title, {"eta": indices.DispersiveIndex(m)}, m.source) for name, m in media}
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:

@@ -127,7 +127,10 @@ class BSDF(Material):
 
     def __post_init__(self) -> None:
         for parameter in self.parameters().values():
-            parameter.check(getattr(self, parameter.name), f"{type(self).__name__}.{parameter.name}")
+            given = getattr(self, parameter.name)
+            taken = parameter.taken(given, f"{type(self).__name__}.{parameter.name}")
+            if taken is not given:
+                object.__setattr__(self, parameter.name, taken)
         object.__setattr__(self, "_count", tree.count(self))
 
     @classmethod

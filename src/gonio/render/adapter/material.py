@@ -85,18 +85,26 @@ class PlacedMaterial:
     def varies(self) -> bool:
         """Whether a parameter, here or further in, has not the same value at every hit: textures, and spectra, which
         are looked up at a ray's wavelengths."""
-        return any(slot.textures for slot in self.slots.values()) or any(
+        return any(slot.textures or slot.curves for slot in self.slots.values()) or any(
             isinstance(held, Native) or held.varies for _, held in self.inner.values()
         )
 
-    def at(self, si: SurfaceInteraction, active: Mask, inner: bool = False) -> BSDF:
+    @property
+    def disperses(self) -> bool:
+        """Whether an index, here or further in, depends on the wavelength."""
+        return any(slot.curves for slot in self.slots.values()) or any(
+            isinstance(held, PlacedMaterial) and held.disperses for _, held in self.inner.values()
+        )
+
+    def at(self, si: SurfaceInteraction, active: Mask, separates: bool = False, inner: bool = False) -> BSDF:
         """The model, its parameters bound to their values at a surface interaction.
 
-        inner  it is part of another material, which alone decides whether both sides are shaded
+        separates  whether an index that depends on the wavelength is that of the first of the ray's
+        inner      it is part of another material, which alone decides whether both sides are shaded
         """
-        values = {name: slot.at(si, active) for name, slot in self.slots.items()}
+        values = {name: slot.at(si, active, separates) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
-            values[name] = held.at(si, active) if isinstance(held, Native) else held.at(si, active, inner=True)
+            values[name] = held.at(si, active) if isinstance(held, Native) else held.at(si, active, separates, True)
         bound = binding.bound_copy(self.model, values, self.derived)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 

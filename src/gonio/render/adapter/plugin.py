@@ -28,7 +28,7 @@ from ..types import (
     Vector,
 )
 from .material import PlacedMaterial
-from .variant import Variant
+from .variant import DISPERSES, SEPARATES, Variant
 
 
 def plugin_class(mi: ModuleType) -> OfVariant:
@@ -49,6 +49,10 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         same = wo.z * wi.z > 0.0
         return active & ((same & reflect) | (~same & transmit))
 
+    def separates(ctx: BSDFContext) -> bool:
+        """Whether who asks goes on with one wavelength where they part."""
+        return int(ctx.type_mask) == SEPARATES
+
     class GonioBSDF(base):
         """A Gonio model in a Mitsuba scene."""
 
@@ -63,6 +67,8 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             sides = kinds.FrontSide | kinds.BackSide if placed.sides or transmits else kinds.FrontSide
             if any(slot.varies for slot in placed.slots.values()):
                 sides = sides | kinds.SpatiallyVarying
+            if placed.disperses:
+                sides = sides | DISPERSES
             lobes = []
             if delta != "always":
                 lobes += [kinds.GlossyReflection, *([kinds.GlossyTransmission] if transmits else [])]
@@ -86,21 +92,21 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         # -------------------------------------------------------------- values
 
         def eval(self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True) -> Radiance:
-            return self._eval(self.placed.at(si, active), ctx, si, wo, active)
+            return self._eval(self.placed.at(si, active, separates(ctx)), ctx, si, wo, active)
 
         def pdf(self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True) -> Float:
-            return self._pdf(self.placed.at(si, active), ctx, si, wo, active)
+            return self._pdf(self.placed.at(si, active, separates(ctx)), ctx, si, wo, active)
 
         def eval_pdf(
             self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True
         ) -> tuple[Radiance, Float]:
-            model = self.placed.at(si, active)
+            model = self.placed.at(si, active, separates(ctx))
             return self._eval(model, ctx, si, wo, active), self._pdf(model, ctx, si, wo, active)
 
         def sample(
             self, ctx: BSDFContext, si: SurfaceInteraction, sample1: Float, sample2: Point, active: Mask = True
         ) -> tuple[BSDFSample, Radiance]:
-            return self._sample(self.placed.at(si, active), ctx, si, sample1, sample2, active)
+            return self._sample(self.placed.at(si, active, separates(ctx)), ctx, si, sample1, sample2, active)
 
         def eval_pdf_sample(
             self,
@@ -111,7 +117,7 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             sample2: Point,
             active: Mask = True,
         ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-            model = self.placed.at(si, active)
+            model = self.placed.at(si, active, separates(ctx))
             value, pdf = self._eval(model, ctx, si, wo, active), self._pdf(model, ctx, si, wo, active)
             return value, pdf, *self._sample(model, ctx, si, sample1, sample2, active)
 

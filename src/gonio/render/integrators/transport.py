@@ -17,6 +17,7 @@ from typing import ClassVar
 import drjit as dr
 
 from .. import engine, sampler
+from ..adapter.variant import DISPERSES, SEPARATES
 from ..lights import Lights
 from ..types import (
     BSDFSample,
@@ -60,6 +61,7 @@ class _Path:
     pdf: Float  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
     solid_angle: Float  # LightSample.solid_angle at its origin
     radiance: Radiance  # found so far
+    alone: UInt  # 1 where the first wavelength goes on without the others
     active: Mask
 
 
@@ -75,6 +77,7 @@ def _waiting_type(variant: str) -> Record:
     found = {name: kind for name, kind in mi.PreliminaryIntersection3f.DRJIT_STRUCT.items() if name != "valid"}
     kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
     kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
+    kept |= {"alone": mi.UInt32} if mi.is_spectral else {}
 
     def pack(path: _Path) -> Record:
         hit = {name: getattr(path.hit, name) for name in found}
@@ -85,7 +88,7 @@ def _waiting_type(variant: str) -> Record:
         for name in found:
             setattr(hit, name, getattr(rest, name))
         hit.valid = rest.t < dr.inf
-        fields = {name: kind(getattr(rest, name)) for name, kind in kept.items()}
+        fields = {"alone": mi.UInt32(0)} | {name: kind(getattr(rest, name)) for name, kind in kept.items()}
         return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
 
     waiting: Record = make_dataclass("Waiting", [*kept.items(), *found.items()])
@@ -110,11 +113,13 @@ class Transport(Integrator):
         super().__init__(mi, scene, sensor, settings, aovs)
         self.Waiting = _waiting_type(mi.variant())
         self.context = mi.BSDFContext()
+        self.context.type_mask = SEPARATES
         self.lights = Lights(mi, scene, self.surfaces)
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
         self.follows_delta = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta) for shape in scene.shapes())
+        self.disperses = any(shape.bsdf().flags() & DISPERSES for shape in scene.shapes())
         # Whether any path has a second vertex to shade.
         self.goes_on = depth > 2 and (self.samples_lobes or self.follows_delta)
 
@@ -201,7 +206,7 @@ class Transport(Integrator):
         mi = self.mi
         ray, weight, hit = self.first_hit(pixel, key, index)
         return _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
-                     mi.Float(0), mi.Spectrum(0), mi.Bool(True))  # fmt: skip
+                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), mi.Bool(True))  # fmt: skip
 
     def extend(self, path: _Path, key: UInt, features: list[Float] | None = None) -> _Path:
         """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
@@ -225,6 +230,9 @@ class Transport(Integrator):
         active = active & si.is_valid() & (depth + 1 < self.max_depth)
 
         bsdf = si.bsdf(ray)
+        alone = path.alone
+        if self.disperses:
+            throughput, alone = self.separate(throughput, alone, active & ((bsdf.flags() & DISPERSES) != 0))
         gathered, solid_angle, bs, weight = self.scatter(path.index, key, dimension, si, bsdf, active)
         radiance = radiance + throughput * dr.select(active, gathered, 0)
         if self.ambient is not None:
@@ -254,7 +262,18 @@ class Transport(Integrator):
         hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         if not lights.has_environment:  # else the path goes on to meet it
             active = active & hit.is_valid()
-        return _Path(path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, active)
+        return _Path(path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, alone, active)
+
+    def separate(self, throughput: Radiance, alone: UInt, here: Mask) -> tuple[Radiance, UInt]:
+        """Go on with the first wavelength alone where the index depends on it, at the weight of all.
+
+        The wavelengths of a sample are shifted copies of one number, so that the first is distributed as each of them
+        is: in its place it stands for all (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero).
+        """
+        mi, count = self.mi, dr.size_v(throughput)
+        hero = mi.Spectrum(0)
+        hero[0] = throughput[0] * dr.select(alone == 0, count, 1)
+        return dr.select(here, hero, throughput), dr.select(here, mi.UInt32(1), alone)
 
     def scatter(
         self, index: UInt, key: UInt, dimension: UInt, si: SurfaceInteraction, bsdf: MitsubaBSDF, active: Mask
