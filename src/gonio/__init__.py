@@ -165,12 +165,11 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
-    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "Index", "InputError", "Integrator", "KullaConty",
-    "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number", "OrenNayar",
-    "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched",
-    "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare",
-    "compress", "emit", "file", "fit", "fits", "flag", "get_precision", "index", "indices", "material", "materials", "measure", "method",
-    "mix", "model", "models",
-    "never", "number", "ops", "plot", "refractive_index", "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided",
-    "verify", "view", "width",
+    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "Index", "InputError", "Integrator",
+    "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Mirror", "Mix", "Mode", "Number",
+    "OrenNayar", "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum",
+    "Stretched", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster",
+    "compare", "compress", "emit", "file", "fit", "fits", "flag", "get_precision", "index", "indices", "material",
+    "materials", "measure", "method", "mix", "model", "models", "never", "number", "ops", "plot", "refractive_index",
+    "register", "render", "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

@@ -96,7 +96,8 @@ class Gas(Dispersion):
 
     def eta(self, wavelength: Floats) -> Floats:
         inverse = wavelength**-2.0
-        return 1.0 + self.constant + self.density * sum(b / (c - inverse) for b, c in self.terms)
+        refractivity = self.constant + self.density * sum(b / (c - inverse) for b, c in self.terms)
+        return np.asarray(1.0 + refractivity, float)
 
 
 @dataclass(frozen=True)
