@@ -168,7 +168,13 @@ class OpticalConstants:
             hint = "in nanometres" if high >= 20.0 * wrong.flat[0] else 'outside="level" takes the value at the end'
             what = f"{wrong.flat[0]:g} nm is outside of {self.name}, which is known from {low:g} to {high:g} nm"
             raise InputError(what, "wavelength", hint)
-        return self.curve.at(np.clip(given, low, high))
+        with np.errstate(all="ignore"):
+            found = self.curve.at(np.clip(given, low, high))
+        missing = given[~np.isfinite(found.eta)]
+        if missing.size:
+            what = f"{self.name} has no index at {missing.flat[0]:g} nm: a resonance, or the square of none"
+            raise InputError(what, "wavelength", "formulas have lambda in micrometres")
+        return found
 
     @property
     def sodium(self) -> float:

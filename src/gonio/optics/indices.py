@@ -190,12 +190,15 @@ def dispersive(name: str, where: str) -> DispersiveIndex:
     if low > 400.0 or high < 650.0:
         what = f"{name} is known from {low:g} to {high:g} nm, not where light is visible"
         raise InputError(what, where, "take another source")
-    seen = found.at(np.linspace(max(low, 400.0), min(high, 700.0), 31))
+    try:
+        seen = found.at(np.linspace(max(low, 400.0), min(high, 700.0), 31))
+    except InputError as error:
+        raise InputError(error.what, where, error.hint) from None
     if seen.k.max() > 0.01:
         hint = "a dielectric is transparent; see Conductor.preset"
         raise InputError(f"{name} absorbs light within a wavelength: k is {seen.k.max():.3g}", where, hint)
-    if not np.all(np.isfinite(seen.eta)) or seen.eta.min() < 0.2 or seen.eta.max() > 5.0:
-        worst = seen.eta[~(seen.eta >= 0.2) | ~(seen.eta <= 5.0)][0]
+    if seen.eta.min() < 0.2 or seen.eta.max() > 5.0:
+        worst = seen.eta[(seen.eta < 0.2) | (seen.eta > 5.0)][0]
         raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", where, "lambda in micrometres")
     return DispersiveIndex(found)
 

@@ -127,18 +127,19 @@ def _picture(request: Request, level: int) -> RGB:
     import warnings
 
     from ..errors import GonioWarning
-    from . import checkpoints, images, run
+    from . import checkpoints, engine, images, run
 
     notices: list[str] = []
     output, exposure = request.output, request.exposure
-    prepared = run.prepare(request)
-    notices += prepared.warnings
-    beside = None if output is None else checkpoints.beside(output)
-    stopped, keeper = run.work(prepared, temporary=beside, tell=notices.append)
-    picture = run.finished(prepared.render, request.denoise)
-    if output is not None:
-        settings = prepared.settings | {"spp": prepared.render.done}
-        notices += filter(None, [images.show(output, picture, settings, exposure).notice])
+    with engine.put_back():
+        prepared = run.prepare(request)
+        notices += prepared.warnings
+        beside = None if output is None else checkpoints.beside(output)
+        stopped, keeper = run.work(prepared, temporary=beside, tell=notices.append)
+        picture = run.finished(prepared.render, request.denoise)
+        if output is not None:
+            settings = prepared.settings | {"spp": prepared.render.done}
+            notices += filter(None, [images.show(output, picture, settings, exposure).notice])
     if not stopped:
         keeper.remove()
     if keeper.error:

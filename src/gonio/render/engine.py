@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
+import sys
 from collections.abc import Iterator
 from types import ModuleType
 
@@ -92,6 +93,21 @@ def using(variant: str) -> Iterator[None]:
             yield
         finally:
             mi.set_variant(before)
+
+
+@contextlib.contextmanager
+def put_back() -> Iterator[None]:
+    """Whatever spectral variant is set in here, afterwards the one from before is, or RGB's of the same device: what
+    else a program does counts on three colours."""
+    loaded = sys.modules.get("mitsuba")
+    before = None if loaded is None else loaded.variant()
+    try:
+        yield
+    finally:
+        mi = sys.modules.get("mitsuba")
+        now = mi and mi.variant()
+        if mi and now and now != before and "spectral" in now:
+            mi.set_variant(before or now.replace("spectral", "rgb"))
 
 
 @contextlib.contextmanager
