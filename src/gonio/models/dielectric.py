@@ -14,9 +14,9 @@ from ..optics import frame, fresnel, indices, masking
 from ..optics.ndf import distribution
 from . import microfacet
 from .calling import method
-from .material import Delta, InnerAlbedo, Preset
+from .material import Delta, InnerAlbedo, Interior, Preset
 from .microfacet import Terms
-from .parameters import Angle, Colour, Index, Width, flag, index
+from .parameters import Angle, Colour, Index, Number, Width, flag, index, number, spectrum
 from .sample import Sample
 
 
@@ -50,6 +50,10 @@ class Dielectric(microfacet._Microfacet):
     f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form that carries radiance: it holds the
     factor 1 / eta^2 by which radiance shrinks; mode "importance" leaves it out. alpha below 1e-4 is smooth glass, and
     eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
+
+    What light loses on its way through (`absorption`, by Beer and Lambert exp(-absorption length)) and which of several
+    media that overlap is there (`priority`, Schmidt2002) are matters of paths: Gonio's integrators apply them, no value
+    of the surface depends on them.
     """
 
     eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
@@ -61,6 +65,8 @@ class Dielectric(microfacet._Microfacet):
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
     transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
     sampling: str = microfacet.sampling_choice()
+    absorption: Colour = spectrum(default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length")
+    priority: Number = number(default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6)
 
     preset_kind: ClassVar[str] = "medium"
 
@@ -223,6 +229,10 @@ class Dielectric(microfacet._Microfacet):
 
     def _index(self) -> Scalar:
         return self.eta
+
+    @property
+    def interior(self) -> Interior | None:
+        return Interior(self.eta, self.absorption, self.priority) if self.transmission else None
 
     def normal_reflectance(self) -> Spectrum:
         """F at normal incidence, times the albedo."""

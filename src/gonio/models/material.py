@@ -89,6 +89,19 @@ class Microsurface(NamedTuple):
     transmits: bool
 
 
+class Interior(NamedTuple):
+    """What lies behind a surface that light enters.
+
+    eta         index inside over that of the vacuum, where media are nested; else over the outside's
+    absorption  light lost per unit length
+    priority    of media that overlap the one with the highest is there
+    """
+
+    eta: Scalar
+    absorption: Spectrum
+    priority: Scalar
+
+
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(bsdf, file))
 class BSDF(Material):
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
@@ -220,6 +233,12 @@ class BSDF(Material):
     def microsurface(self) -> Microsurface | None:
         """The rough surface that light is scattered by, where the material is one; its energy has been tabulated."""
         return None
+
+    @property
+    def interior(self) -> Interior | None:
+        """What lies behind the surface, of a material that light enters, or of the first inside it; None: nothing."""
+        found = (inner.interior for inner in tree.children(self).values())
+        return next((interior for interior in found if interior is not None), None)
 
     @property
     def needs_uniform(self) -> bool:

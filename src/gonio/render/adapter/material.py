@@ -10,7 +10,7 @@ from ...errors import InputError, did_you_mean
 from ...models import BSDF, binding, guide_search, tree
 from ...models.two_sided import TwoSided
 from ..native import Native
-from ..types import Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
+from ..types import Float, Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
 from .slots import NamedPreset, Slot
 from .variant import Variant
 
@@ -61,6 +61,9 @@ class PlacedMaterial:
         if variant.channels != 3 and any(inner.only_rgb for _, inner in tree.walk(self.model)):
             what = f"{self.model.name} knows red, green and blue only, this is {variant.mi.variant()}"
             raise InputError(what, self.name, "render in an RGB variant, such as llvm_ad_rgb")
+        for name in ("absorption", "priority"):
+            if name in self.slots and self.slots[name].varies:
+                raise InputError("a texture given, and the inside has no place on the surface", f"{self.name}.{name}")
         self.sides = TwoSided(self.model) if sides and not self.model.transmits else None
         self.derived: OfVariant = None
         self.derive()
@@ -96,15 +99,25 @@ class PlacedMaterial:
             isinstance(held, PlacedMaterial) and held.disperses for _, held in self.inner.values()
         )
 
-    def at(self, si: SurfaceInteraction, active: Mask, separates: bool = False, inner: bool = False) -> BSDF:
+    def at(
+        self,
+        si: SurfaceInteraction,
+        active: Mask,
+        separates: bool = False,
+        outer: Float | None = None,
+        inner: bool = False,
+    ) -> BSDF:
         """The model, its parameters bound to their values at a surface interaction.
 
         separates  whether an index that depends on the wavelength is that of the first of the ray's
+        outer      index outside of the surface, over which those of the inside are then
         inner      it is part of another material, which alone decides whether both sides are shaded
         """
-        values = {name: slot.at(si, active, separates) for name, slot in self.slots.items()}
+        values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
-            values[name] = held.at(si, active) if isinstance(held, Native) else held.at(si, active, separates, True)
+            values[name] = (
+                held.at(si, active) if isinstance(held, Native) else held.at(si, active, separates, outer, True)
+            )
         bound = binding.bound_copy(self.model, values, self.derived)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 

@@ -28,7 +28,7 @@ from ..types import (
     Vector,
 )
 from .material import PlacedMaterial
-from .variant import DISPERSES, SEPARATES, Variant
+from .variant import DISPERSES, NESTS, SEPARATES, Variant
 
 
 def plugin_class(mi: ModuleType) -> OfVariant:
@@ -51,7 +51,11 @@ def plugin_class(mi: ModuleType) -> OfVariant:
 
     def separates(ctx: BSDFContext) -> bool:
         """Whether who asks goes on with one wavelength where they part."""
-        return int(ctx.type_mask) == SEPARATES
+        return int(ctx.type_mask) in (SEPARATES, NESTS)
+
+    def outer(ctx: BSDFContext, si: SurfaceInteraction) -> Float | None:
+        """The index outside, where who asks knows it."""
+        return 1.0 + si.duv_dx.x if int(ctx.type_mask) == NESTS else None
 
     class GonioBSDF(base):
         """A Gonio model in a Mitsuba scene."""
@@ -92,21 +96,23 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         # -------------------------------------------------------------- values
 
         def eval(self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True) -> Radiance:
-            return self._eval(self.placed.at(si, active, separates(ctx)), ctx, si, wo, active)
+            return self._eval(self.placed.at(si, active, separates(ctx), outer(ctx, si)), ctx, si, wo, active)
 
         def pdf(self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True) -> Float:
-            return self._pdf(self.placed.at(si, active, separates(ctx)), ctx, si, wo, active)
+            return self._pdf(self.placed.at(si, active, separates(ctx), outer(ctx, si)), ctx, si, wo, active)
 
         def eval_pdf(
             self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True
         ) -> tuple[Radiance, Float]:
-            model = self.placed.at(si, active, separates(ctx))
+            model = self.placed.at(si, active, separates(ctx), outer(ctx, si))
             return self._eval(model, ctx, si, wo, active), self._pdf(model, ctx, si, wo, active)
 
         def sample(
             self, ctx: BSDFContext, si: SurfaceInteraction, sample1: Float, sample2: Point, active: Mask = True
         ) -> tuple[BSDFSample, Radiance]:
-            return self._sample(self.placed.at(si, active, separates(ctx)), ctx, si, sample1, sample2, active)
+            return self._sample(
+                self.placed.at(si, active, separates(ctx), outer(ctx, si)), ctx, si, sample1, sample2, active
+            )
 
         def eval_pdf_sample(
             self,
@@ -117,7 +123,7 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             sample2: Point,
             active: Mask = True,
         ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-            model = self.placed.at(si, active, separates(ctx))
+            model = self.placed.at(si, active, separates(ctx), outer(ctx, si))
             value, pdf = self._eval(model, ctx, si, wo, active), self._pdf(model, ctx, si, wo, active)
             return value, pdf, *self._sample(model, ctx, si, sample1, sample2, active)
 

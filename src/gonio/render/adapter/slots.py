@@ -112,10 +112,13 @@ class Slot:
         """Whether it has other values elsewhere on the surface."""
         return any(texture.is_spatially_varying() for texture in self.textures.values())
 
-    def at(self, si: SurfaceInteraction, active: Mask, separates: bool = False) -> OfVariant:
+    def at(
+        self, si: SurfaceInteraction, active: Mask, separates: bool = False, outer: Float | None = None
+    ) -> OfVariant:
         """The bound value at a surface interaction: as `Parameter.bind` would have it.
 
         separates  whether an index is that of the ray's first wavelength, or one for all of them
+        outer      what an index is divided by
         """
         kind = self.parameter.kind
         found = dict(self.values)
@@ -123,6 +126,8 @@ class Slot:
             found[name] = self.variant.looked_up(curve, si.wavelengths[0], active)
         for name, texture in self.textures.items():
             found[name] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
+        if outer is not None and isinstance(self.parameter, IndexParameter):
+            return found[self.parameter.name] / outer
         if kind == "alpha":
             return ops.vec2(found[self.names[0]], found[self.names[-1]])
         if kind == "angle":

@@ -28,6 +28,10 @@ DISPERSES = 1 << 24
 # index of sodium light at all wavelengths.
 SEPARATES = (1 << 31) - 1
 
+# The same of one that knows what lies outside of a surface: a hit's `duv_dx.x`, which nothing of ours has a use for, is
+# the index there less 1.
+NESTS = SEPARATES - (1 << 30)
+
 
 class Variant:
     """The variant that was set when this was made.
