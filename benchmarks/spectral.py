@@ -63,15 +63,16 @@ def through(place: np.ndarray, way: np.ndarray, eta: float) -> tuple[np.ndarray,
     return place, way
 
 
-def prism() -> None:
-    """Render a slit through the prism, in lines; the camera is the slit's counterpart."""
+def prism(lines: tuple[float, ...] = LINES) -> list[float]:
+    """Render a slit through the prism, in lines; the camera is the slit's counterpart. Degrees by which each is off."""
+    errors = []
     print(f"{'nm':>6}  {'deviation':>10}  {'rendered':>10}  {'apart':>9}")
     eye, ahead = np.array([-6.0, 0.2576]), np.array([1.0, 0.0])
     middle = float(go.refractive_index("sf11", 550.0).eta)
     left_at, out = through(eye, ahead, middle)
     slit = left_at + SLIT * out
     across = np.array([-out[1], out[0]])
-    for line in LINES:
+    for line in lines:
         light = {"type": "led", "peaks": [[line, 2, 1]]}
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "prism.obj").write_text((EXAMPLES / "prism/prism.obj").read_text())
@@ -122,13 +123,17 @@ def prism() -> None:
         to_slit = (slit - place) / np.linalg.norm(slit - place)
         turned = [np.degrees(np.arccos(view @ w)) for w in (away, to_slit)]
         print(f"{line:6.1f}  {turned[0]:10.4f}  {turned[1]:10.4f}  {turned[1] - turned[0]:+9.5f}")
+        errors.append(turned[1] - turned[0])
+    return errors
 
 
-def window() -> None:
-    """The radius of the bright disc: where the light begins, in 72 directions from its middle. Towards its rim it fades
-    as Fresnel has it, from 10 % to half within two pixels, so that a level in the middle would lie inside."""
+def window(spp: int = 256) -> float:
+    """Pixels by which the radius of the bright disc is off: where the light begins, in 72 directions from its middle.
+
+    Towards its rim it fades as Fresnel has it, from half to 10 % within two pixels: half would lie inside.
+    """
     size = 480
-    picture = np.asarray(go.render(EXAMPLES / "snells-window", size=(size, size), spp=256, spectral=False), float)
+    picture = np.asarray(go.render(EXAMPLES / "snells-window", size=(size, size), spp=spp), float)
     y, x = np.indices((size, size)) + 0.5 - size / 2.0
     bright = picture.mean(2)
     focal = size / 2.0 / np.tan(np.radians(55.0))
@@ -143,14 +148,16 @@ def window() -> None:
     expected = focal * np.tan(np.arcsin(1.0 / 1.333))
     found = float(np.mean(radii))
     print(f"radius of the window: {found:.2f} pixels, asin(1/1.333) is {expected:.2f}; apart {found - expected:+.2f}")
+    return found - expected
 
 
-def bow() -> None:
+def bow(rays: int = 400_000) -> list[float]:
+    """Degrees by which the bows are off."""
     spec = importlib.util.spec_from_file_location("rainbow", EXAMPLES / "rainbow/rainbow.py")
     assert spec is not None and spec.loader is not None
     program = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(program)
-    program.angles()
+    return list(program.angles(rays))
 
 
 def time() -> None:

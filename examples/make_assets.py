@@ -193,7 +193,7 @@ def waves(size: int, cells: int, height: float) -> tuple[np.ndarray, ...]:
     x, z = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-size, size, cells + 1)] * 2, indexing="ij"))
     level, slope_x, slope_z = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
     for _ in range(24):
-        turn, number, phase = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(3.0, 11.0), rng.uniform(0.0, 2.0 * math.pi)
+        turn, number, phase = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(5.0, 16.0), rng.uniform(0.0, 2.0 * math.pi)
         kx, kz = number * math.cos(turn), number * math.sin(turn)
         rise = height / number
         level += rise * np.sin(kx * x + kz * z + phase)
@@ -218,10 +218,10 @@ def main() -> None:
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
     obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
     obj("diamond/brilliant.obj", *brilliant())
-    way = np.linspace(0.0, 1.0, 241)
+    way = np.linspace(0.0, 1.0, 121)
     bend = np.stack([1.6 * np.cos(1.5 * math.pi * way), 0.25 + 0.9 * way, -1.6 * np.sin(1.5 * math.pi * way)], 1)
-    ply("fibre/fibre.ply", *tube(bend, 0.16))
-    ply("pool-caustic/water.ply", *waves(2, 100, 0.035))
+    ply("fibre/fibre.ply", *tube(bend, 0.16, sides=32))
+    ply("pool-caustic/water.ply", *waves(2, 70, 0.05))
     ply("shader-ball/shell.ply", *shell(1.0, 0.93))
     mi.Bitmap(sky(128)).write(str(HERE / "shader-ball" / "studio.hdr"))
 

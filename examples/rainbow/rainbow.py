@@ -113,14 +113,17 @@ def picture(angles: Floats, colours: Floats, size: tuple[int, int] = (960, 480),
     return np.where(way[..., 1:2] > 0.0, sky, ground)
 
 
-def angles() -> None:
-    """Print where the bows end, by Descartes and by rays."""
+def angles(rays: int = 400_000) -> list[float]:
+    """Print where the bows end, by Descartes and by rays: degrees between the two."""
+    apart = []
     print("bow         nm      n        Descartes   rays      apart")
     for name, k, low, high, inner in (("primary", 1, 39.0, 44.0, True), ("secondary", 2, 48.0, 56.0, False)):
         for wavelength in (650.0, 450.0):
             eta = go.refractive_index("water", wavelength).eta
-            expected, found = float(descartes(eta, k)), edge(wavelength, low, high, inner)
+            expected, found = float(descartes(eta, k)), edge(wavelength, low, high, inner, rays)
             print(f"{name:10s}  {wavelength:.0f}  {eta:.5f}   {expected:8.3f}  {found:8.3f}  {found - expected:+.3f}")
+            apart.append(found - expected)
+    return apart
 
 
 def main() -> None:

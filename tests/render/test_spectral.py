@@ -20,6 +20,7 @@ from gonio.render.scene.values import Blackbody, Daylight, Led
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
 
+ROOT = Path(__file__).parents[2]
 WHITE = {"type": "d65"}
 WARM = {"type": "blackbody", "temperature": 2856}
 
@@ -143,6 +144,32 @@ def test_a_normal_map_on_dispersing_glass_lets_it_disperse(tmp_path: Path) -> No
     flat = {"normalmap": {"type": "imageTex", "file": "flat.png"}}
     plain, mapped = (rendered(tmp_path, ball("sf11", **more), spp=512, spectral=True) for more in ({}, flat))
     assert np.abs(plain - mapped).mean() < 0.02 * plain.mean()
+
+
+# ---------------------------------------------------------------------- closed forms, by the scenes that show them
+
+
+def _benchmark() -> Any:
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location("bench_spectral", ROOT / "benchmarks/spectral.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_a_prism_turns_each_line_as_snell_and_sellmeier_have_it() -> None:
+    assert np.abs(_benchmark().prism()).max() < 0.005, "degrees"
+
+
+def test_snells_window_ends_at_the_critical_angle() -> None:
+    assert abs(_benchmark().window(spp=16)) < 1.0, "pixels"
+
+
+def test_the_bows_of_water_are_where_descartes_has_them() -> None:
+    assert np.abs(_benchmark().bow(rays=100_000)).max() < 0.05, "degrees"
 
 
 # ---------------------------------------------------------------------- lamps

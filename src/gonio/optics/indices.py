@@ -81,7 +81,7 @@ def _glass(low: float, high: float, *terms: tuple[float, float]) -> Sellmeier:
 
 
 def _constants() -> dict[str, OpticalConstants]:
-    tables, schott = _measured(), "SchottBK7"
+    tables, schott = _measured(), "Schott2017"
     media = {
         "vacuum": ("vacuum", Constant(*ALL, 1.0), "by definition"),
         # Ciddor's is for 15 C; the course's 1.00029 is that at 0 C, where air is denser by the ratio of temperatures
@@ -103,7 +103,7 @@ def _constants() -> dict[str, OpticalConstants]:
         "bk7": (
             "borosilicate glass BK7",
             _glass(300.0, 2500.0, (1.03961212, 0.00600069867), (0.231792344, 0.0200179144), (1.01046945, 103.560653)),
-            schott,
+            "SchottBK7",
         ),
         "f2": (
             "flint glass F2",
