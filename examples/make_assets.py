@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from gonio.render import engine, images
+from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 HERE = Path(__file__).parent
 
@@ -110,6 +111,102 @@ def shell(radius: float, inner: float, rows: int = 40, columns: int = 80) -> tup
     return np.vstack(vertices), np.vstack(normals), np.vstack(coordinates), np.vstack(faces)
 
 
+def obj(path: str, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """A faceted mesh as text; faces count from 0."""
+    lines = [*("v {:.9g} {:.9g} {:.9g}".format(*v) for v in vertices), *("f {} {} {}".format(*f) for f in faces + 1)]
+    (HERE / path).write_text("\n".join(lines) + "\n")
+
+
+def convex(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The hull of points, its triangles counter-clockwise from outside."""
+    hull = ConvexHull(vertices)
+    faces = hull.simplices.copy()
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward, ::-1]
+    return vertices, faces
+
+
+def prism(turn: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """An upright prism of side 1; its base runs along x, turned toward -z, its apex points to +z."""
+    along, apex = np.array([math.cos(turn), -math.sin(turn)]), np.array([math.sin(turn), math.cos(turn)])
+    corners = [apex / math.sqrt(3.0), *(-apex / math.sqrt(12.0) + side * along / 2.0 for side in (-1.0, 1.0))]
+    return convex(np.array([[x, y, z] for y in (0.0, height) for x, z in corners]))
+
+
+def brilliant() -> tuple[np.ndarray, np.ndarray]:
+    """A round brilliant of radius 1, 57 facets and the girdle, with Tolkowsky's proportions; its table faces +y."""
+    crown, pavilion, table, girdle = math.radians(34.5), math.radians(40.75), 0.53, 0.02
+    top = girdle + (1.0 - table) * math.tan(crown)
+    planes = [(0.0, 1.0, 0.0, top)]
+
+    def ring(count: int, first: float, angle: float, radius: float, height: float) -> None:
+        """Facets tilted by `angle`, through the point at that radius and height; below the girdle it is negative."""
+        for number in range(count):
+            around = math.radians(first) + number * 2.0 * math.pi / count
+            sin, cos = math.sin(abs(angle)), math.copysign(math.cos(angle), angle)
+            planes.append((sin * math.cos(around), cos, sin * math.sin(around), sin * radius + cos * height))
+
+    ring(8, 0.0, crown, 1.0, girdle)
+    ring(8, 22.5, math.radians(21.5), table * math.cos(math.radians(22.5)), top)
+    ring(16, 11.25, math.radians(40.5), 1.0, girdle)
+    ring(64, 0.0, math.pi / 2.0, 1.0, 0.0)
+    ring(16, 11.25, -math.radians(42.0), 1.0, -girdle)
+    ring(8, 0.0, -pavilion, 1.0, -girdle)
+    halves = np.array(planes) * [1.0, 1.0, 1.0, -1.0]
+    corners = HalfspaceIntersection(halves, np.zeros(3)).intersections
+    return convex(np.unique(corners.round(7), axis=0))
+
+
+def tube(points: np.ndarray, radius: float, sides: int = 48) -> tuple[np.ndarray, ...]:
+    """A rod along points, smooth outside, with flat ends."""
+    along = np.gradient(points, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.zeros_like(along)
+    across[0] = np.cross(along[0], [0.0, 1.0, 0.0])
+    for i in range(1, len(points)):  # carried along without a twist
+        across[i] = across[i - 1] - along[i] * (along[i] @ across[i - 1])
+        across[i] /= np.linalg.norm(across[i])
+    other = np.cross(along, across)
+    angle = np.arange(sides) / sides * 2.0 * math.pi
+    out = np.cos(angle)[None, :, None] * across[:, None] + np.sin(angle)[None, :, None] * other[:, None]
+    skin = points[:, None] + radius * out
+    number = np.arange(len(points) * sides).reshape(len(points), sides)
+    a, b = number[:-1], number[1:]
+    quads = [a, np.roll(a, -1, 1), np.roll(b, -1, 1), b]
+    faces = [np.stack([quads[i].ravel() for i in three], 1) for three in ((0, 1, 2), (0, 2, 3))]
+    vertices, normals, first = [skin.reshape(-1, 3)], [out.reshape(-1, 3)], number.size
+    for end, sign in ((0, -1.0), (-1, 1.0)):
+        vertices += [skin[end], points[end][None]]
+        normals.append(np.tile(sign * along[end], (sides + 1, 1)))
+        rim = first + np.arange(sides)
+        fan = np.stack([rim, np.roll(rim, -1), np.full(sides, first + sides)], 1)
+        faces.append(fan if sign > 0 else fan[:, ::-1])
+        first += sides + 1
+    found = np.vstack(vertices)
+    return found, np.vstack(normals), np.zeros((len(found), 2)), np.vstack(faces)
+
+
+def waves(size: int, cells: int, height: float) -> tuple[np.ndarray, ...]:
+    """Water of some waves over [-size, size]^2: heights by a sum of sines, normals by their slopes."""
+    rng = np.random.default_rng(4)
+    x, z = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-size, size, cells + 1)] * 2, indexing="ij"))
+    level, slope_x, slope_z = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for _ in range(24):
+        turn, number, phase = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(5.0, 16.0), rng.uniform(0.0, 2.0 * math.pi)
+        kx, kz = number * math.cos(turn), number * math.sin(turn)
+        rise = height / number
+        level += rise * np.sin(kx * x + kz * z + phase)
+        slope = rise * np.cos(kx * x + kz * z + phase)
+        slope_x, slope_z = slope_x + kx * slope, slope_z + kz * slope
+    normals = np.stack([-slope_x, np.ones_like(x), -slope_z], 1)
+    number = np.arange(x.size).reshape(cells + 1, cells + 1)
+    a, b, c, d = (part.ravel() for part in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]))
+    faces = np.vstack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.stack([x, level, z], 1), normals, np.zeros((x.size, 2)), faces
+
+
 def main() -> None:
     mi = engine.load()
     grey, white = (0.25, 0.25, 0.25), (0.75, 0.75, 0.75)
@@ -117,7 +214,14 @@ def main() -> None:
         png(f"{folder}/checker.png", checker(20, grey, white))
     png("textured/checker.png", checker(16, (0.05, 0.12, 0.3), (0.85, 0.8, 0.65)))
     png("textured/worn.png", worn(256))
+    png("pool-caustic/tiles.png", checker(16, (0.45, 0.62, 0.68), (0.6, 0.72, 0.75)))
     png("normal-map/bumps.png", bumps(256, 12, 0.7))
+    obj("prism/prism.obj", *prism(math.asin(1.7844560 / 2.0) - math.pi / 6.0, 0.8))
+    obj("diamond/brilliant.obj", *brilliant())
+    way = np.linspace(0.0, 1.0, 121)
+    bend = np.stack([1.6 * np.cos(1.5 * math.pi * way), 0.25 + 0.9 * way, -1.6 * np.sin(1.5 * math.pi * way)], 1)
+    ply("fibre/fibre.ply", *tube(bend, 0.16, sides=32))
+    ply("pool-caustic/water.ply", *waves(2, 70, 0.05))
     ply("shader-ball/shell.ply", *shell(1.0, 0.93))
     mi.Bitmap(sky(128)).write(str(HERE / "shader-ball" / "studio.hdr"))
 

@@ -27,13 +27,27 @@ _PLACES = {
     "errors": ("GonioError", "GonioWarning", "InputError", "MachineError"),
     "members": ("register",),
     "ops": ("Direction", "Mask", "Mode", "Pair", "Scalar", "Spectrum", "get_precision", "set_precision"),
+    "optics.indices": ("indices", "refractive_index"),
     "optics.ndf": ("NDF", "Stretched"),
     "optics.masking": ("Masking",),
     "optics.fresnel": ("Fresnel", "Interface", "fresnel"),
     # what a material of one's own is written with
     "models": (
-        *("Angle", "BSDF", "Breach", "Colour", "Number", "Parameter", "Preset", "Sample", "Width"),
-        *("angle", "bsdf", "choice", "file", "flag", "method", "model", "never", "number", "spectrum", "width"),
+        *("Angle", "BSDF", "Breach", "Colour", "Index", "Number", "Parameter", "Preset", "Sample", "Width"),
+        *(
+            "angle",
+            "bsdf",
+            "choice",
+            "file",
+            "flag",
+            "index",
+            "method",
+            "model",
+            "never",
+            "number",
+            "spectrum",
+            "width",
+        ),
     ),
     "models.library": ("fits", "material", "materials"),
     "measure.compression.compress": ("compress",),
@@ -90,6 +104,7 @@ if TYPE_CHECKING:
     from .models.parameters import (
         Angle,
         Colour,
+        Index,
         Number,
         Width,
         angle,
@@ -97,6 +112,7 @@ if TYPE_CHECKING:
         choice,
         file,
         flag,
+        index,
         number,
         spectrum,
         width,
@@ -106,6 +122,7 @@ if TYPE_CHECKING:
     from .models.two_sided import TwoSided as two_sided
     from .ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, get_precision, set_precision
     from .optics.fresnel import Fresnel, Interface, fresnel
+    from .optics.indices import indices, refractive_index
     from .optics.masking import Masking
     from .optics.ndf import NDF, Stretched
     from .render import render, resume
@@ -149,11 +166,12 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
-    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "InputError", "Integrator", "Interface",
-    "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Metal", "Mirror", "Mix", "Mode",
-    "Number", "OrenNayar", "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample", "Scalar",
-    "Spectrum", "Stretched", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice",
-    "cluster", "compare", "compress", "emit", "file", "fit", "fits", "flag", "fresnel", "get_precision", "material",
-    "materials", "measure", "method", "mix", "model", "models", "never", "number", "ops", "plot", "register", "render",
-    "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
+    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "Index", "InputError", "Integrator",
+    "Interface", "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Metal", "Mirror",
+    "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample",
+    "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture",
+    "choice", "cluster", "compare", "compress", "emit", "file", "fit", "fits", "flag", "fresnel", "get_precision",
+    "index", "indices", "material", "materials", "measure", "method", "mix", "model", "models", "never", "number",
+    "ops", "plot", "refractive_index", "register", "render", "resume", "set_precision", "spectrum", "study",
+    "two_sided", "verify", "view", "width",
 ]  # fmt: skip

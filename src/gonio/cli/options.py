@@ -107,6 +107,7 @@ class Rendering:
     sampler: Annotated[str | None, Option(metavar="NAME", help="Where random numbers come from.")] = None
     seed: Annotated[int | None, Option(metavar="N", help="Same seed, same picture, to the bit.")] = None
     device: Device = "cpu"
+    spectral: Annotated[bool, Option("--spectral", help="Light as wavelengths: glass disperses.")] = False
     threads: Annotated[int | None, Option(metavar="N", help="CPU cores to use; all if not given.")] = None
     denoise: Annotated[bool, Option("--denoise", help="Remove noise with Open Image Denoise.")] = False
     exposure: Exposure = "0"

@@ -13,6 +13,7 @@ from .material import BSDF, Breach, Microsurface, Preset, never
 from .parameters import (
     Angle,
     Colour,
+    Index,
     Number,
     Parameter,
     Width,
@@ -21,6 +22,7 @@ from .parameters import (
     choice,
     file,
     flag,
+    index,
     number,
     spectrum,
     width,
@@ -28,8 +30,9 @@ from .parameters import (
 from .sample import Sample
 
 __all__ = [
-    "BSDF", "Angle", "Breach", "Colour", "Microsurface", "Number", "Parameter", "Preset", "Sample", "Width", "angle",
-    "bsdf", "choice", "file", "flag", "method", "model", "models", "never", "number", "spectrum", "width",
+    "BSDF", "Angle", "Breach", "Colour", "Index", "Microsurface", "Number", "Parameter", "Preset", "Sample", "Width",
+    "angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number", "spectrum",
+    "width",
 ]  # fmt: skip
 
 

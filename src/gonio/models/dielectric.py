@@ -15,9 +15,9 @@ from ..optics.fresnel.polarization import Diattenuation, reflected_by_glass, ref
 from ..optics.ndf import distribution
 from . import microfacet
 from .calling import method
-from .material import Delta, InnerAlbedo, Preset
+from .material import Delta, InnerAlbedo, Interior, Preset
 from .microfacet import Terms
-from .parameters import Angle, Colour, Number, Width, flag, number
+from .parameters import Angle, Colour, Index, Number, Width, flag, index, number, spectrum
 from .polarization import Polarized
 from .sample import Sample
 
@@ -52,9 +52,13 @@ class Dielectric(microfacet._Microfacet):
     f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form that carries radiance: it holds the
     factor 1 / eta^2 by which radiance shrinks; mode "importance" leaves it out. alpha below 1e-4 is smooth glass, and
     eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
+
+    What light loses on its way through (`absorption`, by Beer and Lambert exp(-absorption length)) and which of several
+    media that overlap is there (`priority`, Schmidt2002) are matters of paths: Gonio's integrators apply them, no value
+    of the surface depends on them.
     """
 
-    eta: Number = number(default=1.5, doc="index inside over index outside", low=0.2, high=5.0)
+    eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()
     ndf: str = microfacet.ndf_choice()
@@ -63,13 +67,16 @@ class Dielectric(microfacet._Microfacet):
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
     transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
     sampling: str = microfacet.sampling_choice()
+    absorption: Colour = spectrum(default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length")
+    priority: Number = number(default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6)
 
     preset_kind: ClassVar[str] = "medium"
 
     @classmethod
     def presets(cls) -> Mapping[str, Preset]:
         """Transparent media by name: eta."""
-        return {name: Preset(m.name, {"eta": m.eta}, m.source) for name, m in indices.MEDIA.items()}
+        media = indices.MEDIA.items()
+        return {name: Preset(m.title, {"eta": indices.DispersiveIndex(m)}, m.source) for name, m in media}
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
@@ -246,6 +253,10 @@ class Dielectric(microfacet._Microfacet):
 
     def _index(self) -> Scalar:
         return self.eta
+
+    @property
+    def interior(self) -> Interior | None:
+        return Interior(self.eta, self.absorption, self.priority) if self.transmission else None
 
     def normal_reflectance(self) -> Spectrum:
         """F at normal incidence, times the albedo."""

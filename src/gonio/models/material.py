@@ -90,6 +90,19 @@ class Microsurface(NamedTuple):
     transmits: bool
 
 
+class Interior(NamedTuple):
+    """What lies behind a surface that light enters.
+
+    eta         index inside over that of the vacuum, where media are nested; else over the outside's
+    absorption  light lost per unit length
+    priority    of media that overlap the one with the highest is there
+    """
+
+    eta: Scalar
+    absorption: Spectrum
+    priority: Scalar
+
+
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(bsdf, file))
 class BSDF(Material):
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
@@ -131,7 +144,10 @@ class BSDF(Material):
 
     def __post_init__(self) -> None:
         for parameter in self.parameters().values():
-            parameter.check(getattr(self, parameter.name), f"{type(self).__name__}.{parameter.name}")
+            given = getattr(self, parameter.name)
+            taken = parameter.taken(given, f"{type(self).__name__}.{parameter.name}")
+            if taken is not given:
+                object.__setattr__(self, parameter.name, taken)
         object.__setattr__(self, "_count", tree.count(self))
 
     @classmethod
@@ -229,6 +245,12 @@ class BSDF(Material):
     def microsurface(self) -> Microsurface | None:
         """The rough surface that light is scattered by, where the material is one; its energy has been tabulated."""
         return None
+
+    @property
+    def interior(self) -> Interior | None:
+        """What lies behind the surface, of a material that light enters, or of the first inside it; None: nothing."""
+        found = (inner.interior for inner in tree.children(self).values())
+        return next((interior for interior in found if interior is not None), None)
 
     @property
     def needs_uniform(self) -> bool:

@@ -22,9 +22,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import InputError, did_you_mean
+from ..optics.indices import DispersiveIndex
 from . import is_model, library, model, outside, tree
 from .material import BSDF
-from .parameters import Parameter, Value
+from .parameters import IndexParameter, Parameter, Value
 
 _CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
 
@@ -113,6 +114,8 @@ def typed(parameter: Parameter, value: Value) -> object:
         if str(value).lower() not in ("true", "false"):
             raise InputError(f"'{value}' given, true or false expected", where)
         return str(value).lower() == "true"
+    if isinstance(parameter, IndexParameter) and isinstance(value, str) and value.strip(' "')[:1].isalpha():
+        return parameter.taken(value.strip(' "'), where)
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]
@@ -128,6 +131,8 @@ def written(value: Value) -> str:
         return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
     if isinstance(value, bool | np.bool_):
         return str(bool(value)).lower()
+    if isinstance(value, DispersiveIndex):
+        return value.constants.name
     if np.ndim(value):
         return ",".join(f"{v:.6g}" for v in np.asarray(value).ravel())
     if isinstance(value, float | int | np.floating | np.integer):
@@ -149,6 +154,8 @@ def as_json(material: BSDF) -> dict[str, object]:
             found[name] = as_json(value)
         elif isinstance(value, bool | str):
             found[name] = value
+        elif isinstance(value, DispersiveIndex):
+            found[name] = value.constants.name
         else:
             try:
                 found[name] = np.asarray(value, float).tolist()
@@ -174,6 +181,8 @@ def settings(material: BSDF) -> dict[str, Value]:
 
 
 def _same(a: object, b: object) -> bool:
+    if isinstance(a, DispersiveIndex) or isinstance(b, DispersiveIndex):
+        return a == b
     try:
         return bool(np.all(np.asarray(a) == np.asarray(b)))
     except (TypeError, ValueError):

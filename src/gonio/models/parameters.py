@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..errors import GonioWarning, InputError, did_you_mean
 from ..ops import Pair, Scalar, Spectrum, backend, graph, sincos
+from ..optics import indices
 
 CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have their own number
 
@@ -33,6 +34,7 @@ Value: TypeAlias = Any
 Floats: TypeAlias = "NDArray[np.floating]"
 PlainNumber: TypeAlias = "float | list[float] | Floats | Scalar"
 PlainColour: TypeAlias = "float | tuple[float, float, float] | list[float] | Floats | Spectrum | Scalar"
+PlainIndex: TypeAlias = "PlainNumber | str"
 PlainWidth: TypeAlias = "float | tuple[PlainNumber, PlainNumber] | list[float] | Floats | Pair | Scalar"
 
 if TYPE_CHECKING:
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
     class Number:
         def __get__(self, owner: object, cls: type | None = None) -> Scalar: ...
         def __set__(self, owner: Never, value: PlainNumber) -> None: ...
+
+    class Index(Number):
+        def __set__(self, owner: Never, value: PlainIndex) -> None: ...
 
     class Colour:
         def __get__(self, owner: object, cls: type | None = None) -> Spectrum: ...
@@ -54,7 +59,7 @@ if TYPE_CHECKING:
         def __set__(self, owner: Never, value: PlainNumber | None) -> None: ...
 
 else:
-    Number = Colour = Width = Angle = "a declared parameter"
+    Number = Index = Colour = Width = Angle = "a declared parameter"
 
 
 # --------------------------------------------------------------------------- the kinds
@@ -129,6 +134,11 @@ class Parameter:
     def check(self, value: object, where: str) -> None:
         """Raise InputError, or warn, where `value` cannot stand for this parameter."""
 
+    def taken(self, value: object, where: str) -> Value:
+        """What a material holds where the user gave `value`: here that itself, once it is checked."""
+        self.check(value, where)
+        return value
+
     def bind(self, value: object, types: backend.Types) -> Value:
         """The value as Dr.Jit values of these types; what shapes the code stays as it is."""
         return value
@@ -198,6 +208,16 @@ class NumberParameter(_Numeric):
     """A number; bound: a Dr.Jit float."""
 
     kind = "float"
+
+
+class IndexParameter(NumberParameter):
+    """A refractive index: a number, or the name of a substance, whose index depends on the wavelength.
+
+    A name becomes a `DispersiveIndex`, which is a number to all but spectral renders.
+    """
+
+    def taken(self, value: object, where: str) -> Value:
+        return super().taken(indices.dispersive(value, where) if isinstance(value, str) else value, where)
 
 
 class ColourParameter(_Numeric):
@@ -339,6 +359,11 @@ def number(
 ) -> Number:
     """Declare a number with its closed range and unit."""
     return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit)
+
+
+def index(default: PlainIndex, doc: str, *, low: float, high: float) -> Index:
+    """Declare a refractive index: a number, or a name of `go.indices()`."""
+    return _declare(IndexParameter, default, doc, low=low, high=high)
 
 
 def spectrum(

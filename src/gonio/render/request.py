@@ -35,6 +35,7 @@ class Request:
     sampler: str | None = None
     seed: int | None = None
     device: str = "cpu"
+    spectral: bool = False
     threads: int | None = None
     timeout: float | None = None
     denoise: bool = False

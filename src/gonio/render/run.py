@@ -72,7 +72,7 @@ def prepare(request: Request) -> Prepared:
     request.check()
     if request.material is None and not request.scene.exists():
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
-    mi = engine.load(request.device, threads=request.threads)
+    mi = engine.load(request.device, request.spectral, request.threads)
     with garbage.kept():
         if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
             return _prepare_mitsuba(request, mi)

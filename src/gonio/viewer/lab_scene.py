@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..models import BSDF, notation, tree
 from ..render import scene
-from ..render.scene import schema, textures
+from ..render.scene import schema, spectra, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
-from ..render.scene.values import ImageTexture, rgb
+from ..render.scene.values import ImageTexture
 from .stage import CAMERA, SUN, Ball, Camera, Light, Material, Row, Stage, Value, replaced
 
 Vector: TypeAlias = "NDArray[np.float64]"
@@ -151,14 +151,14 @@ def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], li
     notes: list[str] = []
     for light in description.lights:
         if isinstance(light, schema.AreaLight) and _surrounds(light, target):  # nothing from beyond arrives
-            return ({**ENVIRONMENT, "constant": [float(x) for x in rgb(light.energy)]},), []
+            return ({**ENVIRONMENT, "constant": [float(x) for x in spectra.colour(light.energy)]},), []
     for light in description.lights:
         if isinstance(light, schema.EnvironmentLight):
             found.append(_environment(description, light, axes))
             continue
         if isinstance(light, schema.SpotLight):
             away = np.array(light.position, float) - target
-            irradiance = np.array(rgb(light.energy)) / max(float(away @ away), 1e-12)
+            irradiance = np.array(spectra.colour(light.energy)) / max(float(away @ away), 1e-12)
         else:
             away, irradiance = _area(light, target)
         distance = float(np.linalg.norm(away))
@@ -199,7 +199,7 @@ def _axes(placed: schema.CameraTransform) -> tuple[Vector, float]:
 
 def _area(light: schema.AreaLight, target: Vector) -> tuple[Vector, Vector]:
     """(vector to the lamp's middle, irradiance on a surface that faces it): L A cos / r^2, as if it were far away."""
-    shape, radiance = light.shape, np.array(rgb(light.energy))
+    shape, radiance = light.shape, np.array(spectra.colour(light.energy))
     matrix = shape.transform.matrix()
     if isinstance(shape, schema.Parallelogram):
         edge0, edge1 = (matrix[:3, :3] @ np.array(edge, float) for edge in (shape.edge0, shape.edge1))
@@ -221,7 +221,7 @@ def _environment(description: schema.SceneDescription, light: schema.Environment
     found = {**ENVIRONMENT, "rotation": -math.atan2(axes[2][0], axes[2][2])}
     assert source is not None  # the reader has checked that one is given
     if not isinstance(source, ImageTexture):
-        return {**found, "constant": [float(x) for x in rgb(source)]}
+        return {**found, "constant": [float(x) for x in spectra.colour(source)]}
     where = description.where("/scene/lights")
     pixels = textures.load_image(description.locate(source.file, where), where, srgb=source.color_space == "srgb")
     pixels = _smaller(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))

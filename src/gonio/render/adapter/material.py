@@ -10,7 +10,7 @@ from ...errors import InputError, did_you_mean
 from ...models import BSDF, binding, guide_search, tree
 from ...models.two_sided import TwoSided
 from ..native import Native
-from ..types import Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
+from ..types import Float, Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
 from .slots import NamedPreset, Slot
 from .variant import Variant
 
@@ -61,6 +61,9 @@ class PlacedMaterial:
         if variant.channels != 3 and any(inner.only_rgb for _, inner in tree.walk(self.model)):
             what = f"{self.model.name} knows red, green and blue only, this is {variant.mi.variant()}"
             raise InputError(what, self.name, "render in an RGB variant, such as llvm_ad_rgb")
+        for name in ("absorption", "priority"):
+            if name in self.slots and self.slots[name].varies:
+                raise InputError("a texture given, and the inside has no place on the surface", f"{self.name}.{name}")
         self.sides = TwoSided(self.model) if sides and not self.model.transmits else None
         self.derived: OfVariant = None
         self.derive()
@@ -87,7 +90,7 @@ class PlacedMaterial:
         are looked up at a ray's wavelengths."""
         return (
             self._by_wavelength
-            or any(slot.textures for slot in self.slots.values())
+            or any(slot.textures or slot.curves for slot in self.slots.values())
             or any(isinstance(held, Native) or held.varies for _, held in self.inner.values())
         )
 
@@ -96,14 +99,32 @@ class PlacedMaterial:
         """Whether the model is told the rays' wavelengths."""
         return self.variant.spectral and self.model.reads_wavelengths
 
-    def at(self, si: SurfaceInteraction, active: Mask, inner: bool = False) -> BSDF:
+    @property
+    def disperses(self) -> bool:
+        """Whether an index, here or further in, depends on the wavelength."""
+        return any(slot.curves for slot in self.slots.values()) or any(
+            isinstance(held, PlacedMaterial) and held.disperses for _, held in self.inner.values()
+        )
+
+    def at(
+        self,
+        si: SurfaceInteraction,
+        active: Mask,
+        separates: bool = False,
+        outer: Float | None = None,
+        inner: bool = False,
+    ) -> BSDF:
         """The model, its parameters bound to their values at a surface interaction.
 
-        inner  it is part of another material, which alone decides whether both sides are shaded
+        separates  whether an index that depends on the wavelength is that of the first of the ray's
+        outer      index outside of the surface, over which those of the inside are then
+        inner      it is part of another material, which alone decides whether both sides are shaded
         """
-        values = {name: slot.at(si, active) for name, slot in self.slots.items()}
+        values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
-            values[name] = held.at(si, active) if isinstance(held, Native) else held.at(si, active, inner=True)
+            values[name] = (
+                held.at(si, active) if isinstance(held, Native) else held.at(si, active, separates, outer, True)
+            )
         if self._by_wavelength:
             values["wavelengths"] = self.variant.spectrum(si.wavelengths)
         bound = binding.bound_copy(self.model, values, self.derived)

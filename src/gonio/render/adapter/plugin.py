@@ -28,7 +28,7 @@ from ..types import (
     Vector,
 )
 from .material import PlacedMaterial
-from .variant import Variant
+from .variant import DISPERSES, NESTS, SEPARATES, Variant
 
 
 def plugin_class(mi: ModuleType) -> OfVariant:
@@ -59,6 +59,14 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         toward, away = (wi, wo) if mode == "radiance" else (wo, wi)
         return variant.mueller(value, whole, parts, toward, away)
 
+    def separates(ctx: BSDFContext) -> bool:
+        """Whether who asks goes on with one wavelength where they part."""
+        return int(ctx.type_mask) in (SEPARATES, NESTS)
+
+    def outer(ctx: BSDFContext, si: SurfaceInteraction) -> Float | None:
+        """The index outside, where who asks knows it."""
+        return 1.0 + si.duv_dx.x if int(ctx.type_mask) == NESTS else None
+
     class GonioBSDF(base):
         """A Gonio model in a Mitsuba scene."""
 
@@ -73,6 +81,8 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             sides = kinds.FrontSide | kinds.BackSide if placed.sides or transmits else kinds.FrontSide
             if any(slot.varies for slot in placed.slots.values()):
                 sides = sides | kinds.SpatiallyVarying
+            if placed.disperses:
+                sides = sides | DISPERSES
             lobes = []
             if delta != "always":
                 lobes += [kinds.GlossyReflection, *([kinds.GlossyTransmission] if transmits else [])]
@@ -96,21 +106,23 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         # -------------------------------------------------------------- values
 
         def eval(self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True) -> Radiance:
-            return self._eval(self.placed.at(si, active), ctx, si, wo, active)
+            return self._eval(self.placed.at(si, active, separates(ctx), outer(ctx, si)), ctx, si, wo, active)
 
         def pdf(self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True) -> Float:
-            return self._pdf(self.placed.at(si, active), ctx, si, wo, active)
+            return self._pdf(self.placed.at(si, active, separates(ctx), outer(ctx, si)), ctx, si, wo, active)
 
         def eval_pdf(
             self, ctx: BSDFContext, si: SurfaceInteraction, wo: Vector, active: Mask = True
         ) -> tuple[Radiance, Float]:
-            model = self.placed.at(si, active)
+            model = self.placed.at(si, active, separates(ctx), outer(ctx, si))
             return self._eval(model, ctx, si, wo, active), self._pdf(model, ctx, si, wo, active)
 
         def sample(
             self, ctx: BSDFContext, si: SurfaceInteraction, sample1: Float, sample2: Point, active: Mask = True
         ) -> tuple[BSDFSample, Radiance]:
-            return self._sample(self.placed.at(si, active), ctx, si, sample1, sample2, active)
+            return self._sample(
+                self.placed.at(si, active, separates(ctx), outer(ctx, si)), ctx, si, sample1, sample2, active
+            )
 
         def eval_pdf_sample(
             self,
@@ -121,7 +133,7 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             sample2: Point,
             active: Mask = True,
         ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
-            model = self.placed.at(si, active)
+            model = self.placed.at(si, active, separates(ctx), outer(ctx, si))
             value, pdf = self._eval(model, ctx, si, wo, active), self._pdf(model, ctx, si, wo, active)
             return value, pdf, *self._sample(model, ctx, si, sample1, sample2, active)
 

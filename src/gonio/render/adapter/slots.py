@@ -15,6 +15,8 @@ import numpy as np
 from ... import ops
 from ...errors import InputError
 from ...models import Parameter
+from ...models.parameters import IndexParameter
+from ...optics.dispersion import DispersiveIndex
 from ..types import Float, Mask, OfVariant, Properties, SurfaceInteraction, Texture
 from .variant import Variant
 
@@ -33,6 +35,7 @@ class Slot:
 
     values    opaque values by property ("alpha", or "alpha_x" and "alpha_y")
     textures  the others
+    curves    those of an index that depends on the wavelength: eta by nanometre
     plain     numbers that tell the parameter's range (of a texture: from the lowest to the highest)
     """
 
@@ -40,6 +43,7 @@ class Slot:
         self.variant, self.parameter, self.where = variant, parameter, where
         self.values: dict[str, Float] = {}
         self.textures: dict[str, Texture] = {}
+        self.curves: dict[str, Float] = {}
         self.names = self._names(props)
         plain = [self._read(props, name, preset) for name in self.names]
         self.plain: Plain = (plain[0], plain[1]) if len(plain) == 2 else plain[0]
@@ -59,6 +63,8 @@ class Slot:
         kinds = variant.mi.Properties.Type
         if name in props:
             given = props.type(name)
+            if given == kinds.String and isinstance(parameter, IndexParameter):
+                return self._constant(name, parameter.taken(str(props[name]), self.where))
             if given == kinds.String:
                 raise InputError(f"'{props[name]}' given, a number or a texture expected", self.where)
             if given in (kinds.Float, kinds.Integer):
@@ -82,6 +88,8 @@ class Slot:
         self.parameter.check(value, self.where)
         if self.parameter.kind == "angle" and value == 0:
             return value  # no rotation at all
+        if self.variant.spectral and isinstance(value, DispersiveIndex) and value.constants.disperses:
+            self.curves[name] = self.variant.dispersion(value.constants)
         if self.parameter.kind == "spectrum":
             self.values[name] = self.variant.constant(value)
         else:
@@ -104,12 +112,22 @@ class Slot:
         """Whether it has other values elsewhere on the surface."""
         return any(texture.is_spatially_varying() for texture in self.textures.values())
 
-    def at(self, si: SurfaceInteraction, active: Mask) -> OfVariant:
-        """The bound value at a surface interaction: as `Parameter.bind` would have it."""
+    def at(
+        self, si: SurfaceInteraction, active: Mask, separates: bool = False, outer: Float | None = None
+    ) -> OfVariant:
+        """The bound value at a surface interaction: as `Parameter.bind` would have it.
+
+        separates  whether an index is that of the ray's first wavelength, or one for all of them
+        outer      what an index is divided by
+        """
         kind = self.parameter.kind
         found = dict(self.values)
+        for name, curve in self.curves.items() if separates else ():
+            found[name] = self.variant.looked_up(curve, si.wavelengths[0], active)
         for name, texture in self.textures.items():
             found[name] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
+        if outer is not None and isinstance(self.parameter, IndexParameter):
+            return found[self.parameter.name] / outer
         if kind == "alpha":
             return ops.vec2(found[self.names[0]], found[self.names[-1]])
         if kind == "angle":

@@ -17,7 +17,9 @@ from typing import ClassVar
 import drjit as dr
 
 from .. import engine, sampler
+from ..adapter.variant import DISPERSES, NESTS, SEPARATES
 from ..lights import Lights
+from ..media import Crossing, Media
 from ..types import (
     BSDFSample,
     Float,
@@ -60,11 +62,13 @@ class _Path:
     pdf: Float  # with which the BSDF chose this ray, 1/sr; 0 for camera rays and delta lobes
     solid_angle: Float  # LightSample.solid_angle at its origin
     radiance: Radiance  # found so far
+    alone: UInt  # 1 where the first wavelength goes on without the others
+    inside: UInt  # of which media, see `media.py`
     active: Mask
 
 
 @cache
-def _waiting_type(variant: str) -> Record:
+def _waiting_type(variant: str, media: bool) -> Record:
     """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a _Path.
 
     A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
@@ -75,6 +79,7 @@ def _waiting_type(variant: str) -> Record:
     found = {name: kind for name, kind in mi.PreliminaryIntersection3f.DRJIT_STRUCT.items() if name != "valid"}
     kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
     kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
+    kept |= ({"alone": mi.UInt32} if mi.is_spectral else {}) | ({"inside": mi.UInt32} if media else {})
 
     def pack(path: _Path) -> Record:
         hit = {name: getattr(path.hit, name) for name in found}
@@ -85,7 +90,8 @@ def _waiting_type(variant: str) -> Record:
         for name in found:
             setattr(hit, name, getattr(rest, name))
         hit.valid = rest.t < dr.inf
-        fields = {name: kind(getattr(rest, name)) for name, kind in kept.items()}
+        fields = dict.fromkeys(("alone", "inside"), mi.UInt32(0))
+        fields |= {name: kind(getattr(rest, name)) for name, kind in kept.items()}
         return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
 
     waiting: Record = make_dataclass("Waiting", [*kept.items(), *found.items()])
@@ -108,15 +114,20 @@ class Transport(Integrator):
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         super().__init__(mi, scene, sensor, settings, aovs)
-        self.Waiting = _waiting_type(mi.variant())
+        self.media = Media(mi, scene)
+        self.Waiting = _waiting_type(mi.variant(), self.media.known)
         self.context = mi.BSDFContext()
+        self.context.type_mask = NESTS if self.media.known else SEPARATES
         self.lights = Lights(mi, scene, self.surfaces)
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
         self.follows_delta = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta) for shape in scene.shapes())
-        # Whether any path has a second vertex to shade.
-        self.goes_on = depth > 2 and (self.samples_lobes or self.follows_delta)
+        self.disperses = any(shape.bsdf().flags() & DISPERSES for shape in scene.shapes())
+        eye = mi.Point3f(sensor.world_transform() @ mi.Point3f(0.0)) if self.media.known else None
+        self.begun = None if eye is None else self.media.around(eye)
+        # Whether any path has a second vertex to shade; where media dim the way to a lamp, the last ray is traced too.
+        self.goes_on = (depth > 2 or self.media.known) and (self.samples_lobes or self.follows_delta)
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
@@ -200,8 +211,9 @@ class Transport(Integrator):
         """A sample's path up to the first thing that it meets."""
         mi = self.mi
         ray, weight, hit = self.first_hit(pixel, key, index)
+        inside = self.begun if self.begun is not None else mi.UInt32(0)
         return _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
-                     mi.Float(0), mi.Spectrum(0), mi.Bool(True))  # fmt: skip
+                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), inside, mi.Bool(True))  # fmt: skip
 
     def extend(self, path: _Path, key: UInt, features: list[Float] | None = None) -> _Path:
         """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
@@ -216,6 +228,9 @@ class Transport(Integrator):
         last = depth + 2 >= self.max_depth
 
         si = self.surfaces.interaction(path.hit, ray, active)
+        if self.media.known:
+            through = active & si.is_valid()
+            throughput = dr.select(through, throughput * self.media.transmitted(path.inside, si, si.t), throughput)
         emitted = lights.emitted(si, active)
         if self.samples_lights and not first:
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)
@@ -225,7 +240,17 @@ class Transport(Integrator):
         active = active & si.is_valid() & (depth + 1 < self.max_depth)
 
         bsdf = si.bsdf(ray)
-        gathered, solid_angle, bs, weight = self.scatter(path.index, key, dimension, si, bsdf, active)
+        crossing = self.media.crossing(si, bsdf, path.inside, active) if self.media.known else None
+        if crossing is not None:
+            si.duv_dx = mi.Vector2f(crossing.outer - 1.0, 0.0)
+        alone = path.alone
+        if self.disperses:
+            throughput, alone = self.separate(throughput, alone, active & ((bsdf.flags() & DISPERSES) != 0))
+        gathered, solid_angle, bs, weight = self.scatter(path.index, key, dimension, si, bsdf, active, crossing)
+        inside = path.inside
+        if crossing is not None:
+            bs, weight = self.straight_on(si, bs, weight, active & ~crossing.surface)
+            inside = dr.select(si.wi.z * bs.wo.z < 0.0, crossing.beyond, crossing.here)
         radiance = radiance + throughput * dr.select(active, gathered, 0)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(self.ambient, bsdf, si, active)
@@ -248,18 +273,50 @@ class Transport(Integrator):
         def weigh(light: Radiance, light_pdf: Float) -> Radiance:
             return dr.select(pdf > 0, light * mis(pdf, light_pdf), light) if self.samples_lights else light
 
-        radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
-
-        active = active & ~last
+        if crossing is None:
+            radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
+            active = active & ~last
         hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         if not lights.has_environment:  # else the path goes on to meet it
             active = active & hit.is_valid()
-        return _Path(path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, active)
+        return _Path(
+            path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, alone, inside, active
+        )
+
+    def straight_on(
+        self, si: SurfaceInteraction, bs: BSDFSample, weight: Radiance, through: Mask
+    ) -> tuple[BSDFSample, Radiance]:
+        """A BSDF sample, where there is no surface after all one that goes straight on."""
+        mi = self.mi
+        bs.wo = dr.select(through, -si.wi, bs.wo)
+        bs.pdf, bs.eta = dr.select(through, 1.0, bs.pdf), dr.select(through, 1.0, bs.eta)
+        bs.sampled_type = dr.select(through, mi.UInt32(+mi.BSDFFlags.DeltaTransmission), bs.sampled_type)
+        return bs, dr.select(through, mi.Spectrum(1.0), weight)
+
+    def separate(self, throughput: Radiance, alone: UInt, here: Mask) -> tuple[Radiance, UInt]:
+        """Go on with the first wavelength alone where the index depends on it, at the weight of all.
+
+        The wavelengths of a sample are shifted copies of one number, so that the first is distributed as each of them
+        is: in its place it stands for all (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero).
+        """
+        mi, count = self.mi, dr.size_v(throughput)
+        hero = mi.Spectrum(0)
+        hero[0] = throughput[0] * dr.select(alone == 0, count, 1)
+        return dr.select(here, hero, throughput), dr.select(here, mi.UInt32(1), alone)
 
     def scatter(
-        self, index: UInt, key: UInt, dimension: UInt, si: SurfaceInteraction, bsdf: MitsubaBSDF, active: Mask
+        self,
+        index: UInt,
+        key: UInt,
+        dimension: UInt,
+        si: SurfaceInteraction,
+        bsdf: MitsubaBSDF,
+        active: Mask,
+        crossing: Crossing | None = None,
     ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
         """Ask the BSDF, in one call, what it does with a light's direction, and for a direction of its own.
+
+        crossing  the media on both sides of the surface, where they matter
 
         Returns (light gathered from the lights, solid angle of the light, BSDF sample, its weight).
         """
@@ -279,6 +336,9 @@ class Transport(Integrator):
         gathered = value * light.weight
         if self.samples_lobes:
             gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
+        if crossing is not None:
+            side = dr.select(si.wi.z * toward.z < 0.0, crossing.beyond, crossing.here)
+            gathered *= self.media.transmitted(side, si, light.ds.dist) & crossing.surface
         visible = active & dr.any(gathered != 0)
         visible = self.unoccluded(si, light.ds.p, visible)
         return dr.select(visible, gathered, 0), light.solid_angle, bs, weight

@@ -14,10 +14,10 @@ from ...errors import GonioWarning, InputError
 from ...models import Parameter
 from ..images import RGB
 from ..types import MitsubaBSDF, Plugin, PluginDict, Scene
-from . import meshes, schema, textures
+from . import meshes, schema, spectra, textures
 from .materials import BY_TYPE, MaterialPart, Value, numbers_in
 from .text import pointer
-from .values import ImageTexture, NormalMap, rgb
+from .values import ImageTexture, NormalMap
 
 # Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
 # format's +y, +z, +x: u about y from z toward x, v from +y.
@@ -133,16 +133,16 @@ class _Builder:
     def light(self, light: schema.LightSource, where: str, name: str) -> Plugin | PluginDict:
         if isinstance(light, schema.AreaLight):
             # Mitsuba merges Python plugins whose properties are equal: the tag keeps two like lamps apart
-            emitter = {"type": "gonio_area", "radiance": {"type": "rgb", "value": rgb(light.energy)}, "tag": name}
+            emitter = {"type": "gonio_area", "radiance": spectra.emitted(light.energy), "tag": name}
             return self.shape(light.shape, f"{where}/shape", name, emitter)
         if isinstance(light, schema.SpotLight):
-            intensity = {"type": "rgb", "value": rgb(light.energy)}
+            intensity = spectra.emitted(light.energy)
             return {"type": "point", "position": list(light.position), "intensity": intensity}
         source = light.texture if light.texture is not None else light.radiance
         assert source is not None, "one of the two is given"
         if isinstance(source, ImageTexture):
             return textures.environment(self.mi, self.image(source, f"{where}/texture"))
-        return {"type": "constant", "radiance": {"type": "rgb", "value": rgb(source)}}
+        return {"type": "constant", "radiance": spectra.emitted(source)}
 
     # ------------------------------------------------------------------ shapes
 

@@ -44,10 +44,12 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from ...errors import GonioWarning, InputError
+from ...errors import GonioError, GonioWarning, InputError
 from ...measure import SAMPLE, parted
 from ...models import BSDF, Parameter, library, models, outside
-from .values import Colour, ImageTexture, NormalMap, Part, Scalar, Width, invalid
+from ...models.parameters import IndexParameter
+from ...optics.dispersion import DispersiveIndex
+from .values import Colour, ImageTexture, Index, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
 Locate: TypeAlias = Callable[[str, str], Path]
@@ -249,6 +251,11 @@ def _items(value: Value) -> tuple[Value, ...]:
 
 def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
     def check(value: T) -> T:
+        if isinstance(value, str):
+            try:
+                parameter.taken(value, key)
+            except GonioError as error:
+                raise invalid(error.what, error.hint) from None
         for number in numbers_in(value):
             if number < parameter.low or (number > parameter.high and not parameter.soft_high):
                 raise invalid(f"{number:g} is out of range: {key} is {parameter.range}", _doc(parameter))
@@ -266,7 +273,8 @@ def _field(parameter: Parameter, key: str, required: bool, doc: str = "") -> tup
     if parameter.kind == "choice":
         kind: Any = Literal[tuple(parameter.choices)]
     else:
-        kind = Annotated[_KINDS[parameter.kind], AfterValidator(_in_range(parameter, key))]
+        of_kind = Index if isinstance(parameter, IndexParameter) else _KINDS[parameter.kind]
+        kind = Annotated[of_kind, AfterValidator(_in_range(parameter, key))]
     doc = doc or f"{parameter.doc} ({parameter.range})"
     # JSON Schema's minimum and maximum hold for numbers only, so they do no harm beside lists and textures.
     limits = {"minimum": parameter.low, "maximum": math.inf if parameter.soft_high else parameter.high}
@@ -362,6 +370,8 @@ def described(material: BSDF) -> MaterialPart:
         value = getattr(material, parameter.name)
         if parameter.inner:
             fields[key] = described(value)
+        elif isinstance(value, DispersiveIndex):
+            fields[key] = value.constants.name
         elif value is not None:
             fields[key] = np.asarray(value).tolist() if parameter.numeric else value
     made = part.model_validate(fields)

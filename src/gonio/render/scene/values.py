@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import (
@@ -20,6 +21,7 @@ from pydantic_core import PydanticCustomError
 
 from .text import kind_of
 
+VISIBLE = (380.0, 780.0)  # nm
 LARGEST = 1e18  # its square still fits a 32-bit float, so that lengths of vectors stay finite
 
 
@@ -119,6 +121,64 @@ class NormalMap(Part):
     """Image beside the scene."""
 
 
+class LightSpectrum(Part):
+    """A lamp by its spectrum: in RGB its colour, with `--spectral` itself."""
+
+    scale: NonNegative = 1.0
+    """The radiance has the luminance of [scale, scale, scale]."""
+
+
+class Daylight(LightSpectrum):
+    """CIE standard illuminant D65: white."""
+
+    type: Literal["d65"]
+
+
+class Blackbody(LightSpectrum):
+    """A body that glows, by Planck's law: a filament (2856 K, CIE illuminant A), the sun (5778 K)."""
+
+    type: Literal["blackbody"]
+    temperature: Annotated[Number, Field(ge=500, le=1e6)]
+    """Kelvin."""
+
+
+class Led(LightSpectrum):
+    """Light-emitting diodes: a sum of Gaussians over the wavelength."""
+
+    type: Literal["led"]
+    peaks: Annotated[list[tuple[Positive, Annotated[Number, Field(ge=2, le=500)], NonNegative]], Field(min_length=1)]
+    """[wavelength, full width at half maximum, height] each, in nm; heights are relative."""
+
+    @model_validator(mode="after")
+    def _shines(self) -> Led:
+        if not any(height for _, _, height in self.peaks):
+            raise invalid("no peak has a height", "give one more than 0", "peaks")
+        for wavelength, _, _ in self.peaks:
+            if not VISIBLE[0] <= wavelength <= VISIBLE[1]:
+                raise invalid(f"{wavelength:g} nm is not visible", f"{VISIBLE[0]:g} to {VISIBLE[1]:g} nm", "peaks")
+        return self
+
+
+class MeasuredLight(LightSpectrum):
+    """A lamp's measured spectrum: radiance per wavelength, relative, linear between the points and 0 beyond."""
+
+    type: Literal["spectrum"]
+    wavelengths: list[Positive] = Field(min_length=2)
+    """nm, ascending."""
+    values: list[NonNegative] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _curve(self) -> MeasuredLight:
+        if len(self.values) != len(self.wavelengths):
+            what = f"{len(self.values)} values, {len(self.wavelengths)} wavelengths"
+            raise invalid(what, "give one value each", "values")
+        if any(b <= a for a, b in pairwise(self.wavelengths)):
+            raise invalid("the wavelengths do not ascend", "sort them", "wavelengths")
+        if self.wavelengths[0] >= VISIBLE[1] or self.wavelengths[-1] <= VISIBLE[0] or not any(self.values):
+            raise invalid("nothing of it is visible", "in nanometres, 380 to 780", "wavelengths")
+        return self
+
+
 def _kind_of_value(value: object) -> str | None:
     if isinstance(value, bool):
         return None
@@ -126,7 +186,9 @@ def _kind_of_value(value: object) -> str | None:
         return "<number>"
     if isinstance(value, (list, tuple)):
         return "<list>"
-    return "<texture>" if isinstance(value, (dict, ImageTexture)) else None
+    if isinstance(value, str):
+        return "<name>"
+    return "<texture>" if isinstance(value, (dict, Part)) else None
 
 
 def _either(expected: str) -> Discriminator:
@@ -138,6 +200,10 @@ Texture = Annotated[ImageTexture, Tag("<texture>")]
 Scalar = Annotated[
     Annotated[Number, Tag("<number>")] | Texture, _either("a number or a texture {type: imageTex, file}")
 ]
+Index = Annotated[
+    Annotated[Number, Tag("<number>")] | Annotated[str, Strict(), Tag("<name>")] | Texture,
+    _either("a number, the name of a substance or a texture {type: imageTex, file}"),
+]
 Colour = Annotated[
     Annotated[Number, Tag("<number>")] | Annotated[Rgb, Tag("<list>")] | Texture,
     _either("[r, g, b], a number (grey) or a texture {type: imageTex, file}"),
@@ -148,8 +214,10 @@ Width = Annotated[
     | Texture,
     _either("a number, two numbers [along x, along y] or a texture {type: imageTex, file}"),
 ]
+Lamp = Annotated[Daylight | Blackbody | Led | MeasuredLight, Field(discriminator="type")]
 Radiance = Annotated[
-    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")], _either("[r, g, b] or a number (grey)")
+    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Annotated[Lamp, Tag("<texture>")],
+    _either("[r, g, b], a number (grey) or a spectrum {type: d65, blackbody, led or spectrum}"),
 ]
 Sky = Annotated[
     Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")] | Texture,

@@ -1,0 +1,193 @@
+"""Spectral rendering, held against closed forms, and its price: python benchmarks/spectral.py [prism window bow time]
+
+prism    where lines of a slit's light are seen through the prism of examples/prism, and how far that turned them,
+         against Snell's law with Sellmeier's index (SchottBK7)
+window   the bright disc in examples/snells-window against asin(1/n)
+bow      the bows of examples/rainbow against Descartes' angles
+time     a spectral render against one in RGB, same scene and samples, alternating in two processes
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+WIDTH, HEIGHT, FOV = 1536, 4, 0.045  # pixels; degrees of the height
+SLIT = 8.0  # distance of the slit from the prism
+LINES = (467.8, 486.1, 546.1, 589.3, 656.3)  # nm: cadmium, hydrogen F, mercury e, sodium D, hydrogen C
+TIMED = """
+import sys, time, gonio as go
+
+def render(spp):
+    go.render(sys.argv[1], spp=spp, size=(480, 320), integrator="path", max_depth=8, spectral=sys.argv[2] == "spectral")
+
+render(2)
+print("ready", flush=True)
+for _ in sys.stdin:
+    start, busy = time.perf_counter(), time.process_time()
+    render(256)
+    print(time.perf_counter() - start, time.process_time() - busy, flush=True)
+"""
+
+
+def corners() -> np.ndarray:
+    """The corners of the prism, seen from above: (x, z) of apex, left and right end of the base."""
+    lines = (EXAMPLES / "prism/prism.obj").read_text().splitlines()
+    found = np.array([[float(x) for x in line.split()[1:]] for line in lines if line.startswith("v ")])
+    return found[found[:, 1] == 0.0][:, [0, 2]]
+
+
+def refracted(way: np.ndarray, normal: np.ndarray, eta: float) -> np.ndarray:
+    """A unit vector after a surface; the normal faces it, eta is the index behind over that before (Snell)."""
+    cos = -way @ normal
+    return way / eta + (cos / eta - np.sqrt(1.0 - (1.0 - cos**2) / eta**2)) * normal
+
+
+def through(place: np.ndarray, way: np.ndarray, eta: float) -> tuple[np.ndarray, np.ndarray]:
+    """A ray after the prism's two sloping faces: where it leaves and where to."""
+    apex, left, right = corners()
+    for side, index in ((left, eta), (right, 1.0 / eta)):
+        along = side - apex
+        normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+        normal = -normal if normal @ way > 0.0 else normal
+        place = place + way * ((apex - place) @ normal) / (way @ normal)
+        way = refracted(way, normal, index)
+    return place, way
+
+
+def prism(lines: tuple[float, ...] = LINES) -> list[float]:
+    """Render a slit through the prism, in lines; the camera is the slit's counterpart. Degrees by which each is off."""
+    errors = []
+    print(f"{'nm':>6}  {'deviation':>10}  {'rendered':>10}  {'apart':>9}")
+    eye, ahead = np.array([-6.0, 0.2576]), np.array([1.0, 0.0])
+    middle = float(go.refractive_index("sf11", 550.0).eta)
+    left_at, out = through(eye, ahead, middle)
+    slit = left_at + SLIT * out
+    across = np.array([-out[1], out[0]])
+    for line in lines:
+        light = {"type": "led", "peaks": [[line, 2, 1]]}
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "prism.obj").write_text((EXAMPLES / "prism/prism.obj").read_text())
+            scene = {
+                "output": {"filename": "prism.exr"},
+                "sampler": {"type": "default", "samples": 256},
+                "camera": {
+                    "type": "pinhole",
+                    "transform": {"position": [eye[0], 0.4, eye[1]], "lookAt": [0.0, 0.4, eye[1]], "up": [0, 1, 0]},
+                    "verticalFov": FOV,
+                    "film": {"size": [WIDTH, HEIGHT]},
+                },
+                "integrator": {"type": "path", "maxDepth": 4},
+                "scene": {
+                    "shapes": [
+                        {
+                            "type": "mesh",
+                            "file": "prism.obj",
+                            "material": {"type": "gonio-dielectric", "eta": "sf11", "alpha": 0},
+                        }
+                    ],
+                    "lights": [
+                        {
+                            "type": "areaLight",
+                            "energy": light,
+                            "shape": {
+                                "type": "parallelogram",
+                                "base": [slit[0] - 0.003 * across[0], -5.0, slit[1] - 0.003 * across[1]],
+                                "edge0": [0.006 * across[0], 0.0, 0.006 * across[1]],
+                                "edge1": [0.0, 12.0, 0.0],
+                            },
+                        }
+                    ],
+                },
+            }
+            path = Path(folder) / "scene.json"
+            path.write_text(json.dumps(scene))
+            seen = np.abs(np.asarray(go.render(path, spp=2048, spectral=True), float)).sum((0, 2))
+        seen[:470] = 0.0  # there another image stands, of light that was reflected inside
+        near = np.abs(np.arange(WIDTH) - np.argmax(seen)) < 12
+        column = (np.arange(WIDTH) + 0.5)[near] @ seen[near] / seen[near].sum()
+        scale = 2.0 * np.tan(np.radians(FOV / 2.0)) / HEIGHT
+        # the picture's right is the camera's forward x up: +z here
+        view = np.array([1.0, (column - WIDTH / 2.0) * scale])
+        view /= np.linalg.norm(view)
+        eta = float(go.refractive_index("sf11", line).eta)
+        place, away = through(eye, view, eta)
+        to_slit = (slit - place) / np.linalg.norm(slit - place)
+        turned = [np.degrees(np.arccos(view @ w)) for w in (away, to_slit)]
+        print(f"{line:6.1f}  {turned[0]:10.4f}  {turned[1]:10.4f}  {turned[1] - turned[0]:+9.5f}")
+        errors.append(turned[1] - turned[0])
+    return errors
+
+
+def window(spp: int = 256) -> float:
+    """Pixels by which the radius of the bright disc is off: where the light begins, in 72 directions from its middle.
+
+    Towards its rim it fades as Fresnel has it, from half to 10 % within two pixels: half would lie inside.
+    """
+    size = 480
+    picture = np.asarray(go.render(EXAMPLES / "snells-window", size=(size, size), spp=spp), float)
+    y, x = np.indices((size, size)) + 0.5 - size / 2.0
+    bright = picture.mean(2)
+    focal = size / 2.0 / np.tan(np.radians(55.0))
+    radii = []
+    for angle in np.linspace(0.0, 2.0 * np.pi, 73)[:-1]:
+        near = np.abs(np.arctan2(y, x) - (angle if angle <= np.pi else angle - 2.0 * np.pi)) < 0.03
+        r, values = np.hypot(x, y)[near], bright[near]
+        steps = np.arange(160.0, 230.0, 0.25)
+        share = np.array([values[np.abs(r - step) < 0.5].mean() for step in steps])
+        inside, outside = share[:40].mean(), share[-40:].mean()
+        radii.append(steps[np.argmax(share < outside + 0.1 * (inside - outside))])
+    expected = focal * np.tan(np.arcsin(1.0 / 1.333))
+    found = float(np.mean(radii))
+    print(f"radius of the window: {found:.2f} pixels, asin(1/1.333) is {expected:.2f}; apart {found - expected:+.2f}")
+    return found - expected
+
+
+def bow(rays: int = 400_000) -> list[float]:
+    """Degrees by which the bows are off."""
+    spec = importlib.util.spec_from_file_location("rainbow", EXAMPLES / "rainbow/rainbow.py")
+    assert spec is not None and spec.loader is not None
+    program = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(program)
+    return list(program.angles(rays))
+
+
+def time() -> None:
+    """Medians of 7, the two taking turns: seconds on the wall, and of processors, which other work disturbs less."""
+    for name in ("conductor-ggx", "rough-dielectric", "glass-caustic"):
+        kinds = ("rgb", "spectral")
+        command = [sys.executable, "-W", "ignore", "-c", TIMED, str(EXAMPLES / name)]
+        pipes = [
+            subprocess.Popen([*command, k], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for k in kinds
+        ]
+        for one in pipes:
+            assert one.stdout is not None and one.stdout.readline().strip() == "ready"
+        taken = np.zeros((2, 7, 2))
+        for turn in range(7):
+            for kind, one in enumerate(pipes):
+                assert one.stdin is not None and one.stdout is not None
+                one.stdin.write("go\n")
+                one.stdin.flush()
+                taken[kind, turn] = [float(x) for x in one.stdout.readline().split()]
+        for one in pipes:
+            assert one.stdin is not None
+            one.stdin.close()
+            one.wait()
+        rgb, spectral = np.median(taken, axis=1)
+        wall, busy = np.median(taken[1] / taken[0], axis=0)
+        print(
+            f"{name:18s} rgb {rgb[0]:.2f} s, spectral {spectral[0]:.2f} s: {wall:.2f} times, of processors {busy:.2f}"
+        )
+
+
+if __name__ == "__main__":
+    for one in sys.argv[1:] or ("prism", "window", "bow", "time"):
+        {"prism": prism, "window": window, "bow": bow, "time": time}[one]()

@@ -1,0 +1,208 @@
+"""How a refractive index depends on the wavelength: formulas and tables.
+
+Formulas have the wavelength in micrometres, as they are printed; what the user sees is in nanometres. A formula, too,
+holds only where it was fitted: its range is part of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Floats: TypeAlias = NDArray[np.float64]
+
+SODIUM = 589.3  # nm, the middle of the D lines, where a single index of glass is meant
+VISIBLE = (400.0, 700.0)  # nm; what lies beyond gives 0.3 % of the luminance of daylight
+ALL = (0.0, np.inf)
+
+
+class RefractiveIndex(NamedTuple):
+    """The complex index eta + i k, of the wavelengths asked for; k is 0 where the source has none."""
+
+    eta: Floats
+    k: Floats
+
+
+@dataclass(frozen=True)
+class Dispersion:
+    """An index as a function of the wavelength.
+
+    low, high  range in which it holds, nm
+    """
+
+    low: float
+    high: float
+
+    def at(self, wavelength: Floats) -> RefractiveIndex:
+        """The index at wavelengths in nm, all in range."""
+        eta = np.asarray(self.eta(wavelength / 1000.0), float)
+        return RefractiveIndex(eta, np.zeros_like(eta))
+
+    def eta(self, wavelength: Floats) -> Floats:
+        """The real part, by wavelengths in micrometres."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Constant(Dispersion):
+    """The same index at all wavelengths."""
+
+    value: float
+
+    def eta(self, wavelength: Floats) -> Floats:
+        return np.full_like(wavelength, self.value)
+
+
+@dataclass(frozen=True)
+class Powers(Dispersion):
+    """sum_i c_i lambda^e_i: n itself, by Cauchy's formula, or n^2 (Schott's old catalogues).
+
+    terms    (c, e), lambda in micrometres
+    squared  whether the sum is n^2
+    """
+
+    terms: tuple[tuple[float, float], ...]
+    squared: bool = False
+
+    def eta(self, wavelength: Floats) -> Floats:
+        total = sum(c * wavelength**e for c, e in self.terms)
+        return np.sqrt(total) if self.squared else np.asarray(total, float)
+
+
+@dataclass(frozen=True)
+class Sellmeier(Dispersion):
+    """n^2 = constant + sum_i b_i lambda^2 / (lambda^2 - c_i), with lambda^2 and c_i in square micrometres."""
+
+    terms: tuple[tuple[float, float], ...]
+    constant: float = 1.0
+
+    def eta(self, wavelength: Floats) -> Floats:
+        square = wavelength**2
+        return np.sqrt(self.constant + sum(b * square / (square - c) for b, c in self.terms))
+
+
+@dataclass(frozen=True)
+class Gas(Dispersion):
+    """n = 1 + constant + density sum_i b_i / (c_i - 1 / lambda^2) (Ciddor1996, eq. 1)."""
+
+    terms: tuple[tuple[float, float], ...]
+    density: float = 1.0
+    constant: float = 0.0
+
+    def eta(self, wavelength: Floats) -> Floats:
+        inverse = wavelength**-2.0
+        refractivity = self.constant + self.density * sum(b / (c - inverse) for b, c in self.terms)
+        return np.asarray(1.0 + refractivity, float)
+
+
+@dataclass(frozen=True)
+class Table(Dispersion):
+    """Measured values, linear in the wavelength between them.
+
+    wavelengths  nm, ascending
+    """
+
+    wavelengths: tuple[float, ...]
+    etas: tuple[float, ...]
+    ks: tuple[float, ...]
+
+    def at(self, wavelength: Floats) -> RefractiveIndex:
+        eta, k = (np.interp(wavelength, self.wavelengths, column) for column in (self.etas, self.ks))
+        return RefractiveIndex(np.asarray(eta, float), np.asarray(k, float))
+
+
+@dataclass(frozen=True)
+class Absorbing(Dispersion):
+    """A formula for eta, and a table for k."""
+
+    real: Dispersion
+    imaginary: Table
+
+    def at(self, wavelength: Floats) -> RefractiveIndex:
+        return RefractiveIndex(self.real.at(wavelength).eta, self.imaginary.at(wavelength).k)
+
+
+@dataclass(frozen=True)
+class OpticalConstants:
+    """What is known of a substance's refractive index.
+
+    name    what it is called by
+    title   what it is
+    curve   the index by wavelength
+    source  where that stands
+    """
+
+    name: str
+    title: str
+    curve: Dispersion
+    source: str
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Wavelengths for which it is known, nm."""
+        return self.curve.low, self.curve.high
+
+    @property
+    def disperses(self) -> bool:
+        """Whether it depends on the wavelength."""
+        return not isinstance(self.curve, Constant)
+
+    def at(self, wavelength: float | list[float] | Floats, outside: str = "refuse") -> RefractiveIndex:
+        """The index at wavelengths (nm, in vacuum), in arrays of their shape.
+
+        outside  of the range: "refuse", or "level" for the value at its end
+        """
+        given = np.asarray(wavelength, np.float64)
+        low, high = self.range
+        if outside not in ("refuse", "level"):
+            raise InputError(f"'{outside}' given, refuse or level expected", "outside")
+        if given.size and not np.all(np.isfinite(given) & (given > 0.0)):
+            raise InputError("a wavelength that is not a positive number", "wavelength", "give nanometres")
+        wrong = given[(given < low) | (given > high)]
+        if wrong.size and outside == "refuse":
+            hint = "in nanometres" if high >= 20.0 * wrong.flat[0] else 'outside="level" takes the value at the end'
+            what = f"{wrong.flat[0]:g} nm is outside of {self.name}, which is known from {low:g} to {high:g} nm"
+            raise InputError(what, "wavelength", hint)
+        with np.errstate(all="ignore"):
+            found = self.curve.at(np.clip(given, low, high))
+        missing = given[~np.isfinite(found.eta)]
+        if missing.size:
+            what = f"{self.name} has no index at {missing.flat[0]:g} nm: a resonance, or the square of none"
+            raise InputError(what, "wavelength", "formulas have lambda in micrometres")
+        return found
+
+    @property
+    def sodium(self) -> float:
+        """eta at 589.3 nm, or at the nearest wavelength that is known: what one number for it would be."""
+        return float(self.at(SODIUM, "level").eta)
+
+
+class DispersiveIndex(float):
+    """A dielectric's index that knows how it depends on the wavelength. As a number it is that at 589.3 nm."""
+
+    constants: OpticalConstants
+
+    def __new__(cls, constants: OpticalConstants) -> DispersiveIndex:
+        made = super().__new__(cls, constants.sodium)
+        made.constants = constants
+        return made
+
+    def __repr__(self) -> str:
+        return repr(self.constants.name)
+
+    __str__ = __repr__
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, DispersiveIndex):
+            return self.constants == other.constants
+        return float(self) == other
+
+    __hash__ = float.__hash__
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return DispersiveIndex, (self.constants,)
