@@ -34,20 +34,8 @@ _PLACES = {
     # what a material of one's own is written with
     "models": (
         *("Angle", "BSDF", "Breach", "Colour", "Index", "Number", "Parameter", "Preset", "Sample", "Width"),
-        *(
-            "angle",
-            "bsdf",
-            "choice",
-            "file",
-            "flag",
-            "index",
-            "method",
-            "model",
-            "never",
-            "number",
-            "spectrum",
-            "width",
-        ),
+        *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "never", "number", "spectrum"),
+        "width",
     ),
     "models.library": ("fits", "material", "materials"),
     "measure.compression.compress": ("compress",),
