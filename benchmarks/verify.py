@@ -46,6 +46,7 @@ def correct() -> dict[str, go.BSDF]:
         "metal": go.Metal((1.0, 0.8, 0.4), (0.9, 1.0, 0.7), alpha=0.3),
         "film-conductor": go.model("film-conductor").preset("Au", alpha=0.2, thickness=400.0),
         "film-dielectric": go.model("film-dielectric")(1.5, 0.2, form="belcour-barla"),
+        "thin-dielectric": go.model("thin-dielectric")(),
         "mix": go.mix(go.Lambert(0.5), go.Conductor.preset("Au", alpha=0.3), 0.3),
         "mix with mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
         "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=0.3)),

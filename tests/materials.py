@@ -35,6 +35,7 @@ IDEAL = {
     "mirror": go.Mirror(0.9),
     "smooth-metal": go.Conductor.preset("Cu", alpha=0.0),
     "smooth-glass": go.Dielectric(1.5, 0.0),
+    "pane": go.model("thin-dielectric")(1.5, albedo=(0.9, 0.95, 1.0)),
     "matched-glass": go.Dielectric(1.0, 0.3),
 }
 NESTED = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..optics.fresnel import film
 from ..optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from .dielectric import Dielectric, _Facet
 from .film_conductor import FRESNELS, film_form, film_index, thickness_number
-from .material import InnerAlbedo, Microsurface
+from .material import Breach, InnerAlbedo, Microsurface
 from .parameters import Colour, Number, choice, number, spectrum
 
 
@@ -35,6 +36,9 @@ class FilmDielectric(Dielectric):
     form: str = film_form()
 
     reads_wavelengths: ClassVar[bool] = True
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "delta": Breach("it reflects as its film does, not as the bare index would", 1.0, certain=False)
+    }
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
