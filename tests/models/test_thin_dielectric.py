@@ -14,7 +14,7 @@ WO = np.stack([np.sin(THETA), 0.0 * THETA, np.cos(THETA)], -1)
 
 
 def pane(**values: Any) -> go.BSDF:
-    return go.model("thin-dielectric")(**values)
+    return go.ThinDielectric(**values)
 
 
 def reflected(material: go.BSDF, wo: np.ndarray = WO) -> np.ndarray:

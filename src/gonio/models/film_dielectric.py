@@ -60,9 +60,10 @@ class FilmDielectric(Dielectric):
     def _share(self, f: Spectrum) -> Scalar:  # type: ignore[override]
         return mean(f) if self.transmission else 1.0 + 0.0 * mean(f)
 
-    def _over_chance(self, facet: _Facet, eta: Scalar, share: Scalar) -> Spectrum:
+    def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """The lobes are chosen by their mean colours."""
-        f = self._reflectance_at(facet, eta)
+        f: Spectrum = self._reflectance_at(facet, eta)  # type: ignore[assignment]
+        share = self._share(f)
         if not self.transmission:
             return self.albedo * f
         return self.albedo * where(facet.reflects, safe_div(f, share), safe_div(1.0 - f, 1.0 - share))
