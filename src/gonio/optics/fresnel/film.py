@@ -252,7 +252,8 @@ def _between(values: Sequence[Scalar], nm: float) -> Scalar:
         return values[0] if nm >= red else values[2]
     (a, low), (b, high) = ((2, blue), (1, green)) if nm < green else ((1, green), (0, red))
     share = (nm - low) / (high - low)
-    return values[a] * (1.0 - share) + values[b] * share
+    lower, upper = values[a] * (1.0 - share), values[b] * share
+    return lower + upper
 
 
 # ---------------------------------------------------------------------- in Fourier space
@@ -287,14 +288,14 @@ def _band(
     for top, base in zip(film.top, film.base, strict=True):
         outer, inner = sqr(top), base.square
         passed = 1.0 - outer
-        all_ = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
-        mean = mean + 0.5 * (outer + all_)
+        bounced = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
+        mean = mean + 0.5 * (outer + bounced)
         once = base.scaled(-top)  # one round trip, without its way
         power = once
         for order, curve in enumerate(curves):
             if order:
                 power = power.times(once)
-            wave = wave + (all_ - passed) * power.times(curve).re
+            wave = wave + (bounced - passed) * power.times(curve).re
     return mean, wave
 
 
