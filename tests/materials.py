@@ -35,6 +35,7 @@ IDEAL = {
     "mirror": go.Mirror(0.9),
     "smooth-metal": go.Conductor.preset("Cu", alpha=0.0),
     "smooth-glass": go.Dielectric(1.5, 0.0),
+    "pane": go.ThinDielectric(1.5, albedo=(0.9, 0.95, 1.0)),
     "matched-glass": go.Dielectric(1.0, 0.3),
 }
 NESTED = {
@@ -65,11 +66,12 @@ def _rough() -> dict[str, go.BSDF]:
         found[f"metal-{ndf}-f82"] = go.Conductor.preset("Au", alpha=0.3, ndf=ndf, fresnel="f82")
     found["metal-by-colours"] = go.Metal((1.0, 0.8, 0.4), (0.9, 1.0, 0.7), alpha=(0.1, 0.4), rotation=0.5)
     found["glass-f82"] = go.Dielectric(1.5, 0.3, fresnel="f82")
-    metal, glass = go.model("film-conductor"), go.model("film-dielectric")
-    found["film-on-metal"] = metal.preset("Cr", alpha=(0.1, 0.4), rotation=0.5, thickness=420.0, form="belcour-barla")
-    found["film-on-gold"] = metal.preset("Au", alpha=0.3, thickness=650.0, film_eta=1.6)
-    found["film-on-glass"] = glass(1.5, 0.3, thickness=350.0, film_eta=2.0)
-    found["film-bubble"] = glass(1.0001, 0.2, thickness=500.0, film_eta=1.33, form="belcour-barla")
+    found["film-on-metal"] = go.FilmConductor.preset(
+        "Cr", alpha=(0.1, 0.4), rotation=0.5, thickness=420.0, form="belcour-barla"
+    )
+    found["film-on-gold"] = go.FilmConductor.preset("Au", alpha=0.3, thickness=650.0, film_eta=1.6)
+    found["film-on-glass"] = go.FilmDielectric(1.5, 0.3, thickness=350.0, film_eta=2.0)
+    found["film-bubble"] = go.FilmDielectric(1.0001, 0.2, thickness=500.0, film_eta=1.33, form="belcour-barla")
     found["glass-turned"] = go.Dielectric(1.33, (0.1, 0.5), rotation=-0.7)
     found["glass-dense"] = go.Dielectric(2.42, 0.2)
     found["glass-bubble"] = go.Dielectric(0.7, 0.2)

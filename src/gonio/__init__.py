@@ -82,6 +82,8 @@ if TYPE_CHECKING:
     from .models.blinn_phong import BlinnPhong
     from .models.conductor import Conductor
     from .models.dielectric import Dielectric
+    from .models.film_conductor import FilmConductor
+    from .models.film_dielectric import FilmDielectric
     from .models.lambert import Lambert
     from .models.library import fits, material, materials
     from .models.metal import Metal
@@ -106,6 +108,7 @@ if TYPE_CHECKING:
         width,
     )
     from .models.phong import Phong
+    from .models.thin_dielectric import ThinDielectric
     from .models.two_sided import TwoSided
     from .models.two_sided import TwoSided as two_sided
     from .ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, get_precision, set_precision
@@ -154,12 +157,12 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
-    "Direction", "FdezAguera", "Fresnel", "GonioError", "GonioWarning", "Index", "InputError", "Integrator",
-    "Interface", "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking", "Measured", "Metal", "Mirror",
-    "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter", "Phong", "Preset", "RandomWalk", "Sample",
-    "Scalar", "Spectrum", "Stretched", "Turquin", "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture",
-    "choice", "cluster", "compare", "compress", "emit", "file", "fit", "fits", "flag", "fresnel", "get_precision",
-    "index", "indices", "material", "materials", "measure", "method", "mix", "model", "models", "never", "number",
-    "ops", "plot", "refractive_index", "register", "render", "resume", "set_precision", "spectrum", "study",
-    "two_sided", "verify", "view", "width",
+    "Direction", "FdezAguera", "FilmConductor", "FilmDielectric", "Fresnel", "GonioError", "GonioWarning", "Index",
+    "InputError", "Integrator", "Interface", "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking",
+    "Measured", "Metal", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter", "Phong",
+    "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "ThinDielectric", "Turquin", "TwoSided",
+    "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare", "compress", "emit",
+    "file", "fit", "fits", "flag", "fresnel", "get_precision", "index", "indices", "material", "materials",
+    "measure", "method", "mix", "model", "models", "never", "number", "ops", "plot", "refractive_index", "register",
+    "render", "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

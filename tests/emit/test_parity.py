@@ -21,6 +21,8 @@ RUN = {"glsl": parity.run_glsl, "wgsl": parity.run_wgsl}
 
 # a sampled direction is found by Newton's method in float32 (Beckmann), or on a grazing pair sees its facet from behind
 SAMPLED = 3e-4
+# and the waves of a film magnify what rounding has done to the facet between two directions, most at grazing angles
+FRINGES = 3e-4
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,8 @@ def _check(page: Any, lang: str, name: str, side: int) -> None:
     verdicts = parity.judge(material, draws, got, [term["name"] for term in made.manifest["terms"]])
     assert {"eval", "pdf", "sample.wi", "sample.weight"} <= set(verdicts)
     for result, v in verdicts.items():
-        share = SAMPLED + 1.5 / len(draws.wo) if result.startswith("sample") else 0.0
+        share = SAMPLED if result.startswith("sample") else FRINGES if name.startswith("film") else 0.0
+        share += 1.5 / len(draws.wo) if share else 0.0
         inputs = {path: rows[v.draw].tolist() for path, rows in draws.fields.items()}
         where = f"{result} at {draws.wo[v.draw].tolist()}, {draws.wi[v.draw].tolist()}, u {draws.u[v.draw].tolist()}"
         text = f"{where}, {inputs}: {v.got} in the shader, {v.right} in float64, {v.ratio:.3g} of what is allowed"

@@ -48,8 +48,9 @@ def test_mean_weight_of_samples_is_at_most_one(name: str) -> None:
     material = SMALL[name]
     u = np.random.default_rng(SEED).random((50_000, 3))
     for degrees in (5, 70, 120):
-        weight = material.sample(np.tile(at(degrees), (len(u), 1)), u, "importance").weight.max(axis=1)
-        assert weight.mean() <= 1 + 5 * weight.std() / np.sqrt(len(u)) + 1e-5
+        weight = material.sample(np.tile(at(degrees), (len(u), 1)), u, "importance").weight
+        # each colour for itself: lobes that share one may be chosen by the mean
+        assert np.all(weight.mean(axis=0) <= 1 + 5 * weight.std(axis=0) / np.sqrt(len(u)) + 1e-5)
 
 
 def test_schlicks_masking_says_nothing_false_about_energy() -> None:

@@ -115,7 +115,7 @@ def test_thick_films_have_no_colour_in_fourier_space() -> None:
 
 @pytest.mark.parametrize("form", list(film.FORMS))
 def test_glass_under_a_film_keeps_all_light(form: str) -> None:
-    glass = go.model("film-dielectric")(1.5, 0.0, thickness=500.0, film_eta=2.2, form=form)
+    glass = go.FilmDielectric(1.5, 0.0, thickness=500.0, film_eta=2.2, form=form)
     wo = RNG.normal(size=(200, 3))
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
     s = glass.sample(wo, RNG.random((200, 3)), mode="importance", precision="float64")

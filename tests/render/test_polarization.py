@@ -8,6 +8,7 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.optics.fresnel import waves
 from gonio.render import engine
 
 from sphere import random_directions, random_numbers
@@ -172,6 +173,58 @@ def test_a_mirror_is_a_perfect_conductor() -> None:
     wi, got = sampled(mi.load_dict({"type": "gonio_mirror"}), np.abs(WO), mi.TransportMode.Radiance)
     near = truth(np.abs(WO), wi, 1e-9, 1e10)  # an index without end: r_s = -1, r_p = 1
     assert apart(got[0], near).max() < BAR
+
+
+def test_a_pane_has_the_matrices_of_all_its_bounces() -> None:
+    wi, got = sampled(mi.load_dict({"type": "gonio_thin_dielectric", "eta": 1.5}), WO, mi.TransportMode.Radiance)
+    cos = np.abs(WO[:, 2].astype(np.float64))
+    outside = go.fresnel(np.arccos(np.minimum(cos, 1.0)), 1.5)
+    inside = go.fresnel(np.arcsin(np.sqrt(1.0 - cos**2) / 1.5), 1 / 1.5)
+    back, on, inner = outside.reflection, outside.refraction, inside.reflection
+    out = inside.refraction
+    through, turns = np.zeros_like(back), np.tile(np.eye(4), (N, 1, 1))
+    reflected = back.copy()
+    for _ in range(200):
+        through += out @ turns @ on
+        reflected += out @ inner @ turns @ on
+        turns = inner @ inner @ turns
+    reflects = wi[:, 2] * WO[:, 2] > 0
+    own = np.where(reflects[:, None, None], reflected, through)
+    up = np.tile([0.0, 0.0, 1.0], (N, 1))
+    wo, wi = WO.astype(np.float64), wi.astype(np.float64)
+    wi = np.where(reflects[:, None], wo * [-1.0, -1.0, 1.0], -wo)
+    exact = rotator(cross_of(up, wo), wo) @ own @ rotator(cross_of(up, -wi), -wi).transpose(0, 2, 1)
+    exact *= (got[0, :, 0, 0] / exact[:, 0, 0])[:, None, None]
+    usual = cos > 0.02  # 200 bounces are not all where nearly all is reflected
+    assert reflects.any() and (~reflects).any()
+    assert apart(got[0][usual], exact[usual]).max() < BAR
+
+
+def test_a_film_polarizes_as_its_layers_do() -> None:
+    if not mi.is_spectral:
+        pytest.skip("of the waves at single wavelengths: a film in mono is a sum of many")
+    film = {"type": "gonio_film_conductor", "alpha": 0.3, "thickness": 400.0, "film_eta": 1.6, **INDEX}
+    wo, wi = np.abs(WO), np.abs(WI)
+    got = evaluated(mi.load_dict(film), wo, wi, mi.TransportMode.Radiance)
+    bare = evaluated(
+        mi.load_dict({"type": "gonio_conductor", "alpha": 0.3, **INDEX}), wo, wi, mi.TransportMode.Radiance
+    )
+    a, b = (w.astype(np.float64) / np.linalg.norm(w.astype(np.float64), axis=1, keepdims=True) for w in (wo, wi))
+    m = (a + b) / np.linalg.norm(a + b, axis=1, keepdims=True)
+    cos, sin2 = (m * a).sum(1), 1.0 - (m * a).sum(1) ** 2
+    into, out = rotator(cross_of(m, -b), -b), rotator(cross_of(m, a), a)
+    w2, w3 = np.sqrt(1.6**2 - sin2), np.sqrt((ETA + 1j * K) ** 2 - sin2)
+    for channel, nm in enumerate((450.0, 520.0, 600.0, 650.0)):
+        delta = 2 * np.pi * 400.0 * w2 / nm
+        fields = []
+        for x, y, z in ((cos, w2, w3), (cos, w2 / 1.6**2, w3 / (ETA + 1j * K) ** 2)):
+            top, other = np.cos(delta) - 1j * np.sin(delta) * z / y, z * np.cos(delta) - 1j * y * np.sin(delta)
+            fields.append((x * top - other) / (x * top + other))
+        s, p = fields
+        own = waves.mueller(np.abs(s) ** 2, np.abs(p) ** 2, s * np.conj(p))
+        uncoated = go.fresnel(np.arccos(cos), ETA, K).R
+        exact = out @ own @ into.transpose(0, 2, 1) * (bare[channel, :, 0, 0] / uncoated)[:, None, None]
+        assert apart(got[channel], exact).max() < 1e-4  # float32, and fringes
 
 
 # ---------------------------------------------------------------------- materials of materials

@@ -76,6 +76,10 @@ PAIRS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0},
         {"type": "gonio_dielectric", "alpha": 0.0, "eta": 1.5},
     ),
+    "thindielectric": (
+        {"type": "thindielectric", "int_ior": 1.5, "ext_ior": 1.0},
+        {"type": "gonio_thin_dielectric", "eta": 1.5, "bounces": "mean"},
+    ),
     "roughdielectric": (
         {"type": "roughdielectric", **ROUGH, "int_ior": 1.5, "ext_ior": 1.0},
         {"type": "gonio_dielectric", "alpha": 0.3, "eta": 1.5, "masking": "smith-separable"},
@@ -120,7 +124,7 @@ def test_plugins_give_what_mitsubas_give(variant: str, name: str) -> None:
     channels = {"rgb": 3, "mono": 1, "spectral": 4}[variant.split("_")[2]]
     assert ours[0].shape == (channels, N) and np.isfinite(ours[0]).all()
     np.testing.assert_allclose(ours[0], native[0], rtol=1e-3, atol=1e-6)
-    if name in ("conductor", "dielectric"):
+    if name in ("conductor", "dielectric", "thindielectric"):
         up = WO[:, 2] > 0.0 if name == "conductor" else np.full(N, True)
         np.testing.assert_allclose(ours[2][:, up], native[2][:, up], rtol=1e-4, atol=1e-6)
         np.testing.assert_allclose(ours[3][:, up], native[3][:, up], atol=1e-5)

@@ -147,7 +147,7 @@ class Dielectric(microfacet._Microfacet):
         """Probability of choosing reflection."""
         return f if self.transmission else 1.0 + 0.0 * f
 
-    def _over_chance(self, facet: _Facet, eta: Scalar, share: Scalar) -> Spectrum:
+    def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """albedo F or 1 - F of the lobe over the probability with which it is chosen, which is that where both are."""
         return self.albedo if self.transmission else self.albedo * self._reflectance_at(facet, eta)
 
@@ -195,7 +195,7 @@ class Dielectric(microfacet._Microfacet):
             value = value * squeeze
         chance = where(reflects, share, 1.0 - share)
         pdf = where(right_side, chance * density, 0.0)
-        tinted = self._over_chance(facet, eta, share) * where(pdf > 0.0, safe_div(value, density), 0.0)
+        tinted = self._over_chance(facet, eta) * where(pdf > 0.0, safe_div(value, density), 0.0)
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:

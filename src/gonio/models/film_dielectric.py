@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..optics.fresnel import film
 from ..optics.fresnel.polarization import Diattenuation, reflected_by_glass
 from .dielectric import Dielectric, _Facet
 from .film_conductor import FRESNELS, film_form, film_index, thickness_number
-from .material import InnerAlbedo, Microsurface
+from .material import Breach, InnerAlbedo, Microsurface
 from .parameters import Colour, Number, choice, number, spectrum
 
 
@@ -35,6 +36,9 @@ class FilmDielectric(Dielectric):
     form: str = film_form()
 
     reads_wavelengths: ClassVar[bool] = True
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "delta": Breach("it reflects as its film does, not as the bare index would", 1.0, certain=False)
+    }
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
@@ -56,9 +60,10 @@ class FilmDielectric(Dielectric):
     def _share(self, f: Spectrum) -> Scalar:  # type: ignore[override]
         return mean(f) if self.transmission else 1.0 + 0.0 * mean(f)
 
-    def _over_chance(self, facet: _Facet, eta: Scalar, share: Scalar) -> Spectrum:
+    def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """The lobes are chosen by their mean colours."""
-        f = self._reflectance_at(facet, eta)
+        f: Spectrum = self._reflectance_at(facet, eta)  # type: ignore[assignment]
+        share = self._share(f)
         if not self.transmission:
             return self.albedo * f
         return self.albedo * where(facet.reflects, safe_div(f, share), safe_div(1.0 - f, 1.0 - share))

@@ -28,10 +28,16 @@ def dielectric(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
     and below by the denominator: where eta is near 1 the differences would cancel, but by Snell's law
     cos_i^2 - eta^2 cos_t^2 = 1 - eta^2,  eta^2 cos_i^2 - cos_t^2 = (eta^2 - 1) ((eta^2 + 1) cos_i^2 - 1) / eta^2.
     """
+    r_s, r_p = amplitudes(cos_i, cos_t, eta)
+    return where(cos_t > 1e-15, 0.5 * (sqr(r_s) + sqr(r_p)), 1.0)
+
+
+def amplitudes(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> tuple[Scalar, Scalar]:
+    """(-r_s, r_p) of a dielectric, where it is no total reflection; see `dielectric`."""
     contrast = (eta - 1.0) * (eta + 1.0)
     r_s = contrast / sqr(cos_i + eta * cos_t)
     r_p = contrast * ((sqr(eta) + 1.0) * sqr(cos_i) - 1.0) / sqr(eta * (eta * cos_i + cos_t))
-    return where(cos_t > 1e-15, 0.5 * (sqr(r_s) + sqr(r_p)), 1.0)
+    return r_s, r_p
 
 
 @function

@@ -86,15 +86,15 @@ class Complex(NamedTuple):
 class Faces(NamedTuple):
     """The amplitudes of a film's faces, and half the way of a round trip through it.
 
-    top_s, top_p    of the face toward the light, real
-    base_s, base_p  of the surface under the film
-    way             d w2, in the unit of d
+    top    of the face toward the light, of s and of p; real
+    base   of the surface under the film
+    bare   of the surface without the film
+    way    d w2, in the unit of d
     """
 
-    top_s: Scalar
-    top_p: Scalar
-    base_s: Complex
-    base_p: Complex
+    top: tuple[Scalar, Scalar]
+    base: tuple[Complex, Complex]
+    bare: tuple[Complex, Complex]
     way: Scalar
 
 
@@ -102,16 +102,25 @@ class Faces(NamedTuple):
 def faces(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar) -> Faces:
     """Of a film of real index film_eta >= 1 on a base of index eta + i k."""
     sin2 = 1.0 - sqr(cos_i)
-    w2 = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
-    square = Complex(sqr(eta) - sqr(k), 2.0 * eta * k)
-    w = _root(square.re - sin2, eta * k)
-    n2 = sqr(film_eta)
-    base_s = Complex(w2 - w.re, -w.im).over(Complex(w2 + w.re, w.im))
-    down, up = square.scaled(w2), w.scaled(n2)
-    base_p = Complex(down.re - up.re, down.im - up.im).over(down.plus(up))
-    top_s = (cos_i - w2) / (cos_i + w2)
-    top_p = (n2 * cos_i - w2) / (n2 * cos_i + w2)
-    return Faces(top_s, top_p, base_s, base_p, thickness * w2)
+    inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
+    w = _root(sqr(eta) - sqr(k) - sin2, eta * k)
+    contrast = (1.0 - film_eta) * (1.0 + film_eta)
+    top_s = contrast / sqr(cos_i + inside)
+    top_p = -top_s * (cos_i * inside - sin2) / maximum(cos_i * inside + sin2, 1e-30)
+    loss = 2.0 * eta * k
+    base = _face(inside, w, Complex((film_eta - eta) * (film_eta + eta) + sqr(k), -loss), sin2)
+    bare = _face(cos_i, w, Complex((1.0 - eta) * (1.0 + eta) + sqr(k), -loss), sin2)
+    return Faces((top_s, top_p), base, bare, thickness * inside)
+
+
+def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tuple[Complex, Complex]:
+    """(r_s, r_p) between two media, a over b, with w = sqrt(n^2 - sin^2): r_s = (n_a^2 - n_b^2) / (w_a + w_b)^2 and
+    r_p = -r_s (w_a w_b - sin^2) / (w_a w_b + sin^2). Where the indices are near nothing cancels."""
+    both = Complex(above + below.re, below.im)
+    s = contrast.over(both.times(both))
+    product = below.scaled(above)
+    turned = Complex(sin2 - product.re, -product.im).over(Complex(sin2 + product.re, product.im))
+    return s, s.times(turned)
 
 
 def _root(real: Scalar, half_imaginary: Scalar) -> Complex:
@@ -133,15 +142,22 @@ class Amplitudes(NamedTuple):
 
 @function
 def airy(film: Faces, wavelength: Scalar | float) -> Amplitudes:
-    """The sum of all waves at a wavelength, in the unit of the thickness."""
+    """The sum of all waves at a wavelength, in the unit of the thickness.
+
+    Above the line stands r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), with r13 of the bare surface: it cancels only
+    where waves do.
+    """
     turns = 2.0 * film.way / wavelength
-    sin, cos = sincos((turns - floor(turns)) * (2.0 * math.pi))  # a shader's sine is good near 0 only
-    around = Complex(cos, sin)
-    s, p = film.base_s.times(around), film.base_p.times(around)
-    under_s = Complex(1.0 + film.top_s * s.re, film.top_s * s.im)
-    under_p = Complex(1.0 + film.top_p * p.re, film.top_p * p.im)
-    over_s, over_p = Complex(film.top_s + s.re, s.im), Complex(film.top_p + p.re, p.im)
-    return Amplitudes(over_s.over(under_s), over_p.over(under_p), under_s, under_p)
+    half_angle = (turns - floor(turns)) * math.pi  # a shader's sine is good near 0 only
+    sin, cos = sincos(half_angle)
+    less = Complex(-2.0 * sqr(sin), 2.0 * sin * cos)  # E - 1
+    over, under = [], []
+    for top, base, bare in zip(film.top, film.base, film.bare, strict=True):
+        inner = base.times(less)
+        once = Complex(1.0 + top * base.re, top * base.im)
+        over.append(bare.times(once).plus(inner))
+        under.append(once.plus(inner.scaled(top)))
+    return Amplitudes(over[0].over(under[0]), over[1].over(under[1]), *under)
 
 
 class Film(NamedTuple):
@@ -236,7 +252,8 @@ def _between(values: Sequence[Scalar], nm: float) -> Scalar:
         return values[0] if nm >= red else values[2]
     (a, low), (b, high) = ((2, blue), (1, green)) if nm < green else ((1, green), (0, red))
     share = (nm - low) / (high - low)
-    return values[a] * (1.0 - share) + values[b] * share
+    lower, upper = values[a] * (1.0 - share), values[b] * share
+    return lower + upper
 
 
 # ---------------------------------------------------------------------- in Fourier space
@@ -268,17 +285,17 @@ def _band(
     bells = [BELLS[band], SECOND_X] if band == 0 else [BELLS[band]]
     curves = [_curve(film.way, order, bells) for order in range(1, HARMONICS + 1)]
     mean, wave = 0.0 * cos_i, 0.0 * cos_i
-    for top, base in ((film.top_s, film.base_s), (film.top_p, film.base_p)):
+    for top, base in zip(film.top, film.base, strict=True):
         outer, inner = sqr(top), base.square
         passed = 1.0 - outer
-        all_ = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
-        mean = mean + 0.5 * (outer + all_)
+        bounced = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
+        mean = mean + 0.5 * (outer + bounced)
         once = base.scaled(-top)  # one round trip, without its way
         power = once
         for order, curve in enumerate(curves):
             if order:
                 power = power.times(once)
-            wave = wave + (all_ - passed) * power.times(curve).re
+            wave = wave + (bounced - passed) * power.times(curve).re
     return mean, wave
 
 
@@ -289,7 +306,8 @@ def _curve(way: Scalar, order: int, bells: Sequence[tuple[float, float, float]])
     found: list[Complex] = []
     for height, place, variance in bells:
         turns = path * place
-        sin, cos = sincos((turns - floor(turns)) * (2.0 * math.pi))
+        angle = (turns - floor(turns)) * (2.0 * math.pi)
+        sin, cos = sincos(angle)
         size = exp(sqr(path) * (-variance * (2.0 * math.pi) ** 2)) * (
             height * math.sqrt(2.0 * math.pi * variance) / INTEGRAL_Y
         )
