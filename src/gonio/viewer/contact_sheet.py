@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..errors import GonioWarning, InputError
 from ..models import notation
 from ..owner import public
-from ..render import checkpoints, exposures, images, passes, run
+from ..render import checkpoints, engine, exposures, images, passes, run
 from ..work import crew, parts
 from . import figures
 from .figures import Drawing
@@ -103,6 +103,7 @@ def study(
     sampler: str | None = None,
     seed: int | None = None,
     device: str = "cpu",
+    spectral: bool = False,
     threads: int | None = None,
     denoise: bool = False,
     exposure: exposures.Exposure = 0.0,
@@ -130,6 +131,7 @@ def study(
         sampler=sampler,
         seed=seed,
         device=device,
+        spectral=spectral,
         threads=threads,
         denoise=denoise,
         exposure=exposure,
@@ -138,7 +140,8 @@ def study(
     )
     variations = [Variation(path, tuple(values)) for path, values in vary.items()]
     tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)
-    return render_sheet(request, variations, None if output is None else Path(output), title, tell=tell)
+    with engine.put_back():
+        return render_sheet(request, variations, None if output is None else Path(output), title, tell=tell)
 
 
 def render_sheet(
