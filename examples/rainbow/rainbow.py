@@ -130,7 +130,7 @@ def main() -> None:
     rays = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000_000
     angles()
     shown = np.clip(1.055 * np.clip(picture(*profile(rays)), 1e-6, 1.0) ** (1.0 / 2.4) - 0.055, 0.0, 1.0)
-    matplotlib.image.imsave(HERE / "rainbow.png", shown)
+    matplotlib.image.imsave(HERE / "rainbow.jpg", shown, pil_kwargs={"quality": 90})
 
 
 if __name__ == "__main__":

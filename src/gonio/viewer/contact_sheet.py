@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..errors import GonioWarning, InputError
 from ..models import notation
 from ..owner import public
-from ..render import checkpoints, exposures, images, passes, run
+from ..render import checkpoints, engine, exposures, images, passes, run
 from ..work import crew, parts
 from . import figures
 from .figures import Drawing
@@ -103,6 +103,7 @@ def study(
     sampler: str | None = None,
     seed: int | None = None,
     device: str = "cpu",
+    spectral: bool = False,
     threads: int | None = None,
     spectral: bool = False,
     denoise: bool = False,
@@ -131,6 +132,7 @@ def study(
         sampler=sampler,
         seed=seed,
         device=device,
+        spectral=spectral,
         threads=threads,
         spectral=spectral,
         denoise=denoise,
@@ -140,7 +142,8 @@ def study(
     )
     variations = [Variation(path, tuple(values)) for path, values in vary.items()]
     tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)
-    return render_sheet(request, variations, None if output is None else Path(output), title, tell=tell)
+    with engine.put_back():
+        return render_sheet(request, variations, None if output is None else Path(output), title, tell=tell)
 
 
 def render_sheet(
