@@ -88,7 +88,7 @@ class Eon(BSDF):
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The mixture of the transformed cosine's density and the uniform one."""
         uniform = _uniform_share(wo.z, self.roughness)
-        cosine = _Clipped(*_coefficients(wo.z, self.roughness)).pdf(rotate(wi, frame.azimuth(wo)))
+        cosine = _Clipped(*_coefficients(wo, self.roughness)).pdf(rotate(wi, frame.azimuth(wo)))
         density = (1.0 - uniform) * cosine + uniform * (0.5 * inv_pi)
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
 
@@ -96,7 +96,7 @@ class Eon(BSDF):
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the uniform hemisphere or the clipped lobe."""
         r = self.roughness
-        lobe = rotate_back(_Clipped(*_coefficients(wo.z, r)).draw(u.y, u.z), frame.azimuth(wo))
+        lobe = rotate_back(_Clipped(*_coefficients(wo, r)).draw(u.y, u.z), frame.azimuth(wo))
         phi = (2.0 * ops.pi) * u.z
         sin, cos = ops.sincos(phi)
         flat = ops.safe_sqrt((1.0 - u.y) * (1.0 + u.y))
@@ -131,12 +131,17 @@ def _uniform_share(mu: Scalar, r: Scalar) -> Scalar:
 
 
 @function
-def _coefficients(mu: Scalar, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that takes a cosine to the lobe: their fit."""
+def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that takes a cosine to the lobe: their fit.
+
+    Theirs is in mu; near the normal b and d are differences of near numbers, so here they stand in 1 - mu.
+    """
+    mu = wo.z
+    low = sin2(wo) / (1.0 + ops.abs(mu))  # 1 - mu
     a = 1.0 + r * (0.303392 + (-0.518982 + 0.111709 * mu) * mu + (-0.276266 + 0.335918 * mu) * r)
-    b = r * (-1.16407 + 1.15859 * mu + (0.150815 - 0.150105 * mu) * r) / (mu * mu * mu - 1.43545)
+    b = r * ((0.00071 + 0.150105 * low) * r - (0.00548 + 1.15859 * low)) / (mu * mu * mu - 1.43545)
     c = 1.0 + (0.20013 + (-0.506373 + 0.261777 * mu) * mu) * r
-    d = r * (0.540852 + (-1.01625 + 0.475392 * mu) * mu) / (-1.0743 + mu * (0.0725628 + mu))
+    d = r * (0.000006 - (0.065466 + 0.475392 * low) * low) / (0.0017372 + (2.0725628 - low) * low)
     return a, b, c, d
 
 
