@@ -105,6 +105,11 @@ class Eon(BSDF):
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
 
+    def tint(self, wo: Direction) -> Spectrum:
+        """rho E_avg + rho_ms (1 - E_avg), the mean albedo."""
+        E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
+        return self.albedo * E_avg + self._again() * (1.0 - E_avg)
+
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
