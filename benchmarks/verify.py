@@ -51,12 +51,15 @@ def correct() -> dict[str, go.BSDF]:
         "mix with mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
         "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=0.3)),
     }
+    for name in ("eon", "modified-phong", "sheen", "sheen-charlie"):
+        found[name] = go.model(name)()
     found["measured"] = go.model("measured")()
     found["sum"] = go.model("sum")(go.Lambert(0.4), go.Conductor.preset("Au", alpha=0.3))
     for name in ("ashikhmin-shirley", "cook-torrance", "he-torrance", "lafortune", "low-microfacet", "low-smooth"):
         found[name] = go.model(name)()
     for name in ("shifted-gamma", "ward", "ward-duer"):
         found[name] = go.model(name)()
+    found["coat"] = go.model("coat")(go.Lambert((0.8, 0.5, 0.2)), absorption=(0.1, 0.3, 0.5))
     if "kulla-conty" in go.models():
         found["kulla-conty"] = go.model("kulla-conty")(go.Conductor.preset("Au", alpha=0.6))
     return found

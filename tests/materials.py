@@ -17,6 +17,11 @@ DIFFUSE = {
     "oren-nayar": go.OrenNayar(0.8, 0.4),
     "phong": go.Phong((0.3, 0.4, 0.5), 0.3, 20.0),
     "blinn-phong": go.BlinnPhong(0.2, (0.4, 0.5, 0.6), 60.0),
+    "modified-phong": go.model("modified-phong")((0.3, 0.4, 0.5), 0.4, 25.0),
+    "eon": go.model("eon")((0.9, 0.6, 0.3), 0.8),
+    "eon-fit": go.model("eon")((0.2, 1.0, 0.7), 0.5, energy="fit"),
+    "sheen": go.model("sheen")((0.9, 0.5, 0.7), 0.4),
+    "sheen-charlie": go.model("sheen-charlie")((0.9, 0.5, 0.7), 0.4),
 }
 HISTORIC = {
     "ward": go.Ward((0.1, 0.2, 0.3), (0.4, 0.3, 0.2), (0.1, 0.3), rotation=0.5),

@@ -23,16 +23,22 @@ COMPENSATED = {
     "turquin": go.Turquin(GOLD),
     "turquin-turned": go.Turquin(TURNED),
 }
+COATED = {
+    "coat": go.model("coat")(go.Lambert((0.8, 0.4, 0.2)), absorption=(0.1, 0.4, 0.9)),
+    "coat-on-metal": go.model("coat")(GOLD, 1.6),
+    "coat-on-mirror": go.model("coat")(go.Conductor.preset("Au", alpha=0.0), depth=0.5, absorption=0.3),
+}
 NESTED = {
     "mix-compensated": go.mix(go.KullaConty(GOLD), go.Conductor.preset("Au", alpha=0.3, ndf="beckmann"), 0.3),
     "two-sided-compensated": go.two_sided(go.KullaConty(GOLD)),
     "mix-of-mixes": go.mix(go.mix(go.Lambert(), go.Mirror(), 0.3), go.OrenNayar(), 0.2),
 }
 
-EVERY = {**materials.ALL, **COMPENSATED, **NESTED}
+EVERY = {**materials.ALL, **COMPENSATED, **COATED, **NESTED}
 # each model once, and what shapes its code most
 FEW = {
     **materials.SMALL,
     **{name: COMPENSATED[name] for name in COMPENSATED if name not in ("kulla-conty-sheet", "turquin-turned")},
+    **COATED,
     **NESTED,
 }

@@ -65,7 +65,7 @@ def guide_of(material: Material) -> Guide:
     """The guide of a material as it was made, found once and kept; raises InputError while Dr.Jit records a loop."""
     own = vars(material).get("_guide")
     if own is None:
-        plain = _plain(material)
+        plain = plain_values(material)
         kept = _kept(type(material))
         if plain not in kept:
             kept[plain] = find(plain)
@@ -84,10 +84,12 @@ def _kept(cls: type) -> OrderedDict[Material, Guide]:
 
 
 def prepare(material: Material) -> None:
-    """Find the guides of all materials in a tree that have no sampling of their own, before a loop is recorded."""
+    """Find what all materials in a tree need before a loop is recorded: guides of those that have no sampling of
+    their own, and tables."""
     for _, one in tree.walk(material):
         if one.guided:
             guide_of(one)
+        one.prepare()
 
 
 def find(material: Any) -> Guide:
@@ -250,7 +252,7 @@ class _Varying:
         return Axis(read, count)
 
 
-def _plain(material: Any) -> Any:
+def plain_values(material: Any) -> Any:
     """The material with NumPy's arrays for Dr.Jit's."""
     found: dict[str, Value] = {}
     for leaf in tree.leaves(material):

@@ -10,8 +10,8 @@ import numpy as np
 from .. import ops
 from ..ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
 from ..optics.frame import upright
-from ..optics.special import logrel, power_of_cosine
-from ..optics.warp import around, square_to_power_lobe
+from ..optics.special import logrel
+from ..optics.warp import around, power_about, square_to_power_lobe
 from .glossy import _Glossy, sum_breach
 from .material import Breach
 from .parameters import Colour, Number, number, spectrum
@@ -58,13 +58,6 @@ class Lafortune(_Glossy):
         return normalize(axis), exp(self.exponent * (-0.5 * missing * logrel(-missing)))
 
     @function
-    def _power(self, axis: Direction, wi: Direction) -> Scalar:
-        """(axis.wi)^n, from the distance of the two: near the peak their product has no digits left for a large n."""
-        off = wi - axis
-        versine = 0.5 * dot(off, off)
-        return power_of_cosine(dot(axis, wi), versine * (2.0 - versine), self.exponent)
-
-    @function
     def _focus(self) -> Scalar:
         """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the density of light at the peak against the cosine's."""
         return sqr(self.exponent / (self.exponent + 2.0))
@@ -74,13 +67,13 @@ class Lafortune(_Glossy):
         """specular (n + 2) / (2 pi) |C o|^n (axis.wi)^n cos theta_i."""
         axis, strength = self._axis(wo)
         norm = (self.exponent + 2.0) * (0.5 * inv_pi)
-        return self.specular * (norm * strength * self._power(axis, wi) * wi.z)
+        return self.specular * (norm * strength * power_about(axis, wi, self.exponent) * wi.z)
 
     @function
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """(n + 1) / (2 pi) (axis.wi)^n."""
         axis, _ = self._axis(wo)
-        return (self.exponent + 1.0) * (0.5 * inv_pi) * self._power(axis, wi)
+        return (self.exponent + 1.0) * (0.5 * inv_pi) * power_about(axis, wi, self.exponent)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:

@@ -257,6 +257,12 @@ class BSDF(Material):
         """Whether its parameters, inner ones too, must not vary from ray to ray: no textures, no arrays."""
         return any(inner.needs_uniform for inner in tree.children(self).values())
 
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Paths of the parameters that must not vary from ray to ray: tables are found from them once."""
+        found = {f"{name}.{path}" for name, inner in tree.children(self).items() for path in inner.fixed}
+        return frozenset(found)
+
     def normal_reflectance(self) -> Spectrum | None:
         """F0, the reflectance at normal incidence, its albedo included; None where there is no such thing."""
         return None

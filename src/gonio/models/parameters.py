@@ -85,6 +85,9 @@ class Material:
         """What follows from the parameters alone and is expensive to compute for every ray: a NamedTuple, or None."""
         return None
 
+    def prepare(self) -> None:
+        """Find what is found once from the parameters as they were given, such as tables: no loop can do it."""
+
     @property
     def is_bound(self) -> bool:
         """Whether this is a bound copy."""

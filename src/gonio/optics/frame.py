@@ -49,6 +49,15 @@ def rotate_back(w: Direction, rotation: Pair | None) -> Direction:
     return vec3(rotation.x * w.x - rotation.y * w.y, rotation.x * w.y + rotation.y * w.x, w.z)
 
 
+@function
+def azimuth(w: Direction) -> Pair:
+    """(cos, sin) of the azimuth of w, as `rotate` takes it; (1, 0) along the normal, which has none."""
+    length2 = sin2(w)
+    some = length2 > TINY
+    over = ops.rsqrt(ops.where(some, length2, 1.0))
+    return ops.vec2(ops.where(some, w.x * over, 1.0), ops.where(some, w.y * over, 0.0))
+
+
 def sin2(w: Direction) -> Scalar:
     """Squared sine of the angle to the normal, from x and y: 1 - z^2 would cancel near the normal."""
     return sqr(w.x) + sqr(w.y)

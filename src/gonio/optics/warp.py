@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from .. import ops
-from ..ops import Direction, Scalar, function, safe_sqrt, sincos, vec3
-from .special import exprel
+from ..ops import Direction, Scalar, dot, function, safe_sqrt, sincos, vec3
+from .special import exprel, power_of_cosine
 
 
 @function
@@ -39,6 +39,14 @@ def square_to_power_lobe(u1: Scalar, u2: Scalar, p: Scalar) -> Direction:
 def square_to_power_lobe_pdf(cos_theta: Scalar, p: Scalar) -> Scalar:
     """(p + 1) / (2 pi) cos(theta)^p above, 0 below; 1/sr."""
     return (p + 1.0) * (0.5 * ops.inv_pi) * ops.pow(cos_theta, p)
+
+
+@function
+def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
+    """(axis.w)^p, from the distance of the two: near the peak their product has no digits left for a large p."""
+    off = w - axis
+    versine = 0.5 * dot(off, off)
+    return power_of_cosine(dot(axis, w), versine * (2.0 - versine), p)
 
 
 @function

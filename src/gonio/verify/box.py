@@ -229,6 +229,8 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
     """
     found: list[tuple[float, dict[str, Any]]] = []
     for axis in along:
+        if axis.path in subject.model.fixed:  # tables would be found anew for each of a hundred values
+            continue
         # not from 0 where the steps are in ratio: the first is of another size than all others
         first = 1.0 / SCAN if axis.ratio and axis.low <= 0.0 else 0.0
         values = np.asarray(axis.at(np.linspace(first, 1.0, SCAN)), float)

@@ -246,7 +246,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
     """Parameters that differ from ray to ray, as textures make them: each ray as if all had its values."""
     if not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
         return
-    along = box.axes(subject)
+    along = [axis for axis in box.axes(subject) if axis.path not in subject.model.fixed]
     if not along:
         return
     odd = np.arange(len(wo)) % 2 == 1

@@ -1,0 +1,265 @@
+"""A clear or coloured coat over any material that reflects."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from ... import ops
+from ...errors import InputError
+from ...models import BSDF, Colour, Number, Sample, Width, binding, bsdf, method, microfacet, number, spectrum, tree
+from ...models import width as width_parameter
+from ...models.dielectric import Dielectric
+from ...models.material import Delta
+from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
+from ...optics import frame, fresnel
+from ...optics.warp import square_to_cosine_hemisphere
+from ..interior import Account, account_of
+
+ALMOST_ONE = 0.99999994  # the largest float32 under 1
+
+
+class Coat(BSDF):
+    """A dielectric layer over a base: light is reflected at the top, or refracted, dimmed on its slant way through the
+    layer, scattered by the base, and bounced between the two until it leaves.
+
+    f = f_top + T(o) T(i) t(o') t(i') / eta^2 [f_base(o', i') (1 + a k / (1 - a k)) + rest]
+
+    T = 1 - R is what the top lets through, o' and i' the refracted directions, t = exp(-absorption depth / cos) Beer's
+    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, and a
+    separable rest (`gonio.energy.interior` says how): over Lambert exact, over any base exact in albedo where nothing
+    is absorbed. a is the base's colour, its tint over that of its white twin. Reciprocal; white on white keeps all
+    light.
+
+    The base stands in the coat: an index of its own is over the coat's. A rough top reflects as rough glass does, by an
+    albedo R; refracted light is not blurred. k and the rest are tables found when the material is first asked. Colours
+    of the base may vary over the surface, and so may the coat's own colour and depth, as the tables hold polynomials in
+    u = exp(-absorption depth); no other value may, and derivatives leave the change of the tables out.
+    """
+
+    base: BSDF = bsdf("the material under the coat; it must not transmit")
+    index: Number = number(default=1.5, doc="index of the coat over the outside's", low=1.0, high=3.0)
+    alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
+    absorption: Colour = spectrum(default=0.0, doc="a crossing straight down leaves exp(-absorption depth)", low=0.0)
+    depth: Number = number(default=1.0, doc="how thick the coat is", low=0.0)
+    ndf: str = microfacet.ndf_choice()
+    masking: str = microfacet.masking_choice()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        name = type(self.base).__name__
+        if self.base.transmits:
+            raise InputError(f"{name} transmits, a material that only reflects expected", "Coat.base")
+        if self.base.delta == "maybe" or self.base.stochastic:
+            why = "is a mirror in places" if self.base.delta == "maybe" else "is random"
+            hint = "give it a width everywhere, or make all of it a mirror"
+            raise InputError(f"{name} {why}, one finite lobe or one mirror expected", "Coat.base", hint)
+        if self._mirror and microfacet.delta_of(self.alpha) != "always":
+            hint = "a narrow base, alpha = 0.01, under a rough coat; or a smooth coat"
+            raise InputError("a rough coat over a perfect mirror, which it would blur", "Coat.alpha", hint)
+        fixed = self.fixed
+        for leaf in tree.leaves(self):
+            if leaf.path in fixed and leaf.value is not None and leaf.parameter.rows(leaf.value) > 1:
+                what = f"{leaf.path} varies from ray to ray, yet tables are found from it once"
+                hint = "colours of the base may vary, and the coat's own absorption and depth"
+                raise InputError(what, f"Coat.{leaf.path}", hint)
+
+    # ------------------------------------------------------------------ what is known of the inside
+
+    def prepare(self) -> None:
+        """Find the tables, before a loop is recorded."""
+        account_of(self.plain)
+
+    @property
+    def _account(self) -> Account:
+        return account_of(self.plain)
+
+    @property
+    def _mirror(self) -> bool:
+        """Whether the base is a mirror, of which the series is known in closed form."""
+        return self.plain.base.delta == "always"
+
+    @property
+    def _top(self) -> Dielectric:
+        """The outside, as glass that only reflects."""
+        kind = Dielectric(transmission=False, ndf=self.ndf, masking=self.masking)
+        one = 1.0 + 0.0 * self.absorption
+        return binding.bound_copy(kind, {"eta": self.index, "alpha": self.alpha, "rotation": None, "albedo": one})
+
+    # ------------------------------------------------------------------ formulas
+
+    @function
+    def _through(self, w: Direction) -> Scalar:
+        """What the base's lobe is multiplied by at each end: T by Fresnel's equations; of a rough top the table's."""
+        _, smooth = microfacet.widths(self.alpha)
+        return where(smooth, 1.0 - self._fresnel(w), self._at(w)[2])
+
+    @function
+    def _fresnel(self, w: Direction) -> Scalar:
+        """R of a smooth top."""
+        cos = ops.abs(w.z)
+        return fresnel.kind("exact").dielectric(cos, fresnel.cos_transmitted(cos, self.index), self.index)
+
+    def _at(self, w: Direction) -> tuple[Scalar, ...]:
+        """The coat's table at a direction outside."""
+        table = self._account.coat
+        return ops.lookup(table, ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0]))
+
+    @function
+    def _inside(self, w: Direction) -> Direction:
+        """The refracted direction, away from the base."""
+        over = 1.0 / self.index
+        return ops.vec3(w.x * over, w.y * over, ops.safe_sqrt(1.0 - frame.sin2(w) * sqr(over)))
+
+    @function
+    def _crossed(self) -> Spectrum:
+        """u: what one crossing leaves, straight down."""
+        return exp(self.absorption * (-self.depth))
+
+    @function
+    def _left(self, inner: Direction) -> Spectrum:
+        """t: what a crossing along a direction inside leaves."""
+        return exp(self.absorption * (-self.depth / maximum(inner.z, 1e-4)))
+
+    @function
+    def _rest(self, w: Direction, a: Spectrum) -> Spectrum:
+        """The separable lobe at a direction outside, over a base of colour a there."""
+        table = self._account.rest
+        values, u = ops.lookup(table, ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])), self._crossed()
+        b, more_b, p, more_p = values[-4:]
+        return _polynomial(u, values[:-4]) * _kept(a, u * more_b + b, u * more_p + p)
+
+    def _again(self, like: Direction) -> tuple[Spectrum, ...]:
+        """k, b and p of the rest, the lobe's factor."""
+        values = ops.fetch(self._account.again, 0.0 * like.z)
+        count, u = len(values) // 4, self._crossed()
+        return tuple(_polynomial(u, values[n * count : (n + 1) * count]) for n in range(4))
+
+    def _colour(self, inner: Direction) -> Spectrum:
+        """a: the base's colour along a direction inside, its tint over that of the white base; of a base that is its
+        own white twin, over the mean of its channels."""
+        tint = self.base.tint(inner) * (1.0 + 0.0 * self.absorption)
+        white = self.base.white()
+        if white is self.base:
+            return ops.safe_div(tint, mean(tint))
+        return clamp(ops.safe_div(tint, white.tint(inner) * (1.0 + 0.0 * self.absorption)), 0.0, 1.0)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The top's lobe and the base's light, times cos theta_i."""
+        if self._mirror:
+            return self._top.eval(wo, wi, mode)
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        top = self._top.eval(wo, wi, mode) + self._at(wo)[3] * self._at(wi)[3] * wi.z
+        o, i = self._inside(wo), self._inside(wi)
+        a_o, a_i = self._colour(o), self._colour(i)
+        a = 0.5 * (a_o + a_i)
+        k, b, p, factor = self._again(wo)
+        crossed = self._left(o) * self._left(i) * (self._through(wo) * self._through(wi) / sqr(self.index))
+        lobe = self.base.eval(o, i, mode) * (wi.z / maximum(i.z, frame.TINY))
+        lobe = lobe * crossed * (factor / maximum(1.0 - a * k, 0.01))
+        rest = self._rest(wo, a_o) * self._rest(wi, a_i) * (wi.z / maximum(_kept(a, b, p), 1e-4))
+        return where(above, top + lobe + rest, 0.0)
+
+    @function
+    def _shares(self, wo: Direction) -> Pair:
+        """(probability of the top, that of a cosine among the rest): the cosine finds what the base sends back totally,
+        whose samples fail."""
+        reflected, total, _, beyond = self._at(wo)
+        _, smooth = microfacet.widths(self.alpha)
+        reflected = where(smooth, self._fresnel(wo), reflected)
+        inner = self._inside(wo)
+        tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
+        below = (1.0 - reflected) * mean(self._left(inner) * tint) + 2.0 * beyond
+        top = clamp(ops.safe_div(reflected, reflected + below), 0.02, 1.0)
+        cosine = 0.0 * total if self._mirror else clamp(1.7 * total, 0.05, 0.95)
+        return ops.vec2(top, cosine)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The mixture of the top's lobe, the cosine, and the base's density as it is refracted."""
+        shares = self._shares(wo)
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        top = self._top.pdf(wo, wi)
+        if self._mirror:
+            return 0.0 * top
+        o, i = self._inside(wo), self._inside(wi)
+        base = self.base.pdf(o, i) * wi.z / (sqr(self.index) * maximum(i.z, frame.TINY))
+        below = shares.y * wi.z * inv_pi + (1.0 - shares.y) * base
+        return where(above, shares.x * top + (1.0 - shares.x) * below, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks the top, the cosine or the base; what the base would send into total reflection is a failure."""
+        shares = self._shares(wo)
+        on_top = u.x < shares.x
+        first = ops.minimum(ops.safe_div(u.x - shares.x, 1.0 - shares.x), ALMOST_ONE)
+        by_cosine = first < shares.y
+        second = ops.minimum(ops.safe_div(first - shares.y, 1.0 - shares.y), ALMOST_ONE)
+        o = self._inside(wo)
+        s_top = self._top.sample(wo, u, mode)
+        s_base = self.base.sample(where(wo.z > 0.0, o, -o), ops.vec3(maximum(second, 0.0), u.y, u.z), mode)
+        # out of the coat: tangential parts grow by eta
+        x, y = s_base.wi.x * self.index, s_base.wi.y * self.index
+        height2 = 1.0 - (sqr(x) + sqr(y))
+        leaves = (height2 > 0.0) & (s_base.wi.z > 0.0) & (s_base.pdf > 0.0)
+        refracted = ops.vec3(where(leaves, x, 0.0), where(leaves, y, 0.0), where(leaves, ops.safe_sqrt(height2), -1.0))
+        if self._mirror:
+            refracted, leaves = frame.mirror(wo), s_base.pdf > 0.0
+        cosine = square_to_cosine_hemisphere(u.y, u.z)
+        wi = where(on_top, s_top.wi, where(by_cosine, cosine, refracted))
+        from_top = on_top & s_top.delta
+        from_base = ~on_top & ~by_cosine & s_base.delta & leaves
+        delta = from_top | from_base
+        density = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, density)
+        weight = where(from_top, s_top.weight * ops.safe_div(1.0, shares.x), weight)
+        ideal = where(from_top, shares.x * s_top.pdf, (1.0 - shares.x) * (1.0 - shares.y) * s_base.pdf)
+        if self._mirror:
+            weight = where(from_base, s_base.weight * self._bounced(wo, o), weight)
+            weight = where(from_base, weight * ops.safe_div(1.0, (1.0 - shares.x) * (1.0 - shares.y)), weight)
+        pdf = where((wo.z > 0.0) & (wi.z > 0.0), where(delta, ideal, density), 0.0)
+        return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), 1.0 + 0.0 * pdf)
+
+    @function
+    def _bounced(self, wo: Direction, inner: Direction) -> Spectrum:
+        """T^2 t^2 / (1 - a k) of a mirror, k = (1 - T) t^2."""
+        through, left2 = self._through(wo), sqr(self._left(inner))
+        k = (1.0 - through) * left2
+        return sqr(through) * left2 / (1.0 - k * clamp(self.base.tint(inner) * (1.0 + 0.0 * k), 0.0, 1.0))
+
+    def white(self) -> Self:
+        """Over the white base, and without absorption."""
+        white = self.base.white()
+        values = {"base": white, "absorption": self.absorption * 0.0 if self.is_bound else 0.0}
+        return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """What the tables are found from: all but colours of the base, and the coat's own colour and depth."""
+        numeric = [leaf for leaf in tree.leaves(self.plain.base) if leaf.parameter.numeric]
+        return frozenset({"index", "alpha"} | {f"base.{leaf.path}" for leaf in numeric if leaf.parameter.white is None})
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """R, and what is left of the base's."""
+        through = self._through(wo)
+        return (1.0 - through) + through * sqr(self._left(self._inside(wo))) * self.base.tint(self._inside(wo))
+
+    @property
+    def delta(self) -> Delta:
+        top = microfacet.delta_of(self.plain.alpha)
+        return "always" if self._mirror else "never" if top == "never" else "maybe"
+
+
+@function
+def _kept(a: Spectrum, b: Spectrum, p: Spectrum) -> Spectrum:
+    """phi(a) = a (1 - b) + b a^2 (1 - p) / (1 - a p): what a colour a of the base leaves of the rest."""
+    return a * (1.0 - b + b * a * (1.0 - p) / (1.0 - a * p))
+
+
+@function
+def _polynomial(u: Spectrum, coefficients: tuple[Scalar, ...]) -> Spectrum:
+    """c_0 + c_1 u + c_2 u^2 + ..."""
+    value = 0.0 * u + coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        value = value * u + c
+    return value
