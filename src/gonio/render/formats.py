@@ -10,6 +10,7 @@ attributes. Radiance is read here altogether, since Mitsuba's reader writes past
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import struct
 import zlib
@@ -201,6 +202,24 @@ def _exr(content: bytes) -> Claimed:
     return Claimed(right - left + 1, bottom - top + 1, bits)
 
 
+# Bytes of an attribute's type (OpenEXR, "File layout"). The library reads as many whatever the file says, and takes what
+# follows, at the wrong place, for names and sizes of blocks to allocate.
+_EXR_BYTES = {
+    **{
+        "box2f": 16,
+        "box2i": 16,
+        "chromaticities": 32,
+        "compression": 1,
+        "double": 8,
+        "envmap": 1,
+        "float": 4,
+        "int": 4,
+    },
+    **{"keycode": 28, "lineOrder": 1, "m33d": 72, "m33f": 36, "m44d": 128, "m44f": 64, "rational": 8, "tiledesc": 9},
+    **{"timecode": 8, "v2d": 16, "v2f": 8, "v2i": 8, "v3d": 24, "v3f": 12, "v3i": 12},
+}
+
+
 def exr_attributes(content: bytes) -> Iterator[tuple[str, str, bytes]]:
     """Name, type and value of each attribute of an OpenEXR file's (first) header. Raises Unreadable."""
     version = struct.unpack("<I", content[4:8])[0]
@@ -220,7 +239,12 @@ def exr_attributes(content: bytes) -> Iterator[tuple[str, str, bytes]]:
         size = struct.unpack("<i", content[at : at + 4])[0]
         if not 0 <= size <= len(content) - at - 4:
             raise Unreadable(f"its attribute '{texts[0]}' is longer than the file")
-        yield texts[0], texts[1], content[at + 4 : at + 4 + size]
+        if size != _EXR_BYTES.get(texts[1], size):
+            raise Unreadable(f"its attribute '{texts[0]}' has {size} bytes, {texts[1]} has {_EXR_BYTES[texts[1]]}")
+        value = content[at + 4 : at + 4 + size]
+        if texts[1] == "preview" and (size < 8 or size != 8 + 4 * math.prod(struct.unpack("<II", value[:8]))):
+            raise Unreadable(f"its attribute '{texts[0]}' is no preview of the size that it says")
+        yield texts[0], texts[1], value
         at += 4 + size
 
 

@@ -112,7 +112,7 @@ class Exposure(Part):
 class Shot(Part):
     """A photograph: one picture, or a series of several exposures of one view."""
 
-    file: str | None = None
+    file: str | None = Field(default=None, min_length=1)
     seconds: Positive | None = None
     exposures: list[Exposure] = Field(default_factory=list)
     light: str = "lamp"
