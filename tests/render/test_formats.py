@@ -78,6 +78,11 @@ def test_headers_that_contradict_their_file_are_refused(tmp_path: Path) -> None:
     assert "lacks 'compression'" in refused(exr.replace(b"compression\0", b"compressiom\0"))
     at = exr.index(b"compression\0") + len(b"compression\0compression\0")
     assert "longer than the file" in refused(exr[:at] + struct.pack("<i", 2**30) + exr[at + 4 :])
+    at = exr.index(b"pixelAspectRatio\0float\0") + len(b"pixelAspectRatio\0float\0")
+    longer = struct.pack("<i", 329) + exr[at + 4 : at + 8] + bytes(325)
+    assert "has 329 bytes, float has 4" in refused(exr[:at] + longer + exr[at + 8 :])
+    preview = b"preview\0preview\0" + struct.pack("<iII", 8, 1 << 15, 1 << 15)
+    assert "no preview of the size" in refused(exr[:8] + preview + exr[8:])
     assert "unknown version" in refused(exr[:4] + b"\x03" + exr[5:])
     assert "XYZ" in refused(radiance(9, 1, b"").replace(b"rgbe", b"xyze"))
 

@@ -202,21 +202,26 @@ def _exr(content: bytes) -> Claimed:
     return Claimed(right - left + 1, bottom - top + 1, bits)
 
 
-# Bytes of an attribute's type (OpenEXR, "File layout"). The library reads as many whatever the file says, and takes what
-# follows, at the wrong place, for names and sizes of blocks to allocate.
+# Bytes of an attribute's type (OpenEXR, "File layout"). The library reads as many whatever the file says, and takes
+# what follows, at the wrong place, for names and sizes of blocks to allocate.
 _EXR_BYTES = {
-    **{
-        "box2f": 16,
-        "box2i": 16,
-        "chromaticities": 32,
-        "compression": 1,
-        "double": 8,
-        "envmap": 1,
-        "float": 4,
-        "int": 4,
-    },
-    **{"keycode": 28, "lineOrder": 1, "m33d": 72, "m33f": 36, "m44d": 128, "m44f": 64, "rational": 8, "tiledesc": 9},
-    **{"timecode": 8, "v2d": 16, "v2f": 8, "v2i": 8, "v3d": 24, "v3f": 12, "v3i": 12},
+    kind: size
+    for size, kinds in {
+        1: "compression envmap lineOrder",
+        4: "float int",
+        8: "double rational timecode v2f v2i",
+        9: "tiledesc",
+        12: "v3f v3i",
+        16: "box2f box2i v2d",
+        24: "v3d",
+        28: "keycode",
+        32: "chromaticities",
+        36: "m33f",
+        64: "m44f",
+        72: "m33d",
+        128: "m44d",
+    }.items()
+    for kind in kinds.split()
 }
 
 
