@@ -141,7 +141,7 @@ def balls() -> None:
     axes = figure.subplots(2, len(shown))
     for column, nm in enumerate(shown):
         oxide = go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))
-        skin = go.FilmDielectric(1.0001, 0.0, film_eta=1.33, thickness=2.0 * nm)
+        skin = go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=2.0 * nm)
         for row, (material, thickness) in enumerate(((oxide, nm), (skin, 2 * nm))):
             axes[row, column].imshow(encoded(go.render(material, size=(110, 110), spp=64)))
             axes[row, column].set_title(f"{thickness} nm", fontsize=8)
@@ -160,7 +160,7 @@ PAGE = """# Thin films
 `film-conductor` and `film-dielectric` carry a clear film of `thickness` nm and index `film_eta` on every facet.
 
     gonio render "film-conductor(preset=Cr,alpha=.15,thickness=400)" -o heat.png
-    gonio plot "film-dielectric(eta=1.0001,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
+    gonio plot "film-dielectric(eta=1,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
 
 ![Titanium under its oxide, index 2.3, above; a bubble's skin, index 1.33, below](images/films.jpg)
 
