@@ -126,9 +126,7 @@ def picture(truth: Floats, models: dict[str, Floats]) -> None:
     for axis, symbol in zip(axes, shown, strict=True):
         place = SYMBOLS.index(symbol)
         rows = [truth[0, place, :, 0], *(models[form][0, place, :, 0] for form in FORMS)]
-        linear = np.clip(np.stack(rows) @ colour.XYZ_TO_RGB.T, 0.0, 1.0)
-        encoded = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-        axis.imshow(encoded, aspect="auto", interpolation="nearest")
+        axis.imshow(encoded(np.stack(rows) @ colour.XYZ_TO_RGB.T), aspect="auto", interpolation="nearest")
         axis.set_yticks(range(3), ["exact", *FORMS.values()], fontsize=8)
         axis.set_xticks(range(len(THICKNESSES)), [f"{t:g}" for t in THICKNESSES], fontsize=8)
         axis.set_title(f"{METALS[symbol].name} under a film of index {FILMS[0]}, from above", fontsize=9, loc="left")
@@ -136,12 +134,35 @@ def picture(truth: Floats, models: dict[str, Floats]) -> None:
     figure.savefig(HERE / "images" / "thin-film.png", dpi=130)
 
 
+def balls() -> None:
+    """Titanium under its oxide, and the skin of a bubble, over the thickness."""
+    shown = (0, 25, 50, 100, 160, 220, 300, 450)
+    figure = Figure(figsize=(9.6, 2.9), layout="constrained")
+    axes = figure.subplots(2, len(shown))
+    for column, nm in enumerate(shown):
+        oxide = go.FilmConductor.preset("Ti", alpha=0.12, film_eta=2.3, thickness=float(nm))
+        skin = go.FilmDielectric(1.0, 0.0, film_eta=1.33, thickness=2.0 * nm)
+        for row, (material, thickness) in enumerate(((oxide, nm), (skin, 2 * nm))):
+            axes[row, column].imshow(encoded(go.render(material, size=(110, 110), spp=64)))
+            axes[row, column].set_title(f"{thickness} nm", fontsize=8)
+            axes[row, column].axis("off")
+    figure.savefig(HERE / "images" / "films.jpg", dpi=130)
+
+
+def encoded(linear: Floats) -> Floats:
+    """Linear sRGB as a screen wants it."""
+    held = np.clip(linear, 0.0, 1.0)
+    return np.asarray(np.where(held < 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055))
+
+
 PAGE = """# Thin films
 
 `film-conductor` and `film-dielectric` carry a clear film of `thickness` nm and index `film_eta` on every facet.
 
     gonio render "film-conductor(preset=Cr,alpha=.15,thickness=400)" -o heat.png
-    gonio plot "film-dielectric(eta=1.0001,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
+    gonio plot "film-dielectric(eta=1,film_eta=1.33,thickness=350,alpha=0)" --kind albedo     # a soap bubble
+
+![Titanium under its oxide, index 2.3, above; a bubble's skin, index 1.33, below](images/films.jpg)
 
 At one wavelength the waves from both faces add up to r = (r12 + r23 e^(i delta)) / (1 + r12 r23 e^(i delta)), as the
 characteristic matrix of a layer has it (1e-12, `tests/optics/test_film.py`); spectral variants render that. Three
@@ -180,6 +201,7 @@ Made by `python docs/make_thin_film.py`.
 
 def main() -> None:
     check()
+    balls()
     truth = np.zeros((len(FILMS), len(SYMBOLS), len(THICKNESSES), len(ANGLES), 3))
     models = {form: np.zeros_like(truth) for form in FORMS}
     for i, film in enumerate(FILMS):

@@ -76,7 +76,7 @@ def _rough() -> dict[str, go.BSDF]:
     )
     found["film-on-gold"] = go.FilmConductor.preset("Au", alpha=0.3, thickness=650.0, film_eta=1.6)
     found["film-on-glass"] = go.FilmDielectric(1.5, 0.3, thickness=350.0, film_eta=2.0)
-    found["film-bubble"] = go.FilmDielectric(1.0001, 0.2, thickness=500.0, film_eta=1.33, form="belcour-barla")
+    found["film-bubble"] = go.FilmDielectric(1.2, 0.2, thickness=500.0, film_eta=1.33, form="belcour-barla")
     found["glass-turned"] = go.Dielectric(1.33, (0.1, 0.5), rotation=-0.7)
     found["glass-dense"] = go.Dielectric(2.42, 0.2)
     found["glass-bubble"] = go.Dielectric(0.7, 0.2)

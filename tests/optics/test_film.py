@@ -129,6 +129,16 @@ def test_glass_under_a_film_keeps_all_light(form: str) -> None:
     assert np.ptp(low.weight * low.pdf[:, None], axis=1).max() > 0.05, "it has colours"
 
 
+def test_the_skin_of_a_bubble_reflects_and_lets_pass_straight_on() -> None:
+    skin = go.FilmDielectric(1.0, 0.3, thickness=350.0, film_eta=1.33)
+    wo = np.array([[0.0, 0.6, 0.8], [0.0, 0.6, -0.8]])
+    back, on = (skin.sample(wo, np.tile([u, 0.5, 0.5], (2, 1)), precision="float64") for u in (1e-9, 0.999999))
+    np.testing.assert_allclose(back.wi, wo * [-1, -1, 1], atol=1e-12)
+    np.testing.assert_allclose(on.wi, -wo, atol=1e-12)
+    np.testing.assert_allclose(back.weight * back.pdf[:, None] + on.weight * on.pdf[:, None], 1.0, atol=1e-12)
+    assert 0.01 < (back.weight * back.pdf[:, None]).min() < (back.weight * back.pdf[:, None]).max() < 0.12
+
+
 @pytest.mark.parametrize(
     ("name", "values", "text"),
     [

@@ -71,7 +71,7 @@ def test_an_inner_material_is_made_no_delta_lobe_where_the_outer_says_that_it_ha
 def test_every_name_of_a_choice_is_tried() -> None:
     places = box.places(subject.of(go.Conductor(alpha=0.3)), EFFORTS["deep"], 1)
     named = [place.values for place in places if place.why == "choice"]
-    assert {"ndf": "beckmann"} in named and {"fresnel": "one"} in named and {"sampling": "bounded"} in named
+    assert {"ndf": "beckmann"} in named and {"fresnel": "f82"} in named and {"sampling": "bounded"} in named
     assert "ndf = beckmann" in box.covered(subject.of(go.Conductor()), places)
 
 

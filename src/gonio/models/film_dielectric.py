@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..ops import Mask, Scalar, Spectrum, function, mean, safe_div, sqr, where
+from ..ops import Mask, Scalar, Spectrum, abs, function, mean, safe_div, sqr, where
 from ..optics import fresnel
 from ..optics.fresnel import average as mean_over_angles
 from ..optics.fresnel import film
@@ -62,7 +62,11 @@ class FilmDielectric(Dielectric):
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """The lobes are chosen by their mean colours."""
-        f: Spectrum = self._reflectance_at(facet, eta)  # type: ignore[assignment]
+        _, smooth = self._widths()  # where no index bends the light, no facet can be told from its directions
+        cos_o, cos_i = (
+            where(smooth, abs(w.z), abs(dot)) for w, dot in ((facet.wo, facet.dot_o), (facet.wi, facet.dot_i))
+        )
+        f = self.reflectance(cos_o, where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
         share = self._share(f)
         if not self.transmission:
             return self.albedo * f

@@ -45,6 +45,7 @@ FORMS = {
 # 390 to 770 nm by 20: fringes of a film of 1 um are 100 nm apart, of 3 um 35 nm
 NODES = np.arange(390.0, 771.0, 20.0)
 WEIGHTS = colour.weights(NODES)
+PART = 5  # of them in a function: a shader's stay short
 
 # Fits of the observer's curves over wave numbers (Belcour2017, supplemental code): height, place and variance, the
 # second bell of x last. Divided by the integral of y
@@ -180,11 +181,16 @@ class Film(NamedTuple):
 
 def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
     """R of unpolarized light under cos_i, by the form of the film; at the rays' wavelengths where these are known."""
-    if film.wavelengths is None and film.form == "belcour-barla":
-        return _in_fourier_space(cos_i, film)
-    seen = _seen(film, lambda eta, k, nm: _unpolarized(cos_i, eta, k, film.film_eta, film.thickness, nm))
+    index = film.eta, film.k, film.film_eta, film.thickness
+    if film.wavelengths is not None:
+        return _seen(film, lambda eta, k, nm: _unpolarized(cos_i, eta, k, film.film_eta, film.thickness, nm))
+    if film.form == "belcour-barla":
+        return _in_fourier_space(cos_i, *index)
+    first, *others = [_part(cos_i, *index, start) for start in range(0, len(NODES), PART)]
+    for part in others:
+        first = first + part
     # colours that no three lights mix would be more than all, or less than nothing
-    return seen if film.wavelengths is not None else clamp(seen, 0.0, 1.0)
+    return clamp(first, 0.0, 1.0)
 
 
 def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
@@ -225,22 +231,38 @@ def _unpolarized(
     return 0.5 * (waves.s.square + waves.p.square)
 
 
-def _seen(film: Film, at: Callable[[Scalar, Scalar, Scalar | float], Scalar]) -> Spectrum:
-    """What `at` gives for eta, k and a wavelength: one for each channel of a spectrum, else as a colour under daylight.
+@function
+def _part(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scalar, thickness: Scalar, start: int) -> Spectrum:
+    """What some wavelengths add to the colour of R."""
 
-    The indices of red, green and blue stand for `RGB_WAVELENGTHS`; between them they are straight, beyond them level.
-    """
-    etas, ks = channels(film.eta), channels(film.k)
-    if film.wavelengths is not None:
-        values = [at(*one) for one in zip(etas, ks, channels(film.wavelengths), strict=True)]
-        return of_channels(film.eta, values)
+    def at(eta: Scalar, k: Scalar, nm: Scalar | float) -> Scalar:
+        return _unpolarized(cos_i, eta, k, film_eta, thickness, nm)
+
+    return _sum(eta, k, range(start, start + PART), at)
+
+
+def _seen(film: Film, at: Callable[[Scalar, Scalar, Scalar | float], Scalar]) -> Spectrum:
+    """What `at` gives for eta, k and a wavelength: one for each channel of a spectrum, else a colour under daylight."""
+    if film.wavelengths is None:
+        return _sum(film.eta, film.k, range(len(NODES)), at)
+    triples = zip(channels(film.eta), channels(film.k), channels(film.wavelengths), strict=True)
+    return of_channels(film.eta, [at(*one) for one in triples])
+
+
+def _sum(
+    eta: Spectrum, k: Spectrum, nodes: Sequence[int], at: Callable[[Scalar, Scalar, Scalar | float], Scalar]
+) -> Spectrum:
+    """The colour of what `at` gives at some of the nodes. The indices of red, green and blue stand for
+    `RGB_WAVELENGTHS`; between them they are straight, beyond them level."""
+    etas, ks = channels(eta), channels(k)
     mixing = WEIGHTS if len(etas) == 3 else (WEIGHTS @ colour.LUMINANCE)[:, None]
     totals: list[Scalar] = []
-    for nm, shares in zip(NODES, mixing, strict=True):
-        found = at(_between(etas, float(nm)), _between(ks, float(nm)), float(nm))
-        terms = [found * float(share) for share in shares]
+    for node in nodes:
+        nm = float(NODES[node])
+        R = at(_between(etas, nm), _between(ks, nm), nm)
+        terms = [R * float(share) for share in mixing[node]]
         totals = [total + term for total, term in zip(totals, terms, strict=True)] if totals else terms
-    return of_channels(film.eta, totals)
+    return of_channels(eta, totals)
 
 
 def _between(values: Sequence[Scalar], nm: float) -> Scalar:
@@ -259,52 +281,61 @@ def _between(values: Sequence[Scalar], nm: float) -> Scalar:
 # ---------------------------------------------------------------------- in Fourier space
 
 
-def _in_fourier_space(cos_i: Scalar, film: Film) -> Spectrum:
+@function
+def _in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scalar, thickness: Scalar) -> Spectrum:
     """Belcour2017, eq. 6 to 10, the mean term kept as a colour; harmonics of red, green and blue indices are taken for
     those of x, y and z."""
-    etas, ks = channels(film.eta), channels(film.k)
-    means: list[Scalar] = []
-    waves: list[Scalar] = []
-    for band, (eta, k) in enumerate(zip(etas, ks, strict=True)):
-        mean, wave = _band(cos_i, eta, k, film.film_eta, film.thickness, band if len(etas) == 3 else 1)
-        means.append(mean)
-        waves.append(wave)
-    if len(etas) == 3:
-        scaled = [wave * white for wave, white in zip(waves, WHITE, strict=True)]
-        waves = [sum((w * float(m) for w, m in zip(scaled[1:], row[1:], strict=True)), scaled[0] * float(row[0]))
-                 for row in colour.XYZ_TO_RGB]  # fmt: skip
-    total = [mean + wave for mean, wave in zip(means, waves, strict=True)]
-    return clamp(of_channels(film.eta, total), 0.0, 1.0)
+    etas, ks = channels(eta), channels(k)
+    if len(etas) != 3:
+        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, 1)
+        return clamp(of_channels(eta, [luminance.mean + luminance.wave]), 0.0, 1.0)
+    x = _band(cos_i, etas[0], ks[0], film_eta, thickness, 0)
+    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, 1)
+    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, 2)
+    X, Y, Z = (band.wave * white for band, white in zip((x, y, z), WHITE, strict=True))
+    waves = [X * float(row[0]) + Y * float(row[1]) + Z * float(row[2]) for row in colour.XYZ_TO_RGB]
+    total = [band.mean + wave for band, wave in zip((x, y, z), waves, strict=True)]
+    return clamp(of_channels(eta, total), 0.0, 1.0)
 
 
-def _band(
-    cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar, band: int
-) -> tuple[Scalar, Scalar]:
-    """(the mean of R over wavelengths, what the observer's curve sees of its waves), mean of both polarizations."""
+class Band(NamedTuple):
+    """What one curve of the observer sees: the mean of R over wavelengths, and what is left of its waves."""
+
+    mean: Scalar
+    wave: Scalar
+
+
+@function
+def _band(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar, band: int) -> Band:
+    """Mean of both polarizations."""
     film = faces(cos_i, eta, k, film_eta, thickness)
-    bells = [BELLS[band], SECOND_X] if band == 0 else [BELLS[band]]
-    curves = [_curve(film.way, order, bells) for order in range(1, HARMONICS + 1)]
     mean, wave = 0.0 * cos_i, 0.0 * cos_i
+    trips: list[Complex] = []  # once through the film and back, without the way
+    sizes: list[Scalar] = []
     for top, base in zip(film.top, film.base, strict=True):
         outer, inner = sqr(top), base.square
         passed = 1.0 - outer
         bounced = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
         mean = mean + 0.5 * (outer + bounced)
-        once = base.scaled(-top)  # one round trip, without its way
-        power = once
-        for order, curve in enumerate(curves):
-            if order:
-                power = power.times(once)
-            wave = wave + (bounced - passed) * power.times(curve).re
-    return mean, wave
+        trips.append(base.scaled(-top))
+        sizes.append(bounced - passed)
+    powers = trips
+    for order in range(1, HARMONICS + 1):
+        curve = _curve(film.way, order, band)
+        if order > 1:
+            powers = [power.times(trip) for power, trip in zip(powers, trips, strict=True)]
+        for size, power in zip(sizes, powers, strict=True):
+            wave = wave + size * power.times(curve).re
+    return Band(mean, wave)
 
 
-def _curve(way: Scalar, order: int, bells: Sequence[tuple[float, float, float]]) -> Complex:
+@function
+def _curve(way: Scalar, order: int, band: int) -> Complex:
     """The Fourier transform of an observer's curve at `order` round trips: bells over wave numbers are waves that die
     out."""
     path = way * (2.0 * order * 1e-9)  # metres
     found: list[Complex] = []
-    for height, place, variance in bells:
+    for height, place, variance in (BELLS[band], SECOND_X) if band == 0 else (BELLS[band],):
         turns = path * place
         angle = (turns - floor(turns)) * (2.0 * math.pi)
         sin, cos = sincos(angle)

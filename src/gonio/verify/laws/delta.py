@@ -284,6 +284,8 @@ def _fresnel(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: 
     bends = through & (np.abs(power.eta - 1.0) > FLAT)
     if index is None or abs(index - 1.0) < FLAT or (through.any() and not bends.any()):
         return  # a thin slab lets light through straight, and is another curve
+    if "delta" in subject.breaches:
+        return  # a film's, as the material declares: its index is not all that it reflects by
     cos = np.abs(wo[:, 2])
     ratio = np.where(wo[:, 2] > 0.0, index, 1.0 / index)
     exact, schlick = _dielectric(cos, ratio), _schlick(cos, ratio)
