@@ -33,7 +33,7 @@ render(2)
 print("ready", flush=True)
 for _ in sys.stdin:
     start, busy = time.perf_counter(), time.process_time()
-    render(256)
+    render(128)
     print(time.perf_counter() - start, time.process_time() - busy, flush=True)
 """
 

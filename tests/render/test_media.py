@@ -150,6 +150,27 @@ def test_water_that_reaches_into_its_glass_is_as_if_it_touched(tmp_path: Path, e
     assert np.all(np.abs(seen / single - 1.0) < 0.02), "reflections inside add a percent"
 
 
+def test_nested_media_disperse(tmp_path: Path) -> None:
+    """By wavelength each surface has the ratio of two curves; flat on they let through what their middles do."""
+    shapes = [slab(-2, -1, eta="sf11", priority=2), slab(-1.4, 1, eta="water", absorption=0.1, priority=1)]
+    seen = rendered(tmp_path, shapes, spectral=True, spp=4096)
+    sf11, water = (float(go.refractive_index(name).eta) for name in ("sf11", "water"))
+    through = [(1.0 - ((a - b) / (a + b)) ** 2) for a, b in ((1.0, water), (water, sf11), (sf11, 1.0))]
+    assert seen.mean() == pytest.approx(float(np.prod(through)) * np.exp(-0.2), rel=0.02)
+
+
+def test_what_a_material_derives_follows_the_index_outside(tmp_path: Path) -> None:
+    """Energy compensation derives from the index: rough glass in water is the same as glass of the ratio in nothing."""
+    rough = {"type": "kulla-conty", "base": {"type": "gonio-dielectric", "eta": 1.8, "alpha": 0.5, "priority": 2}}
+    inner = {"type": "sphere", "center": [0.3, 0.2, 0], "radius": 3, "material": rough}
+    water = slab(-8, 5, eta=1.2, priority=1)
+    nested = rendered(tmp_path, [inner, water], eye=4.0, spp=2048)
+    alone = {**inner, "material": {**rough, "base": {**rough["base"], "eta": 1.5, "priority": 0}}}
+    plain = rendered(tmp_path, [alone], eye=4.0, spp=2048)
+    # the lamp stands outside of the water, whose flat surface keeps .8 % of it; seen in the water it is 1.44 as bright
+    assert nested.mean() == pytest.approx(1.44 * plain.mean(), rel=0.06)
+
+
 def test_the_order_of_priorities_decides_and_not_that_of_the_scene(tmp_path: Path) -> None:
     glass, water = slab(-2, 0.5, eta=1.5, priority=2), slab(-0.5, 2, eta=1.33, priority=1)
     pictures = [rendered(tmp_path, shapes, spp=1024) for shapes in ([glass, water], [water, glass])]

@@ -290,7 +290,7 @@ TERMS = {
 
 
 def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
-    for path, parameter, value, _ in tree.leaves(model):
+    for path, parameter, value, _ in tree.surface(model):
         yield {
             "path": path,
             "kind": parameter.kind,
@@ -315,7 +315,7 @@ def _plain(value: object) -> object:
 
 def _numbers(model: BSDF) -> Iterator[tuple[str, Value]]:
     """(path, value as its field holds it) of each numeric parameter."""
-    for path, parameter, value, owner in tree.leaves(model):
+    for path, parameter, value, owner in tree.surface(model):
         if parameter.numeric and value is not None:
             array = np.asarray(value, dtype=float)
             where = f"emit: {type(owner).__name__}.{parameter.name}"

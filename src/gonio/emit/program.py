@@ -234,7 +234,7 @@ def _result_name(path: str, value: Value) -> str:
 
 def parameter_docs(model: BSDF) -> Iterator[tuple[str, str]]:
     """(field, what it is, with unit and range) of a model's numeric parameters."""
-    for path, parameter, _, _ in tree.leaves(model):
+    for path, parameter, _, _ in tree.surface(model):
         if parameter.numeric:
             doc = parameter.doc.partition(";")[0] if parameter.kind == "alpha" else parameter.doc
             form = {"alpha": "along x, along y", "angle": "as (cos, sin)"}.get(parameter.kind, parameter.unit)

@@ -67,8 +67,12 @@ class Dielectric(microfacet._Microfacet):
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
     transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
     sampling: str = microfacet.sampling_choice()
-    absorption: Colour = spectrum(default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length")
-    priority: Number = number(default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6)
+    absorption: Colour = spectrum(
+        default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length", inside=True
+    )
+    priority: Number = number(
+        default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6, inside=True
+    )
 
     preset_kind: ClassVar[str] = "medium"
 

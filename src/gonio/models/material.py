@@ -360,7 +360,7 @@ class BSDF(Material):
 
     def __parts__(self) -> dict[str, object]:
         """What a recording follows: the parameters, and what is derived where this copy holds it."""
-        parts = {name: getattr(self, name) for name in self.parameters()}
+        parts = {name: getattr(self, name) for name, parameter in self.parameters().items() if not parameter.inside}
         return parts if self._derived is None else {**parts, binding.DERIVED: self._derived}
 
     def __with_parts__(self, parts: Mapping[str, object]) -> Self:

@@ -105,6 +105,7 @@ class Parameter:
 
     low, high  closed range; outside it is an error, above `high` only a warning where `soft_high`
     white      its value in the material's white twin (`BSDF.white`); None leaves it as it is
+    inside     whether it is of what lies behind the surface: no formula of the surface depends on it
     """
 
     kind: ClassVar[str] = ""
@@ -119,6 +120,7 @@ class Parameter:
     unit: str = ""
     soft_high: bool = False
     white: Value = None
+    inside: bool = False
 
     @property
     def required(self) -> bool:
@@ -358,10 +360,19 @@ def _declare(kind: type[Parameter], default: object, doc: str, **more: object) -
 
 
 def number(
-    default: PlainNumber | None = None, doc: str = "", *, low: float = -math.inf, high: float = math.inf, unit: str = ""
+    default: PlainNumber | None = None,
+    doc: str = "",
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    unit: str = "",
+    inside: bool = False,
 ) -> Number:
-    """Declare a number with its closed range and unit."""
-    return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit)
+    """Declare a number with its closed range and unit.
+
+    inside  it is of what lies behind the surface, which no formula of the surface depends on
+    """
+    return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit, inside=inside)
 
 
 def index(default: PlainIndex, doc: str, *, low: float, high: float) -> Index:
@@ -377,13 +388,18 @@ def spectrum(
     high: float = math.inf,
     unit: str = "",
     soft_high: bool = False,
+    inside: bool = False,
 ) -> Colour:
     """Declare a colour: a number (grey), three values, or an array (N, channels).
 
     A colour whose range ends at 1 is a share of the light: it is 1 in the material's white twin.
+
+    inside  it is of what lies behind the surface, which no formula of the surface depends on
     """
     white = 1.0 if high == 1.0 else None
-    return _declare(ColourParameter, default, doc, low=low, high=high, unit=unit, soft_high=soft_high, white=white)
+    return _declare(
+        ColourParameter, default, doc, low=low, high=high, unit=unit, soft_high=soft_high, white=white, inside=inside
+    )
 
 
 def width(default: PlainWidth | None = None, doc: str = "", *, low: float = 0.0, high: float = 1.0) -> Width:

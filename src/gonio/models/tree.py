@@ -66,6 +66,11 @@ def leaves(material: M, path: str = "") -> Iterator[Leaf[M]]:
             yield Leaf(join(path, name), parameter, value, material)
 
 
+def surface(material: M) -> Iterator[Leaf[M]]:
+    """Those of `leaves` that the surface depends on."""
+    return (leaf for leaf in leaves(material) if not leaf.parameter.inside)
+
+
 def join(path: str, name: str) -> str:
     """The path of a parameter of the material at a path."""
     return f"{path}.{name}" if path else name

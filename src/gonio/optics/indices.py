@@ -25,6 +25,7 @@ from ..errors import InputError, did_you_mean
 from . import index_database
 from .dispersion import (
     ALL,
+    VISIBLE,
     Constant,
     Dispersion,
     DispersiveIndex,
@@ -187,11 +188,11 @@ def dispersive(name: str, where: str) -> DispersiveIndex:
     that is not positive, and where the visible is not covered."""
     found = constants(name, where)
     low, high = found.range
-    if low > 400.0 or high < 650.0:
+    if low > VISIBLE[0] or high < VISIBLE[1]:
         what = f"{name} is known from {low:g} to {high:g} nm, not where light is visible"
         raise InputError(what, where, "take another source")
     try:
-        seen = found.at(np.linspace(max(low, 400.0), min(high, 700.0), 31))
+        seen = found.at(np.linspace(*VISIBLE, 31))
     except InputError as error:
         raise InputError(error.what, where, error.hint) from None
     if seen.k.max() > 0.01:

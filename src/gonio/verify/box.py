@@ -99,7 +99,7 @@ def axes(subject: Subject) -> list[Axis]:
     if not isinstance(subject.model, BSDF):
         return []
     found = []
-    for leaf in tree.leaves(subject.model):
+    for leaf in tree.surface(subject.model):
         ends = _ends(leaf.parameter, leaf.value)
         if ends is None:
             continue

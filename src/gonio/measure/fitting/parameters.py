@@ -56,7 +56,7 @@ def free_of(material: BSDF, fixed: Mapping[str, object], free: tuple[str, ...] =
            turns
     Raises InputError for a path that is none, and where nothing is left.
     """
-    leaves = [leaf for leaf in tree.leaves(material) if leaf.parameter.numeric]
+    leaves = [leaf for leaf in tree.surface(material) if leaf.parameter.numeric]
     known = [leaf.path for leaf in leaves]
     for path in (*fixed, *free):
         if path not in [leaf.path for leaf in tree.leaves(material)]:

@@ -127,7 +127,8 @@ class PlacedMaterial:
             )
         if self._by_wavelength:
             values["wavelengths"] = self.variant.spectrum(si.wavelengths)
-        bound = binding.bound_copy(self.model, values, self.derived)
+        # what was derived once is that of the index over the vacuum's
+        bound = binding.bound_copy(self.model, values, self.derived if outer is None else None)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
 
     def traverse(self, callback: TraversalCallback) -> None:
