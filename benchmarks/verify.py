@@ -47,7 +47,7 @@ def correct() -> dict[str, go.BSDF]:
         "mix with mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
         "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=0.3)),
     }
-    for name in ("eon", "modified-phong", "sheen", "sheen-charlie"):
+    for name in ("disney", "eon", "modified-phong", "sheen", "sheen-charlie"):
         found[name] = go.model(name)()
     found["measured"] = go.model("measured")()
     found["sum"] = go.model("sum")(go.Lambert(0.4), go.Conductor.preset("Au", alpha=0.3))

@@ -18,6 +18,7 @@ DIFFUSE = {
     "phong": go.Phong((0.3, 0.4, 0.5), 0.3, 20.0),
     "blinn-phong": go.BlinnPhong(0.2, (0.4, 0.5, 0.6), 60.0),
     "modified-phong": go.model("modified-phong")((0.3, 0.4, 0.5), 0.4, 25.0),
+    "disney": go.model("disney")((0.8, 0.4, 0.2), 0.3, 0.2, 0.6, 0.5, 0.4, 0.7, 0.3, 0.5, 0.6, 0.8, 0.4),
     "eon": go.model("eon")((0.9, 0.6, 0.3), 0.8),
     "eon-fit": go.model("eon")((0.2, 1.0, 0.7), 0.5, energy="fit"),
     "sheen": go.model("sheen")((0.9, 0.5, 0.7), 0.4),
