@@ -133,18 +133,21 @@ class Disney(BSDF):
         h, cos = facet(wo, wi)
         at_o, at_i, at_h = _schlick(wo.z), _schlick(wi.z), _schlick(cos)
         rough = self.roughness * sqr(cos)
-        diffuse = _mix(1.0, 0.5 + 2.0 * rough, at_i) * _mix(1.0, 0.5 + 2.0 * rough, at_o)
-        flat = _mix(1.0, rough, at_i) * _mix(1.0, rough, at_o)
-        below = 1.25 * (flat * (1.0 / (wo.z + wi.z) - 0.5) + 0.5)
+        edge = 0.5 + 2.0 * rough
+        diffuse = _mix(1.0, edge, at_i) * _mix(1.0, edge, at_o)
+        even = _mix(1.0, rough, at_i) * _mix(1.0, rough, at_o)
+        below = 1.25 * (even * (1.0 / (wo.z + wi.z) - 0.5) + 0.5)
         body = (1.0 - self.metallic) * wi.z
         alpha, ndf = self._widths(), distribution("ggx")
         m, o, i = (frame.rotate(w, self.rotation) for w in (h, wo, wi))
         g = masking.masking_shadowing("smith-separable", ndf, o, i, m, alpha)
         f0 = self._normal_reflectance()
-        specular = (f0 + (1.0 - f0) * at_h) * (ndf.D(m, alpha) * g / (4.0 * wo.z))
+        four = 4.0 * wo.z
+        specular = (f0 + (1.0 - f0) * at_h) * (ndf.D(m, alpha) * g / four)
         satin = vec2(COAT_WIDTH + 0.0 * cos, COAT_WIDTH + 0.0 * cos)
         coat_g = masking.masking_shadowing("smith-separable", ndf, wo, wi, h, satin)
-        coat = self._coat_density(h) * coat_g * (0.04 + 0.96 * at_h) * self.clearcoat * 0.25 / (4.0 * wo.z)
+        strength = (0.01 + 0.24 * at_h) * self.clearcoat  # a quarter of Fresnel's
+        coat = self._coat_density(h) * coat_g * strength / four
         tint = 1.0 + (self._tint() - 1.0) * self.sheen_tint
         return Pieces(
             self.base_color * (_mix(diffuse, below, self.subsurface) * body * inv_pi),
