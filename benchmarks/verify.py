@@ -51,7 +51,7 @@ def correct() -> dict[str, go.BSDF]:
         "mix with mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
         "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=0.3)),
     }
-    for name in ("eon", "modified-phong", "sheen", "sheen-charlie"):
+    for name in ("disney", "eon", "modified-phong", "sheen", "sheen-charlie"):
         found[name] = go.model(name)()
     found["measured"] = go.model("measured")()
     found["sum"] = go.model("sum")(go.Lambert(0.4), go.Conductor.preset("Au", alpha=0.3))
@@ -59,6 +59,7 @@ def correct() -> dict[str, go.BSDF]:
         found[name] = go.model(name)()
     for name in ("shifted-gamma", "ward", "ward-duer"):
         found[name] = go.model(name)()
+    found["opacity"] = go.model("opacity")(go.Dielectric(1.5, 0.2), 0.3)
     found["coat"] = go.model("coat")(go.Lambert((0.8, 0.5, 0.2)), absorption=(0.1, 0.3, 0.5))
     if "kulla-conty" in go.models():
         found["kulla-conty"] = go.model("kulla-conty")(go.Conductor.preset("Au", alpha=0.6))

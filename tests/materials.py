@@ -18,6 +18,7 @@ DIFFUSE = {
     "phong": go.Phong((0.3, 0.4, 0.5), 0.3, 20.0),
     "blinn-phong": go.BlinnPhong(0.2, (0.4, 0.5, 0.6), 60.0),
     "modified-phong": go.model("modified-phong")((0.3, 0.4, 0.5), 0.4, 25.0),
+    "disney": go.model("disney")((0.8, 0.4, 0.2), 0.3, 0.2, 0.6, 0.5, 0.4, 0.7, 0.3, 0.5, 0.6, 0.8, 0.4),
     "eon": go.model("eon")((0.9, 0.6, 0.3), 0.8),
     "eon-fit": go.model("eon")((0.2, 1.0, 0.7), 0.5, energy="fit"),
     "sheen": go.model("sheen")((0.9, 0.5, 0.7), 0.4),
@@ -47,6 +48,7 @@ NESTED = {
     "mix": go.mix(go.Lambert(0.5), go.Conductor.preset("Au", alpha=0.3), 0.3),
     "mix-with-mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
     "mix-with-glass": go.mix(go.Dielectric(1.4, 0.3), go.Lambert(0.5), 0.4),
+    "opacity": go.model("opacity")(go.Dielectric(1.5, 0.3), 0.7),
     "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=(0.2, 0.5), rotation=0.4)),
 }
 

@@ -17,6 +17,8 @@ def _index(material: go.BSDF, w: np.ndarray) -> np.ndarray:
     """Index of refraction on w's side, the outside's being 1."""
     if isinstance(material, go.Mix):
         return np.maximum(_index(material.a, w), _index(material.b, w))
+    if "base" in material.parameters():
+        return _index(material.base, w)
     return np.where(w[:, 2] < 0, material.eta if material.transmits else 1.0, 1.0)
 
 

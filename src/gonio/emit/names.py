@@ -6,7 +6,7 @@ import math
 
 from ..ops.graph import first_free
 from .languages import Language
-from .program import Program
+from .program import Program, place
 from .simplify import Kind, Record, Routine, Value, check_single, stem_of
 from .source import module_constant
 from .syntax import literal
@@ -42,11 +42,22 @@ class Names:
         if stem_of(routine) in self.language.native:
             return stem_of(routine)
         if self.language.overloads:
-            types = tuple(v.type for v in routine.parameters)
+            types = self._types(routine)
             if self.signatures.setdefault((name, types), routine) is routine and self._same_doc(name, routine):
                 return name
         name = self._told_apart(name, routine) if name in taken else name
         return first_free(name, taken)
+
+    def _types(self, routine: Routine) -> tuple[object, ...]:
+        """What tells overloads apart: the types of the arguments that are written, an object's being its struct."""
+        arguments = self.program.recorded[routine].arguments
+        found: dict[object, object] = {}
+        for index in sorted(routine.used):
+            parameter = routine.parameters[index]
+            root, rest, _ = place(parameter.static)
+            struct = self.program.struct_of(arguments.get(root)) if rest else None
+            found[root if struct else index] = struct.record.name if struct else parameter.type
+        return tuple(found.values())
 
     def _told_apart(self, name: str, routine: Routine) -> str:
         """The name with what a copy was recorded for, where that is a flag or a word: "masking_shadowing_transmits"."""

@@ -56,10 +56,12 @@ class Eon(BSDF):
         """
         mu = w.z
         if self.energy == "fit":
-            g = fma(fma(fma(1.0 - mu, FIT[3], FIT[2]), 1.0 - mu, FIT[1]), 1.0 - mu, FIT[0]) * (1.0 - mu)
+            low = 1.0 - mu
+            g = fma(fma(fma(low, FIT[3], FIT[2]), low, FIT[1]), low, FIT[0]) * low
             return maximum(GRAZING - g, 0.0)
         sin = ops.safe_sqrt(sin2(w))
-        cubes = sin * mu * (1.0 + sin + sqr(sin)) / (1.0 + sin)  # tan (1 - sin^3)
+        over = 1.0 + sin
+        cubes = sin * mu * (over + sqr(sin)) / over  # tan (1 - sin^3)
         g = sin * (atan2(sin, mu) - sin * mu) + (2.0 / 3.0) * (cubes - sin)
         return maximum(GRAZING - inv_pi * g, 0.0)
 
@@ -87,9 +89,9 @@ class Eon(BSDF):
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The mixture of the transformed cosine's density and the uniform one."""
-        uniform = _uniform_share(wo.z, self.roughness)
+        even = _uniform_share(wo.z, self.roughness)
         cosine = _Clipped(*_coefficients(wo, self.roughness)).pdf(rotate(wi, frame.azimuth(wo)))
-        density = (1.0 - uniform) * cosine + uniform * (0.5 * inv_pi)
+        density = (1.0 - even) * cosine + even * (0.5 * inv_pi)
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
 
     @method
@@ -99,8 +101,8 @@ class Eon(BSDF):
         lobe = rotate_back(_Clipped(*_coefficients(wo, r)).draw(u.y, u.z), frame.azimuth(wo))
         phi = (2.0 * ops.pi) * u.z
         sin, cos = ops.sincos(phi)
-        flat = ops.safe_sqrt((1.0 - u.y) * (1.0 + u.y))
-        wi = where(u.x < _uniform_share(wo.z, r), vec3(flat * cos, flat * sin, u.y), lobe)
+        across = ops.safe_sqrt((1.0 - u.y) * (1.0 + u.y))
+        wi = where(u.x < _uniform_share(wo.z, r), vec3(across * cos, across * sin, u.y), lobe)
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
@@ -143,7 +145,8 @@ def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Sca
     """
     mu = wo.z
     low = sin2(wo) / (1.0 + ops.abs(mu))  # 1 - mu
-    a = 1.0 + r * (0.303392 + (-0.518982 + 0.111709 * mu) * mu + (-0.276266 + 0.335918 * mu) * r)
+    wider = r * (0.303392 + (-0.518982 + 0.111709 * mu) * mu + (-0.276266 + 0.335918 * mu) * r)
+    a = 1.0 + wider
     b = r * ((0.00071 + 0.150105 * low) * r - (0.00548 + 1.15859 * low)) / (mu * mu * mu - 1.43545)
     c = 1.0 + (0.20013 + (-0.506373 + 0.261777 * mu) * mu) * r
     d = r * (0.000006 - (0.065466 + 0.475392 * low) * low) / (0.0017372 + (2.0725628 - low) * low)
@@ -159,23 +162,25 @@ class _Clipped:
 
     def __init__(self, a: Scalar, b: Scalar, c: Scalar, d: Scalar) -> None:
         self.a, self.b, self.c, self.d = a, b, c, d
-        self.kept = 0.5 * (1.0 + ops.rsqrt(d * d + 1.0))
-        self.determinant = c * (a - b * d)
+
+    def _kept(self) -> Scalar:
+        """The share of the disk that is kept."""
+        return 0.5 * (1.0 + ops.rsqrt(self.d * self.d + 1.0))
 
     def draw(self, u1: Scalar, u2: Scalar) -> Direction:
         """A direction of the lobe about a wo in the x-z plane."""
         radius = ops.sqrt(u1)
         sin, cos = ops.sincos((2.0 * ops.pi) * u2)
         y = radius * sin
-        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - self.kept) + radius * cos * self.kept)
+        kept = self._kept()
+        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - kept) + radius * cos * kept)
         z = ops.safe_sqrt(1.0 - (x * x + y * y))
         return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
 
     def pdf(self, w: Direction) -> Scalar:
         """cos(h) / (pi kept) |det| / |adj(M) w|^4, with h along the adjugate's adj(M) w."""
-        h = vec3(
-            self.c * (w.x - self.b * w.z),
-            (self.a - self.b * self.d) * w.y,
-            self.c * (self.a * w.z - self.d * w.x),
-        )
-        return sqr(self.determinant / maximum(dot(h, h), frame.TINY)) * maximum(h.z, 0.0) * inv_pi / self.kept
+        across = self.a - self.b * self.d
+        height = self.c * (self.a * w.z - self.d * w.x)
+        h = vec3(self.c * (w.x - self.b * w.z), across * w.y, height)
+        size = self.c * across
+        return sqr(size / maximum(dot(h, h), frame.TINY)) * maximum(height, 0.0) * inv_pi / self._kept()

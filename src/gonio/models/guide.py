@@ -205,10 +205,10 @@ class Guide(NamedTuple):
 
     def draw(self, material: object, wo: Direction, u: Direction) -> Direction:
         """A direction; u1 picks the slice and the side. It may lie on a side where nothing is: its pdf is 0 then."""
-        flat = square_to_cosine_hemisphere(u.y, u.z)
-        sign = where(wo.z < 0.0, -1.0, 1.0)
+        broad = square_to_cosine_hemisphere(u.y, u.z)
+        facing = where(wo.z < 0.0, -1.0, 1.0)
         if not self.lobes:
-            return vec3(flat.x, flat.y, flat.z * sign)
+            return vec3(broad.x, broad.y, broad.z * facing)
         place = self._place(material, wo)
         turn, above = self._turn(wo), _above(wo)
         (cosine,) = fetch(self.cosine, 0.0 * wo.z)
@@ -228,8 +228,8 @@ class Guide(NamedTuple):
             flattened = ops.rsqrt(maximum(w.x * w.x + w.y * w.y, 1e-20))
             w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, 0.0 * w.z))
             w = _turned(w, vec3(turn.x, -turn.y, turn.z))
-            w = where(by_cosine, flat, w)
-            w = vec3(w.x, w.y, w.z * (-sign if lobe.across else sign))
+            w = where(by_cosine, broad, w)
+            w = vec3(w.x, w.y, w.z * (-facing if lobe.across else facing))
             chosen = w if chosen is None else where(crosses if lobe.across else ~crosses, w, chosen)
         assert chosen is not None
         return chosen
@@ -249,9 +249,9 @@ class Guide(NamedTuple):
         zero = 0.0 * wo.z
         if self.azimuths > 1:
             return vec3(1.0 + zero, zero, zero)
-        radius2 = wo.x * wo.x + wo.y * wo.y
-        scale = ops.rsqrt(maximum(radius2, 1e-20))
-        upright = radius2 < 1e-20
+        squared = wo.x * wo.x + wo.y * wo.y
+        scale = ops.rsqrt(maximum(squared, 1e-20))
+        upright = squared < 1e-20
         return vec3(where(upright, 1.0, wo.x * scale), where(upright, 0.0, wo.y * scale), zero)
 
     def _place(self, material: object, wo: Direction) -> Place:
@@ -291,7 +291,8 @@ def _above(w: Direction) -> Direction:
 
 def _turned(w: Direction, turn: Direction) -> Direction:
     """w in axes turned by an azimuth of (cos, sin, 0)."""
-    return vec3(turn.x * w.x + turn.y * w.y, turn.x * w.y - turn.y * w.x, w.z)
+    along, across = turn.x * w.x + turn.y * w.y, turn.x * w.y - turn.y * w.x
+    return vec3(along, across, w.z)
 
 
 def _cell(at: Scalar, count: int) -> tuple[Scalar, Scalar]:

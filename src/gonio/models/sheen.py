@@ -22,7 +22,7 @@ from .parameters import Colour, Number, number, spectrum
 from .sample import Sample
 
 
-class _Lobe(NamedTuple):
+class Layer(NamedTuple):
     """The transformed cosine at a wo: M^-1 = ((A, 0, B), (0, A, 0), (0, 0, 1)) takes it back to the cosine.
 
     A, B  of the matrix
@@ -58,14 +58,14 @@ class Sheen(BSDF):
     }
 
     @function
-    def _lobe(self, wo: Direction) -> _Lobe:
+    def _lobe(self, wo: Direction) -> Layer:
         """The row of the table."""
         table = _table()
         rows, columns = table.shape
-        return _Lobe(*ops.lookup(table, ops.inset(self.roughness, rows), ops.inset(wo.z, columns)))
+        return Layer(*ops.lookup(table, ops.inset(self.roughness, rows), ops.inset(wo.z, columns)))
 
     @function
-    def _density(self, lobe: _Lobe, wo: Direction, wi: Direction) -> Scalar:
+    def _density(self, lobe: Layer, wo: Direction, wi: Direction) -> Scalar:
         """cos(h) / pi A^2 / |h|^4 with h = M^-1 wi: the cosine's density times the Jacobian of the map."""
         w = frame.rotate(wi, frame.azimuth(wo))
         h = vec3(lobe.A * w.x + lobe.B * w.z, lobe.A * w.y, w.z)

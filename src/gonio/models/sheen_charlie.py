@@ -81,8 +81,8 @@ class SheenCharlie(BSDF):
     @method
     def terms(self, wo: Direction, wi: Direction) -> Terms:
         """D, G and the albedo of the pair."""
-        _, o, i = lit(wo, wi)
-        return Terms(self._density(frame.half_vector(o, i)), self._visible(o, i), self.albedo)
+        above, o, i = lit(wo, wi)
+        return Terms(where(above, self._density(frame.half_vector(o, i)), 0.0), self._visible(o, i), self.albedo)
 
 
 def _gain(model: SheenCharlie) -> float:

@@ -68,7 +68,10 @@ class Place:
         if not moved:
             return self
         values = {path: moved.get(path, value) for path, value in self.values.items()}
-        return dataclasses.replace(self, values=values, subject=self.subject.replace(**moved))
+        try:
+            return dataclasses.replace(self, values=values, subject=self.subject.replace(**moved))
+        except InputError:  # at the end of its range one parameter asks something of another
+            return self
 
     @property
     def words(self) -> str:

@@ -234,6 +234,8 @@ def index_below(subject: Subject) -> Iterator[float]:
     wo = directions.on_side(directions.uniform(np.random.default_rng(4), 2048), 1)
     s = subject.sample(wo, directions.numbers(np.random.default_rng(44), 2048))
     through = (s.pdf > 0.0) & (s.wi[:, 2] < 0.0)
+    if np.any(through & ~s.delta):
+        through &= ~s.delta
     told = float(np.median(s.eta[through])) if through.any() else 1.0
     values = [told]
     declared = getattr(subject.model, "eta", None)

@@ -26,7 +26,7 @@ class Coat(BSDF):
 
     T = 1 - R is what the top lets through, o' and i' the refracted directions, t = exp(-absorption depth / cos) Beer's
     law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, and a
-    separable rest (`gonio.energy.interior` says how): over Lambert exact, over any base exact in albedo where nothing
+    separable rest (`energy/interior.py` says how): over Lambert exact, over any base exact in albedo where nothing
     is absorbed. a is the base's colour, its tint over that of its white twin. Reciprocal; white on white keeps all
     light.
 
@@ -91,18 +91,21 @@ class Coat(BSDF):
     def _through(self, w: Direction) -> Scalar:
         """What the base's lobe is multiplied by at each end: T by Fresnel's equations; of a rough top the table's."""
         _, smooth = microfacet.widths(self.alpha)
-        return where(smooth, 1.0 - self._fresnel(w), self._at(w)[2])
+        return where(smooth, self._sharp(w), self._at(w)[2])
 
     @function
-    def _fresnel(self, w: Direction) -> Scalar:
-        """R of a smooth top."""
+    def _sharp(self, w: Direction) -> Scalar:
+        """T of a smooth top, by Fresnel's equations: not 1 - R, which at grazing angles has no digits left."""
         cos = ops.abs(w.z)
-        return fresnel.kind("exact").dielectric(cos, fresnel.cos_transmitted(cos, self.index), self.index)
+        cos_t = fresnel.cos_transmitted(cos, self.index)
+        across, along = cos + self.index * cos_t, self.index * cos + cos_t
+        return 2.0 * self.index * cos * cos_t * (1.0 / sqr(across) + 1.0 / sqr(along))
 
     def _at(self, w: Direction) -> tuple[Scalar, ...]:
         """The coat's table at a direction outside."""
         table = self._account.coat
-        return ops.lookup(table, ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0]))
+        at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
+        return ops.lookup(table, at)
 
     @function
     def _inside(self, w: Direction) -> Direction:
@@ -124,7 +127,8 @@ class Coat(BSDF):
     def _rest(self, w: Direction, a: Spectrum) -> Spectrum:
         """The separable lobe at a direction outside, over a base of colour a there."""
         table = self._account.rest
-        values, u = ops.lookup(table, ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])), self._crossed()
+        at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
+        values, u = ops.lookup(table, at), self._crossed()
         b, more_b, p, more_p = values[-4:]
         return _polynomial(u, values[:-4]) * _kept(a, u * more_b + b, u * more_p + p)
 
@@ -141,7 +145,7 @@ class Coat(BSDF):
         white = self.base.white()
         if white is self.base:
             return ops.safe_div(tint, mean(tint))
-        return clamp(ops.safe_div(tint, white.tint(inner) * (1.0 + 0.0 * self.absorption)), 0.0, 1.0)
+        return ops.safe_div(tint, white.tint(inner) * (1.0 + 0.0 * self.absorption))
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -162,17 +166,17 @@ class Coat(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """(probability of the top, that of a cosine among the rest): the cosine finds what the base sends back totally,
+        """(probability of what is under the top, of a cosine among it): that finds what the base sends back totally,
         whose samples fail."""
         reflected, total, _, beyond = self._at(wo)
         _, smooth = microfacet.widths(self.alpha)
-        reflected = where(smooth, self._fresnel(wo), reflected)
+        through = where(smooth, self._sharp(wo), 1.0 - reflected)
         inner = self._inside(wo)
         tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
-        below = (1.0 - reflected) * mean(self._left(inner) * tint) + 2.0 * beyond
-        top = clamp(ops.safe_div(reflected, reflected + below), 0.02, 1.0)
+        below = through * mean(self._left(inner) * tint) + 2.0 * beyond
+        under = clamp((below + 1e-3) / (1.0 - through + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
         cosine = 0.0 * total if self._mirror else clamp(1.7 * total, 0.05, 0.95)
-        return ops.vec2(top, cosine)
+        return ops.vec2(under, cosine)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -185,16 +189,17 @@ class Coat(BSDF):
         o, i = self._inside(wo), self._inside(wi)
         base = self.base.pdf(o, i) * wi.z / (sqr(self.index) * maximum(i.z, frame.TINY))
         below = shares.y * wi.z * inv_pi + (1.0 - shares.y) * base
-        return where(above, shares.x * top + (1.0 - shares.x) * below, 0.0)
+        return where(above, (1.0 - shares.x) * top + shares.x * below, 0.0)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the top, the cosine or the base; what the base would send into total reflection is a failure."""
         shares = self._shares(wo)
-        on_top = u.x < shares.x
-        first = ops.minimum(ops.safe_div(u.x - shares.x, 1.0 - shares.x), ALMOST_ONE)
+        over, by_base = 1.0 - shares.x, 1.0 - shares.y
+        on_top = u.x >= shares.x
+        first = ops.minimum(ops.safe_div(u.x, shares.x), ALMOST_ONE)
         by_cosine = first < shares.y
-        second = ops.minimum(ops.safe_div(first - shares.y, 1.0 - shares.y), ALMOST_ONE)
+        second = ops.minimum(ops.safe_div(first - shares.y, by_base), ALMOST_ONE)
         o = self._inside(wo)
         s_top = self._top.sample(wo, u, mode)
         s_base = self.base.sample(where(wo.z > 0.0, o, -o), ops.vec3(maximum(second, 0.0), u.y, u.z), mode)
@@ -212,11 +217,11 @@ class Coat(BSDF):
         delta = from_top | from_base
         density = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, density)
-        weight = where(from_top, s_top.weight * ops.safe_div(1.0, shares.x), weight)
-        ideal = where(from_top, shares.x * s_top.pdf, (1.0 - shares.x) * (1.0 - shares.y) * s_base.pdf)
+        weight = where(from_top, s_top.weight / over, weight)
+        ideal = where(from_top, over * s_top.pdf, shares.x * by_base * s_base.pdf)
         if self._mirror:
             weight = where(from_base, s_base.weight * self._bounced(wo, o), weight)
-            weight = where(from_base, weight * ops.safe_div(1.0, (1.0 - shares.x) * (1.0 - shares.y)), weight)
+            weight = where(from_base, weight * ops.safe_div(1.0, shares.x), weight)
         pdf = where((wo.z > 0.0) & (wi.z > 0.0), where(delta, ideal, density), 0.0)
         return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), 1.0 + 0.0 * pdf)
 
@@ -225,7 +230,7 @@ class Coat(BSDF):
         """T^2 t^2 / (1 - a k) of a mirror, k = (1 - T) t^2."""
         through, left2 = self._through(wo), sqr(self._left(inner))
         k = (1.0 - through) * left2
-        return sqr(through) * left2 / (1.0 - k * clamp(self.base.tint(inner) * (1.0 + 0.0 * k), 0.0, 1.0))
+        return sqr(through) * left2 / (1.0 - k * self.base.tint(inner))
 
     def white(self) -> Self:
         """Over the white base, and without absorption."""

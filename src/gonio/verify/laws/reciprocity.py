@@ -156,6 +156,8 @@ def _eta(subject: Subject, seed: int) -> float:
     wo = directions.on_side(directions.uniform(rng, 4096), 1)
     drawn = subject.sample(wo, directions.numbers(rng, 4096))
     through = (drawn.pdf > 0.0) & (drawn.wi[:, 2] < 0.0)
+    if np.any(through & ~drawn.delta):  # what goes straight on through a hole says nothing of the rest
+        through &= ~drawn.delta
     return float(np.median(drawn.eta[through])) if through.any() else 1.0
 
 
