@@ -26,6 +26,8 @@ FRINGES = 3e-4
 
 # a guide's density near the rim of its chart, where the logarithm of the distance from the axis is rounded: 3 times
 GUIDED = 6.0
+# the base of a coat sees refracted directions, which are rounded once more: of a narrow lobe that is 1.3 times
+COATED = 2.0
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +50,8 @@ def _check(page: Any, lang: str, name: str, side: int) -> None:
         where = f"{result} at {draws.wo[v.draw].tolist()}, {draws.wi[v.draw].tolist()}, u {draws.u[v.draw].tolist()}"
         text = f"{where}, {inputs}: {v.got} in the shader, {v.right} in float64, {v.ratio:.3g} of what is allowed"
         if material.guided and v.ratio <= GUIDED and not result.startswith("eval"):
+            continue
+        if "coat" in name and v.ratio <= COATED:
             continue
         assert v.share <= share, f"{text}; {v.share:.2g} of the draws"
 

@@ -55,7 +55,7 @@ class Account(NamedTuple):
 
     coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's light that is
            reflected totally, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
-    rest   likewise: the separable lobe, a polynomial, then its b and p, linear in u
+    rest   likewise: the separable lobe, a polynomial in u^4, then its b and p, parabolas in u
     again  one texel: k, b, p and the lobe's factor, polynomials
     """
 
@@ -102,7 +102,7 @@ def find(coat: Coated) -> Account:
     if coat.base.delta == "always":
         columns = [face.reflected(outside), 0.0 * outside, 1.0 - face.reflected(outside), face.beyond(outside)]
         count = len(LEFT)
-        none = Table("coat_rest", np.zeros((NODES, count + 4)))
+        none = Table("coat_rest", np.zeros((NODES, count + 6)))
         return Account(Table("coat", np.stack(columns, -1)), none, Table("coat_again", np.zeros((1, 4 * count))))
     seen = _drawn(coat.base, index)
     totally = (seen.weight * (seen.position <= 0.0)).sum(1) / np.maximum(seen.weight.sum(1), LEAST)
@@ -113,9 +113,10 @@ def find(coat: Coated) -> Account:
         face.lobe(outside),
         face.beyond(outside),
     ]
-    middle, last = (sums[n].bounces for n in (2, -1))
-    slope = (last - middle) / (LEFT[-1] - LEFT[2])
-    bounces = np.stack([last - slope, slope], -1).reshape(NODES, 4)
+    some = [1, 3, 4]  # of `LEFT`: a parabola in u
+    powers = np.array(LEFT)[some][:, None] ** np.arange(3)
+    bounces = np.tensordot(np.linalg.inv(powers), np.array([sums[n].bounces for n in some]), 1)
+    bounces = np.moveaxis(bounces, 0, -1).reshape(NODES, 6)
     rest = np.concatenate([_positive(np.array([one.rest for one in sums])), bounces], axis=-1)
     again = _polynomial(np.array([[one.k, *one.mean, one.lobe] for one in sums]))
     return Account(
@@ -314,8 +315,9 @@ def _bounces(rest: Floats, grey: Floats, once: Floats) -> tuple[Floats, Floats]:
 
 
 def _positive(values: Floats) -> Floats:
-    """As `_polynomial`, by Bernstein's with no coefficient below 0: no light is negative between the nodes."""
-    degree, u = len(LEFT) - 1, np.array(LEFT)
+    """As `_polynomial`, in u^4, as light that bounces often fades fast with u, and by Bernstein's polynomials with no
+    coefficient below 0: no light is negative between the nodes."""
+    degree, u = len(LEFT) - 1, np.array(LEFT) ** 4
     n = np.arange(degree + 1)
     basis = u[:, None] ** n * (1.0 - u[:, None]) ** (degree - n)
     sure = np.where(u == 1.0, 1e3, 1.0)  # without absorption nothing may be lost

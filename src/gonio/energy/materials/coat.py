@@ -129,8 +129,8 @@ class Coat(BSDF):
         table = self._account.rest
         at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
         values, u = ops.lookup(table, at), self._crossed()
-        b, more_b, p, more_p = values[-4:]
-        return _polynomial(u, values[:-4]) * _kept(a, u * more_b + b, u * more_p + p)
+        b, p = _polynomial(u, values[-6:-3]), _polynomial(u, values[-3:])
+        return _polynomial(sqr(sqr(u)), values[:-6]) * _kept(a, b, p)
 
     def _again(self, like: Direction) -> tuple[Spectrum, ...]:
         """k, b and p of the rest, the lobe's factor."""
@@ -170,11 +170,14 @@ class Coat(BSDF):
         whose samples fail."""
         reflected, total, _, beyond = self._at(wo)
         _, smooth = microfacet.widths(self.alpha)
+        cos = ops.abs(wo.z)
+        sharp = fresnel.kind("exact").dielectric(cos, fresnel.cos_transmitted(cos, self.index), self.index)
         through = where(smooth, self._sharp(wo), 1.0 - reflected)
+        reflected = where(smooth, sharp, reflected)
         inner = self._inside(wo)
         tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
         below = through * mean(self._left(inner) * tint) + 2.0 * beyond
-        under = clamp((below + 1e-3) / (1.0 - through + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
+        under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
         cosine = 0.0 * total if self._mirror else clamp(1.7 * total, 0.05, 0.95)
         return ops.vec2(under, cosine)
 
@@ -261,7 +264,6 @@ def _kept(a: Spectrum, b: Spectrum, p: Spectrum) -> Spectrum:
     return a * (1.0 - b + b * a * (1.0 - p) / (1.0 - a * p))
 
 
-@function
 def _polynomial(u: Spectrum, coefficients: tuple[Scalar, ...]) -> Spectrum:
     """c_0 + c_1 u + c_2 u^2 + ..."""
     value = 0.0 * u + coefficients[-1]
