@@ -45,13 +45,21 @@ FORMS = {
 # 390 to 770 nm by 20: fringes of a film of 1 um are 100 nm apart, of 3 um 35 nm
 NODES = np.arange(390.0, 771.0, 20.0)
 WEIGHTS = colour.weights(NODES)
-PART = 5  # of them in a function: a shader's stay short
+
+
+def _of_unit(height: float, place: float, variance: float) -> tuple[float, float, float]:
+    """A bell, its height such that y's integral is 1."""
+    return height * math.sqrt(2.0 * math.pi * variance) / 1.0685e-7, place, variance
+
 
 # Fits of the observer's curves over wave numbers (Belcour2017, supplemental code): height, place and variance, the
-# second bell of x last. Divided by the integral of y
-BELLS = ((5.4856e-13, 1.6810e6, 4.3278e9), (4.4201e-13, 1.7953e6, 9.3046e9), (5.2481e-13, 2.2084e6, 6.6121e9))
-SECOND_X = (9.7470e-14, 2.2399e6, 4.5282e9)
-INTEGRAL_Y = 1.0685e-7
+# second bell of x last, which the other curves have at height 0
+BELLS = (
+    _of_unit(5.4856e-13, 1.6810e6, 4.3278e9),
+    _of_unit(4.4201e-13, 1.7953e6, 9.3046e9),
+    _of_unit(5.2481e-13, 2.2084e6, 6.6121e9),
+)
+SECOND = (_of_unit(9.7470e-14, 2.2399e6, 4.5282e9), (0.0, 1.0, 1.0), (0.0, 1.0, 1.0))
 HARMONICS = 3  # the next is r^4 of the first, and the eye's curves have blurred it
 WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted under even light
 
@@ -186,11 +194,18 @@ def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
         return _seen(film, lambda eta, k, nm: _unpolarized(cos_i, eta, k, film.film_eta, film.thickness, nm))
     if film.form == "belcour-barla":
         return _in_fourier_space(cos_i, *index)
-    first, *others = [_part(cos_i, *index, start) for start in range(0, len(NODES), PART)]
-    for part in others:
-        first = first + part
+    return _by_wavelengths(cos_i, *index)
+
+
+@function
+def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scalar, thickness: Scalar) -> Spectrum:
+    """The colour of R under daylight, summed over `NODES`."""
+    mixing = WEIGHTS if len(channels(eta)) == 3 else np.tile((WEIGHTS @ colour.LUMINANCE)[:, None], 3)
+    seen = 0.0 * eta
+    for nm, (red, green, blue) in zip(NODES.tolist(), mixing.tolist(), strict=True):
+        seen = seen + _node(cos_i, eta, k, film_eta, thickness, nm, red, green, blue)
     # colours that no three lights mix would be more than all, or less than nothing
-    return clamp(first, 0.0, 1.0)
+    return clamp(seen, 0.0, 1.0)
 
 
 def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
@@ -232,13 +247,20 @@ def _unpolarized(
 
 
 @function
-def _part(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scalar, thickness: Scalar, start: int) -> Spectrum:
-    """What some wavelengths add to the colour of R."""
-
-    def at(eta: Scalar, k: Scalar, nm: Scalar | float) -> Scalar:
-        return _unpolarized(cos_i, eta, k, film_eta, thickness, nm)
-
-    return _sum(eta, k, range(start, start + PART), at)
+def _node(
+    cos_i: Scalar,
+    eta: Spectrum,
+    k: Spectrum,
+    film_eta: Scalar,
+    thickness: Scalar,
+    nm: float,
+    red: float,
+    green: float,
+    blue: float,
+) -> Spectrum:
+    """What a wavelength adds to the colour of R."""
+    R = _unpolarized(cos_i, _between(channels(eta), nm), _between(channels(k), nm), film_eta, thickness, nm)
+    return of_channels(eta, [R * share for share in (red, green, blue)][: len(channels(eta))])
 
 
 def _seen(film: Film, at: Callable[[Scalar, Scalar, Scalar | float], Scalar]) -> Spectrum:
@@ -270,12 +292,8 @@ def _between(values: Sequence[Scalar], nm: float) -> Scalar:
     if len(values) != 3:
         return values[0]
     red, green, blue = RGB_WAVELENGTHS
-    if not blue < nm < red:
-        return values[0] if nm >= red else values[2]
-    (a, low), (b, high) = ((2, blue), (1, green)) if nm < green else ((1, green), (0, red))
-    share = (nm - low) / (high - low)
-    lower, upper = values[a] * (1.0 - share), values[b] * share
-    return lower + upper
+    upper, lower = clamp((nm - green) / (red - green), 0.0, 1.0), clamp((green - nm) / (green - blue), 0.0, 1.0)
+    return values[1] + (values[0] - values[1]) * upper + (values[2] - values[1]) * lower
 
 
 # ---------------------------------------------------------------------- in Fourier space
@@ -287,11 +305,11 @@ def _in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scala
     those of x, y and z."""
     etas, ks = channels(eta), channels(k)
     if len(etas) != 3:
-        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, 1)
+        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, *BELLS[1], *SECOND[1])
         return clamp(of_channels(eta, [luminance.mean + luminance.wave]), 0.0, 1.0)
-    x = _band(cos_i, etas[0], ks[0], film_eta, thickness, 0)
-    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, 1)
-    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, 2)
+    x = _band(cos_i, etas[0], ks[0], film_eta, thickness, *BELLS[0], *SECOND[0])
+    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, *BELLS[1], *SECOND[1])
+    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, *BELLS[2], *SECOND[2])
     X, Y, Z = (band.wave * white for band, white in zip((x, y, z), WHITE, strict=True))
     waves = [X * float(row[0]) + Y * float(row[1]) + Z * float(row[2]) for row in colour.XYZ_TO_RGB]
     total = [band.mean + wave for band, wave in zip((x, y, z), waves, strict=True)]
@@ -306,8 +324,20 @@ class Band(NamedTuple):
 
 
 @function
-def _band(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar, band: int) -> Band:
-    """Mean of both polarizations."""
+def _band(
+    cos_i: Scalar,
+    eta: Scalar,
+    k: Scalar,
+    film_eta: Scalar,
+    thickness: Scalar,
+    height: float,
+    place: float,
+    variance: float,
+    height_too: float,
+    place_too: float,
+    variance_too: float,
+) -> Band:
+    """Mean of both polarizations; the curve is the sum of two bells."""
     film = faces(cos_i, eta, k, film_eta, thickness)
     mean, wave = 0.0 * cos_i, 0.0 * cos_i
     trips: list[Complex] = []  # once through the film and back, without the way
@@ -321,7 +351,8 @@ def _band(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Sc
         sizes.append(bounced - passed)
     powers = trips
     for order in range(1, HARMONICS + 1):
-        curve = _curve(film.way, order, band)
+        path = film.way * (2.0 * order * 1e-9)
+        curve = _bell(path, height, place, variance).plus(_bell(path, height_too, place_too, variance_too))
         if order > 1:
             powers = [power.times(trip) for power, trip in zip(powers, trips, strict=True)]
         for size, power in zip(sizes, powers, strict=True):
@@ -330,17 +361,10 @@ def _band(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Sc
 
 
 @function
-def _curve(way: Scalar, order: int, band: int) -> Complex:
-    """The Fourier transform of an observer's curve at `order` round trips: bells over wave numbers are waves that die
-    out."""
-    path = way * (2.0 * order * 1e-9)  # metres
-    found: list[Complex] = []
-    for height, place, variance in (BELLS[band], SECOND_X) if band == 0 else (BELLS[band],):
-        turns = path * place
-        angle = (turns - floor(turns)) * (2.0 * math.pi)
-        sin, cos = sincos(angle)
-        size = exp(sqr(path) * (-variance * (2.0 * math.pi) ** 2)) * (
-            height * math.sqrt(2.0 * math.pi * variance) / INTEGRAL_Y
-        )
-        found.append(Complex(cos, sin).scaled(size))
-    return found[0] if len(found) == 1 else found[0].plus(found[1])
+def _bell(path: Scalar, height: float, place: float, variance: float) -> Complex:
+    """The Fourier transform of a bell over wave numbers at a path, metres: a wave that dies out."""
+    turns = path * place
+    angle = (turns - floor(turns)) * (2.0 * math.pi)
+    sin, cos = sincos(angle)
+    size = exp(sqr(path) * (variance * -((2.0 * math.pi) ** 2))) * height
+    return Complex(cos, sin).scaled(size)
