@@ -88,7 +88,7 @@ def _directions(rng: np.random.Generator, count: int, below: bool) -> np.ndarray
 
 
 def _fields(model: go.BSDF, rng: np.random.Generator, count: int) -> Any:
-    for path, parameter, value, owner in tree.leaves(model):
+    for path, parameter, value, owner in tree.surface(model):
         if parameter.numeric and not (parameter.kind == "angle" and isinstance(value, int | float) and value == 0):
             yield path, _values(type(owner).__name__, parameter, value, rng, count)
 
@@ -134,7 +134,7 @@ def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ..
         return {2: kind.vec2, 3: kind.vec3}[x.shape[1]](*[column(c) for c in x.T])
 
     def convert(parameter: Parameter, value: Any) -> Any:
-        if parameter.kind == "angle" and isinstance(value, int | float) and value == 0:
+        if parameter.inside or (parameter.kind == "angle" and isinstance(value, int | float) and value == 0):
             return None
         x = next(rows)
         return column(x[:, 0]) if x.shape[1] == 1 else vector(x)

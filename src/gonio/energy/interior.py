@@ -27,7 +27,6 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 
 from ..errors import InputError
 from ..models import BSDF, guide_search, tree
@@ -321,7 +320,9 @@ def _positive(values: Floats) -> Floats:
     n = np.arange(degree + 1)
     basis = u[:, None] ** n * (1.0 - u[:, None]) ** (degree - n)
     sure = np.where(u == 1.0, 1e3, 1.0)  # without absorption nothing may be lost
-    weights = np.array([optimize.nnls(basis * sure[:, None], column * sure)[0] for column in values.T])
+    from scipy.optimize import nnls  # late: a picture whose tables are there shall not wait for it
+
+    weights = np.array([nnls(basis * sure[:, None], column * sure)[0] for column in values.T])
     to_powers = np.zeros((degree + 1, degree + 1))
     for k in range(degree + 1):
         for j in range(degree - k + 1):

@@ -22,7 +22,22 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from .. import ops
-from ..ops import Direction, Mask, Scalar, Table, dot, fetch, inv_pi, maximum, minimum, safe_sqrt, sincos, vec3, where
+from ..ops import (
+    Direction,
+    Mask,
+    Scalar,
+    Table,
+    dot,
+    fetch,
+    function,
+    inv_pi,
+    maximum,
+    minimum,
+    safe_sqrt,
+    sincos,
+    vec3,
+    where,
+)
 from ..ops.backend import Array
 from ..optics.frame import half_vector, reflect
 from ..optics.warp import square_to_cosine_hemisphere
@@ -109,6 +124,7 @@ class Lobe(NamedTuple):
         )
         return _between(_between(a, b, across), _between(c, d, across), along)
 
+    @function
     def draw(self, index: Scalar, u1: Scalar, u2: Scalar) -> tuple[Scalar, Scalar]:
         """(s, phi) with the density of a slice: first s, by the integrals over phi, then phi at that s."""
         _, rows, columns = self.density.shape
@@ -318,6 +334,7 @@ def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
     return found
 
 
+@function
 def _in_cell(area: Scalar, low: Scalar, high: Scalar) -> Scalar:
     """Share of a cell of width 1 below which lies `area` of a density that goes linearly from low to high."""
     root = safe_sqrt(low * low + 2.0 * (high - low) * area)

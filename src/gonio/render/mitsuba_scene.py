@@ -38,13 +38,13 @@ class MitsubaRender:
         spp: int,
         seed: int = 0,
         integrator: Plugin = None,
-        wavefront: int = WAVEFRONT,
+        wavefront: int | None = None,
     ) -> None:
         self._mi, self._scene, self._seed = mi, scene, seed
         self._integrator = scene.integrator() if integrator is None else integrator
         self._sensor = scene.sensors()[0]
         width, height = self._sensor.film().crop_size()
-        self.pass_size = min(spp, power_of_two(max(1, wavefront // (int(width) * int(height)))))
+        self.pass_size = min(spp, power_of_two(max(1, (wavefront or WAVEFRONT) // (int(width) * int(height)))))
         self._sum: NDArray[np.float64] | None = None
         self._passes = 0
         self.done = 0
