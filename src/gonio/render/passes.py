@@ -62,6 +62,7 @@ def run(
     pixels: int,
     *,
     timeout: float | None = None,
+    first: int = 0,
     report: Callable[[Progress], None] = lambda progress: None,
     interrupted: Callable[[], object] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
@@ -70,10 +71,12 @@ def run(
 
     At least one pass is made where samples are missing, so that there is always a picture. Both wishes to stop are
     looked at between passes; near the time limit the passes shrink to what still fits.
+
+    first  samples per pixel of the first pass, where the rate is known; 0 begins with a short one
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # a Mitsuba scene's passes are of one size
-    count = power_of_two(FIRST_PASS / pixels)
+    count = first or power_of_two(FIRST_PASS / pixels)
     compiled, counted_samples, counted_seconds = False, 0, 0.0
     while render.done < spp:
         if fixed:

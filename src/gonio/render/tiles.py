@@ -38,6 +38,7 @@ ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the ca
 MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
 LEAST_SAMPLES = 1 << 21  # less is soon lost to sending it
 HANDED_OUT = 1 << 17  # samples that a worker does while one part is handed out
+LONGEST_PASS = 2.0  # seconds: nobody presses Ctrl-C on a worker, and a pass takes 15 ms of Python besides
 PARTS = 20  # for each worker at least, so that none waits long for the last
 
 
@@ -192,6 +193,7 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
 _last: dict[
     str, tuple[Prepared, tempfile.TemporaryDirectory[str]]
 ] = {}  # the scene that is loaded; parts follow each other
+_rates: dict[str, float] = {}  # samples a second that its last part made
 
 
 def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
@@ -201,7 +203,12 @@ def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays |
     render.select(slice(begin, end))
     if start is not None:
         render.restore(first, start)
-    passes.run(render, last, end - begin)
+    lanes = end - begin
+
+    def remember(progress: Progress) -> None:
+        _rates[spec] = progress.rate
+
+    passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * LONGEST_PASS / lanes), report=remember)
     return {name: np.array(values) for name, values in render.state().items()}
 
 
@@ -210,6 +217,7 @@ def _prepared(spec: str) -> Prepared:
 
     if spec not in _last:
         _last.clear()
+        _rates.clear()
         folder = tempfile.TemporaryDirectory(prefix="gonio-scene-")
         known: Facts = json.loads(spec)
         _last[spec] = (
