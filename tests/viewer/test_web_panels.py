@@ -275,6 +275,8 @@ def test_table_read_out_is_the_float(fresh: Opened) -> None:
     assert len(seen) == 3
 
 
+SETTLED = "() => gonio.converge(16)"  # at its end the page shows the picture, as its state has it by then
+
 REFERENCE = """([exposure]) => {
   const picture = gonio.readPixels();
   const data = picture.data.map((v, i) => i % 4 === 3 ? v : v * exposure);
@@ -283,14 +285,14 @@ REFERENCE = """([exposure]) => {
 
 
 def test_wipe_shows_one_picture_on_each_side(fresh: Opened) -> None:
-    fresh.tab.evaluate("() => gonio.converge(4)")
+    fresh.tab.evaluate(SETTLED)
     plain = ink(fresh.tab.locator("canvas").first.screenshot())
     fresh.tab.evaluate(REFERENCE, [0.25])
     fresh.tab.evaluate("gonio.app.store.set('compare.mode', 'wipe'), gonio.app.store.set('display.tone', 'reinhard')")
     fresh.tab.evaluate("gonio.app.store.set('display.tone', 'none')")
     handle = fresh.tab.locator(".p-handle")
     handle.wait_for(state="visible")
-    fresh.tab.wait_for_timeout(300)
+    fresh.tab.evaluate(SETTLED)
     half = ink(fresh.tab.locator("canvas").first.screenshot())
     middle = plain.shape[1] // 2
     left, right = slice(0, middle - 40), slice(middle + 40, None)
@@ -302,8 +304,8 @@ def test_wipe_shows_one_picture_on_each_side(fresh: Opened) -> None:
     fresh.tab.mouse.down()
     fresh.tab.mouse.move(x - 300, y, steps=3)
     fresh.tab.mouse.up()
-    fresh.tab.wait_for_timeout(300)
-    assert fresh.tab.evaluate("gonio.state.compare.wipe") < 0.4
+    fresh.tab.wait_for_function("gonio.state.compare.wipe < 0.4")
+    fresh.tab.evaluate(SETTLED)
     moved = ink(fresh.tab.locator("canvas").first.screenshot())
     band = slice(middle - 220, middle - 60)
     assert half[:, band].mean() - moved[:, band].mean() > 1
@@ -333,7 +335,6 @@ def test_figures_on_the_page_are_pythons(fresh: Opened) -> None:
 
 def test_smaller_reference_is_compared_with_averages(fresh: Opened) -> None:
     open_panel(fresh, "compare")
-    fresh.tab.wait_for_timeout(300)  # the dock makes the canvas lower, and the picture begins anew
     fresh.tab.evaluate("gonio.app.store.setPanel('compare', { pixels: 'all' })")
     fresh.tab.evaluate(
         """() => gonio.converge().then(picture => {
@@ -351,9 +352,7 @@ def test_smaller_reference_is_compared_with_averages(fresh: Opened) -> None:
 def test_probe_reads_the_pixel(fresh: Opened) -> None:
     fresh.tab.set_viewport_size(SMALLER)
     body = open_panel(fresh, "probe")
-    # opening the dock makes the canvas lower, and the picture begins anew when the browser says so
-    fresh.tab.wait_for_timeout(300)
-    fresh.tab.wait_for_function("() => gonio.app.picture().done", timeout=120_000)
+    fresh.tab.evaluate("() => gonio.converge()")
     fresh.tab.evaluate(REFERENCE, [0.5])
     picture = fresh.tab.evaluate("{ const p = gonio.app.picture(); [p.width, p.height, [...p.data]] }")
     data = np.reshape(picture[2], (picture[1], picture[0], 4))
@@ -380,7 +379,7 @@ def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int,
     fresh.tab.evaluate("() => gonio.converge(16)")
     fresh.tab.evaluate(REFERENCE, [1.0])
     fresh.tab.evaluate("gonio.app.store.set('compare.mode', 'side')")
-    fresh.tab.wait_for_timeout(300)
+    fresh.tab.evaluate(SETTLED)
     for width, height in ((800, 400), (300, 500)):
         at = "([w, h, x, y]) => gonio.comparison().view.pictureAt(w, h, x, y)"
         first = (0.3, 0.4) if width > height else (0.4, 0.3)
@@ -399,7 +398,6 @@ def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int,
 
 def test_a_reference_of_what_was_shown_before_is_not_measured(fresh: Opened) -> None:
     body = open_panel(fresh, "compare")
-    fresh.tab.wait_for_timeout(300)
     fresh.tab.evaluate("() => gonio.converge(2)")
     fresh.tab.evaluate(REFERENCE, [1.1])
     fresh.tab.wait_for_function("() => gonio.comparison().figures !== null", timeout=30_000)

@@ -242,8 +242,10 @@ export class PageApp implements App {
     });
   }
 
+  /** The browser says so late, and under load after a picture of the new size is there: that one stands. */
   private resized(): void {
-    this.invalidate();
+    if (this.renderer.hasSize(...this.size())) this.redraw();
+    else this.invalidate();
   }
 
   /** Backing size of the canvas: multiples of 4, so that a reference at half or a quarter has whole pixels. */
@@ -306,23 +308,24 @@ export class PageApp implements App {
    */
   async converge(samples = Infinity): Promise<Picture> {
     const { renderer } = this;
-    const scene = this.scene();
-    const [width, height] = this.size();
     this.converging = true;
     try {
-      renderer.resize(width, height);
-      if (this.dirty || renderer.samples > samples) renderer.invalidate();
-      this.dirty = false;
-      this.changed = -Infinity;
-      const wanted = () => !renderer.done(scene) && (renderer.samples < samples || !renderer.settled);
-      while (wanted()) {
-        for (let i = 0; i < 8 && wanted(); i++) renderer.step(scene, false);
-        await new Promise((resolve) => setTimeout(resolve));
-      }
+      do {
+        const scene = this.scene();
+        renderer.resize(...this.size());
+        if (this.dirty || renderer.samples > samples) renderer.invalidate();
+        this.dirty = false;
+        this.changed = -Infinity;
+        const wanted = () => !this.dirty && !renderer.done(scene) && (renderer.samples < samples || !renderer.settled);
+        while (wanted()) {
+          for (let i = 0; i < 8 && wanted(); i++) renderer.step(scene, false);
+          await new Promise((resolve) => setTimeout(resolve));
+        }
+      } while (this.dirty); // changed meanwhile: the picture is that of the state it is returned with
     } finally {
       this.converging = false;
     }
-    renderer.present(scene, this.presenter, this.canvas.width, this.canvas.height);
+    renderer.present(this.scene(), this.presenter, this.canvas.width, this.canvas.height);
     return this.picture();
   }
 

@@ -105,8 +105,12 @@ export class Renderer {
     return this.target?.height ?? 0;
   }
 
+  hasSize(width: number, height: number): boolean {
+    return this.target?.width === width && this.target.height === height;
+  }
+
   resize(width: number, height: number): void {
-    if (this.target?.width === width && this.target.height === height) return;
+    if (this.hasSize(width, height)) return;
     deleteTarget(this.gl, this.target);
     deleteTarget(this.gl, this.early);
     this.early = null;

@@ -112,7 +112,7 @@ export class CompareView implements Presenter {
 
   /** Where in the picture a point of the canvas lies, both 0 to 1 from the top left; null in the margins. */
   pictureAt(width: number, height: number, x: number, y: number): [number, number] | null {
-    if (this.app.state.compare.mode !== "side" || !this.reference) return [x, y];
+    if (this.app.state.compare.mode !== "side" || !this.upload(this.app.gl)) return [x, y];
     const { middle, shrink } = this.crop(width, height);
     const stacked = height > width;
     const part = stacked ? [x, (2 * y) % 1] : [(2 * x) % 1, y];
