@@ -50,6 +50,16 @@ def test_a_radiance_picture_whose_lines_run_wild_corrupts_nothing() -> None:
     assert "longer" in refused(radiance(9, 60, line(9, *[GREY] * 4) * 20 + line(9, *[bytes((255, 7))] * 8) * 40))
 
 
+@pytest.mark.parametrize("first", [b"-Y 9 +X -0", b"-Y 0x9 +X 9"])
+def test_a_radiance_picture_has_one_line_of_sizes(first: bytes) -> None:
+    # Mitsuba takes the first of them, and would end the process; another reader the first that it understands
+    whole = radiance(9, 1, line(9, *[GREY] * 4))
+    formats.check(whole, "RGBE")
+    header, _, rest = whole.partition(b"\n\n")
+    assert "no line" in refused(header + b"\n\n" + first + b"\n\n\n" + rest)
+    assert "no line" in refused(header + b"\n" + first + b"\n\n" + rest)
+
+
 @pytest.mark.parametrize("width", [3, 8, 9, 300])
 def test_radiance_is_read_as_mitsuba_does(tmp_path: Path, width: int) -> None:
     mi = engine.load()

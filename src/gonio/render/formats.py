@@ -257,8 +257,17 @@ _RESOLUTION = re.compile(rb"\n\n-Y (\d{1,9}) \+X (\d{1,9})\n")
 _FURTHEST = 1 << 16  # a header is no longer than this
 
 
+def _resolution(content: bytes) -> re.Match[bytes] | None:
+    """Of the line behind the first empty one. Mitsuba takes the first such line in the file, wherever it stands: a file
+    with one in its header too, or with one that only Mitsuba can read there, is refused."""
+    empty = content.find(b"\n\n", 0, _FURTHEST)
+    if empty < 0 or re.search(rb"-Y[^\n]*\+X", content[:empty]):
+        return None
+    return _RESOLUTION.match(content, empty)
+
+
 def _rgbe(content: bytes) -> Claimed:
-    found = _RESOLUTION.search(content, 0, _FURTHEST)
+    found = _resolution(content)
     if found is None:
         raise Unreadable("it has no line '-Y height +X width' behind its header")
     if b"FORMAT=32-bit_rle_xyze" in content[: found.start()]:
@@ -272,7 +281,7 @@ def _rgbe(content: bytes) -> Claimed:
 
 def _radiance(content: bytes, claimed: Claimed) -> NDArray[np.float32]:
     """Red, green, blue of a Radiance picture [Ward's `color.c`]: three mantissas with one exponent."""
-    found = _RESOLUTION.search(content, 0, _FURTHEST)
+    found = _resolution(content)
     assert found is not None, "`check` found it"
     width, height = claimed.width, claimed.height
     data = memoryview(content)[found.end() :]
