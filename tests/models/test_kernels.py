@@ -8,7 +8,24 @@ import pytest
 from gonio.models import binding
 from gonio.ops import backend
 
+from materials import SMALL
 from sphere import random_directions
+
+
+@pytest.mark.parametrize("material", SMALL.values(), ids=SMALL)
+def test_more_directions_compile_no_kernel(material: go.BSDF) -> None:
+    """Dr.Jit's mean over channels once wrote the number of lanes into the kernel."""
+    dr = backend.drjit()
+    compiled = []
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for count in (65, 66):
+            dr.kernel_history_clear()
+            wo, wi = random_directions(count, 1), random_directions(count, 2)
+            assert np.isfinite(material.eval(wo, wi)).all()
+            assert np.isfinite(material.pdf(wo, wi)).all()
+            assert np.isfinite(material.sample(wo, np.full((count, 3), 0.3, np.float32)).weight).all()
+            compiled.append(sum(not k["cache_hit"] for k in dr.kernel_history([dr.KernelType.JIT])))
+    assert compiled[1] == 0, compiled
 
 
 def test_a_changed_width_compiles_no_kernel() -> None:

@@ -283,7 +283,8 @@ def mean(spectrum: Spectrum) -> Scalar:
     """Mean over the channels of a spectrum, as a float."""
     if isinstance(spectrum, Node):
         return graph.emit("mean", "float", spectrum)
-    return drjit().mean(spectrum, axis=0)
+    # not Dr.Jit's mean, which writes the number of lanes into the kernel: another one for every size of an array
+    return drjit().sum(spectrum, axis=0) * (1.0 / len(spectrum))
 
 
 def max_component(spectrum: Spectrum) -> Scalar:
