@@ -108,6 +108,7 @@ def draw(found: dict[str, list[tuple[float, float]]], path: Path) -> None:
     axes.axhline(100.0 * GIVEN[1], color="0.7", linewidth=1, zorder=0)
     axes.text(GIVEN[0] * 1.06, 0.5, "16 KiB", color="0.4", transform=axes.get_xaxis_transform())
     axes.set(xlabel="bytes a material", ylabel="relative error on a sphere, median [%]")
+    axes.set_title("Compressed 13 MERL tables and 9 RGL files", fontsize=10)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)
 

@@ -13,12 +13,14 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import GonioWarning, InputError, MachineError
 from gonio.render import checkpoints, run, tiles
+from gonio.render.polarizer import PolarizedRender
 from gonio.work import crew, facts, parts
 from gonio.work.cluster import Cluster
 
@@ -172,6 +174,10 @@ def test_what_cannot_travel_is_refused(two: Cluster, tmp_path: Path) -> None:
     with crew.working(two), pytest.raises(InputError, match="one machine") as caught:
         go.render(tmp_path / "ball.xml", spp=2)
     assert "--integrator path" in caught.value.hint
+    polarized = SimpleNamespace(render=object.__new__(PolarizedRender), request=None)
+    with pytest.raises(InputError, match="a scene with a polarizer") as caught:
+        tiles.travelling(polarized)  # type: ignore[arg-type]
+    assert "--integrator" not in caught.value.hint
 
 
 sys.path.insert(0, str(Path(__file__).parent / "render"))

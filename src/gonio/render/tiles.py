@@ -29,6 +29,7 @@ from . import checkpoints, passes
 from .integrators import Render
 from .integrators.progressive import LANES
 from .passes import Progress
+from .polarizer import PolarizedRender
 from .request import Request
 
 if TYPE_CHECKING:
@@ -170,8 +171,10 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
     """
     request, where = prepared.request, "cluster"
     if not isinstance(prepared.render, Render):
-        what = "Mitsuba's own integrator renders on one machine"
-        raise InputError(what, where, "add --integrator path (or direct), or leave the cluster out")
+        what, instead = "Mitsuba's own integrator renders on one machine", "add --integrator path (or direct), or "
+        if isinstance(prepared.render, PolarizedRender):
+            what, instead = "a scene with a polarizer is rendered by Mitsuba's own integrator, on one machine", ""
+        raise InputError(what, where, f"{instead}leave --workers, or the cluster, out")
     named = dict(prepared.sources.files)
     folder = ""
     if request.material is None:
