@@ -4,7 +4,7 @@ A photograph adds J^T J to what is known of the material, J being the derivative
 must spend on its own lamp's faults. Chosen is the place after which the relative errors of the material's numbers,
 squared, have the smallest sum. The determinant (D-optimal) would ask for the smallest volume in which they may lie,
 and gladly tell again what is known well: by information alone, four places of its choice leave 1.08 times the error of
-eight random ones in the median, four of these .91. Places are taken one by one, each after the ones before.
+eight random ones in the median, four of these .77. Places are taken one by one, each after the ones before.
 """
 
 from __future__ import annotations
