@@ -82,14 +82,19 @@ class Render:
             raise InputError(f"{count} samples asked for", "advance", "1 or more")
         mi = self.mi
         with dr.suspend_grad(), garbage.kept():
-            first = dr.opaque(mi.UInt32, self.done)
-            last = first + dr.opaque(mi.UInt32, count)
-            if self._lanes is not None:  # some lanes are ahead, and go on or wait
-                first, last = self._lanes, dr.maximum(self._lanes, last)
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
-            lane = dr.arange(mi.UInt32, len(self._pixel)) * dr.opaque(mi.UInt32, self._begun)
-            sums = self._integrator.accumulate(self._pixel, key, first, last, self._sums.at(lane))
-            dr.eval(sums)
+            sums, begun = self._sums, self._begun
+            lowest, highest = self.done, self.done + count
+            if self._lanes is not None:
+                highest = max(highest, int(dr.max(self._lanes)[0]))
+            for start, end in self._integrator.stages(lowest, highest):
+                first, last = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, end)
+                if self._lanes is not None:  # some lanes are ahead, and go on or wait
+                    until = dr.maximum(self._lanes, dr.opaque(mi.UInt32, self.done + count))
+                    first, last = dr.clip(self._lanes, first, last), dr.minimum(until, last)
+                lane = dr.arange(mi.UInt32, len(self._pixel)) * dr.opaque(mi.UInt32, begun)
+                sums, begun = self._integrator.accumulate(self._pixel, key, first, last, sums.at(lane)), True
+                dr.eval(sums)
             dr.sync_thread()
         self._sums = sums
         self.done += count
