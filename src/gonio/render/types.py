@@ -39,6 +39,7 @@ Record: TypeAlias = OfVariant  # one of our own, made for a variant
 # Values with an entry for every lane, of the variant's types
 Float: TypeAlias = OfVariant
 UInt: TypeAlias = OfVariant
+Whole: TypeAlias = OfVariant  # of 64 bits, with a sign
 Mask: TypeAlias = OfVariant
 Point: TypeAlias = OfVariant  # of two or three components
 Vector: TypeAlias = OfVariant

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import ClassVar
@@ -86,11 +86,14 @@ class Integrator:
 
     name         as `--integrator` and a scene's "integrator" have it
     takes_depth  whether `Settings.max_depth` means something: then a scene must give maxDepth
+    splats       whether a sample adds to other pixels than its own, in whole numbers of `unit` (`Sums.splats`)
     """
 
     family: ClassVar[Family[type[Integrator]]]
     name: ClassVar[str] = ""
     takes_depth: ClassVar[bool] = False
+    splats: ClassVar[bool] = False
+    unit: float = 1.0  # what one of its splats counts
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         self.mi, self.scene, self.sensor, self.settings, self.aovs = mi, scene, sensor, settings, aovs
@@ -119,6 +122,10 @@ class Integrator:
         return [dr.select(si.is_valid(), v, 0) for v in (*self.show(si, key, index), *features)]
 
     # ------------------------------------------------------------------ what it has
+
+    def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """Samples [first, last) cut into what one kernel takes: what it needs is there when it is asked for."""
+        yield first, last
 
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
         """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples."""

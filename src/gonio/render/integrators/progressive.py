@@ -61,7 +61,8 @@ class Render:
         self._order = _tiles(self.width, self.height)
         self._pixel = mi.UInt32(self._order)
         dr.make_opaque(self._pixel)
-        self._sums = Sums.zeros(mi, NOTHING, 6 if aovs else self.features)
+        self._splatted = self.width * self.height if settings.program.splats else 0
+        self._sums = Sums.zeros(mi, NOTHING, 6 if aovs else self.features, self._splatted)
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
@@ -81,14 +82,19 @@ class Render:
             raise InputError(f"{count} samples asked for", "advance", "1 or more")
         mi = self.mi
         with dr.suspend_grad(), garbage.kept():
-            first = dr.opaque(mi.UInt32, self.done)
-            last = first + dr.opaque(mi.UInt32, count)
-            if self._lanes is not None:  # some lanes are ahead, and go on or wait
-                first, last = self._lanes, dr.maximum(self._lanes, last)
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
-            lane = dr.arange(mi.UInt32, len(self._pixel)) * dr.opaque(mi.UInt32, self._begun)
-            sums = self._integrator.accumulate(self._pixel, key, first, last, self._sums.at(lane))
-            dr.eval(sums)
+            sums, begun = self._sums, self._begun
+            lowest, highest = self.done, self.done + count
+            if self._lanes is not None:
+                highest = max(highest, int(dr.max(self._lanes)[0]))
+            for start, end in self._integrator.stages(lowest, highest):
+                first, last = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, end)
+                if self._lanes is not None:  # some lanes are ahead, and go on or wait
+                    until = dr.maximum(self._lanes, dr.opaque(mi.UInt32, self.done + count))
+                    first, last = dr.clip(self._lanes, first, last), dr.minimum(until, last)
+                lane = dr.arange(mi.UInt32, len(self._pixel)) * dr.opaque(mi.UInt32, begun)
+                sums, begun = self._integrator.accumulate(self._pixel, key, first, last, sums.at(lane)), True
+                dr.eval(sums)
             dr.sync_thread()
         self._sums = sums
         self.done += count
@@ -102,7 +108,7 @@ class Render:
     def state(self) -> dict[str, NDArray[Any]]:
         """The sums so far, as arrays of one entry a lane that stay as they are while more is rendered."""
         if not self._begun:
-            return Sums.zeros(self.mi, len(self._pixel), len(self._sums.near) - 3).arrays()
+            return Sums.zeros(self.mi, len(self._pixel), len(self._sums.near) - 3, self._splatted).arrays()
         ahead = {} if self._lanes is None else {LANES: np.asarray(self._lanes)}
         return {**self._sums.arrays(), **ahead}
 
@@ -118,12 +124,17 @@ class Render:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
         self._pixel = self.mi.UInt32(np.array(self._order[lanes]))
         dr.make_opaque(self._pixel)
-        self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.near) - 3)
+        self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.near) - 3, self._splatted)
         self.done, self._lanes = 0, None
 
     def image(self) -> NDArray[np.float32]:
         """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""
-        return self._mean(self._sums.near[0:3], self._sums.far)
+        picture = self._mean(self._sums.near[0:3], self._sums.far)
+        if self._splatted and self._begun:
+            scale = self._integrator.unit / max(self.done, 1)
+            splats = [np.array(channel) * scale for channel in self._sums.splats]
+            picture += np.stack(splats, -1).reshape(picture.shape).astype(np.float32)
+        return picture
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
         """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).

@@ -64,11 +64,12 @@ class _Path:
     radiance: Radiance  # found so far
     alone: UInt  # 1 where the first wavelength goes on without the others
     inside: UInt  # of which media, see `media.py`
+    lobe: Float  # pdf over cosine with which the last lobe before mirrors chose its direction; 0 where there was none
     active: Mask
 
 
 @cache
-def _waiting_type(variant: str, media: bool) -> Record:
+def _waiting_type(variant: str, media: bool, merges: bool) -> Record:
     """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a _Path.
 
     A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
@@ -80,6 +81,7 @@ def _waiting_type(variant: str, media: bool) -> Record:
     kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
     kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
     kept |= ({"alone": mi.UInt32} if mi.is_spectral else {}) | ({"inside": mi.UInt32} if media else {})
+    kept |= {"lobe": mi.Float} if merges else {}
 
     def pack(path: _Path) -> Record:
         hit = {name: getattr(path.hit, name) for name in found}
@@ -90,7 +92,7 @@ def _waiting_type(variant: str, media: bool) -> Record:
         for name in found:
             setattr(hit, name, getattr(rest, name))
         hit.valid = rest.t < dr.inf
-        fields = dict.fromkeys(("alone", "inside"), mi.UInt32(0))
+        fields = {"alone": mi.UInt32(0), "inside": mi.UInt32(0), "lobe": mi.Float(0)}
         fields |= {name: kind(getattr(rest, name)) for name, kind in kept.items()}
         return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
 
@@ -105,17 +107,19 @@ class Transport(Integrator):
     samples_lights  whether each vertex looks for light by sampling the lights
     samples_lobes   whether it does by sampling the BSDF's lobes; delta lobes are always followed
     plays_roulette  whether dim paths are ended by chance
+    merges          whether particles bring light to vertices too: then it has `merged` and `found`
     depth           the longest path in segments, a method
     """
 
     samples_lights: ClassVar[bool] = True
     samples_lobes: ClassVar[bool] = True
     plays_roulette: ClassVar[bool] = False
+    merges: ClassVar[bool] = False
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         super().__init__(mi, scene, sensor, settings, aovs)
         self.media = Media(mi, scene)
-        self.Waiting = _waiting_type(mi.variant(), self.media.known)
+        self.Waiting = _waiting_type(mi.variant(), self.media.known, self.merges)
         self.context = mi.BSDFContext()
         self.context.type_mask = NESTS if self.media.known else SEPARATES
         self.lights = Lights(mi, scene, self.surfaces)
@@ -126,8 +130,10 @@ class Transport(Integrator):
         self.disperses = any(shape.bsdf().flags() & DISPERSES for shape in scene.shapes())
         eye = mi.Point3f(sensor.world_transform() @ mi.Point3f(0.0)) if self.media.known else None
         self.begun = None if eye is None else self.media.around(eye)
-        # Whether any path has a second vertex to shade; where media dim the way to a lamp, the last ray is traced too.
-        self.goes_on = (depth > 2 or self.media.known) and (self.samples_lobes or self.follows_delta)
+        # Where media dim the way to a lamp, or particles compete for it, the last ray is traced like the others.
+        self.traces_last = self.media.known or self.merges
+        # Whether any path has a second vertex to shade.
+        self.goes_on = (depth > 2 or self.traces_last) and (self.samples_lobes or self.follows_delta)
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
@@ -213,7 +219,7 @@ class Transport(Integrator):
         ray, weight, hit = self.first_hit(pixel, key, index)
         inside = self.begun if self.begun is not None else mi.UInt32(0)
         return _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
-                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), inside, mi.Bool(True))  # fmt: skip
+                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), inside, mi.Float(0), mi.Bool(True))  # fmt: skip
 
     def extend(self, path: _Path, key: UInt, features: list[Float] | None = None) -> _Path:
         """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
@@ -236,6 +242,8 @@ class Transport(Integrator):
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)
             weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
+            if self.merges:
+                emitted = self.found(ray, path.lobe, si, emitted, active & (path.pdf == 0))
         radiance = radiance + throughput * dr.select(active, emitted, 0)
         active = active & si.is_valid() & (depth + 1 < self.max_depth)
 
@@ -251,6 +259,10 @@ class Transport(Integrator):
         if crossing is not None:
             bs, weight = self.straight_on(si, bs, weight, active & ~crossing.surface)
             inside = dr.select(si.wi.z * bs.wo.z < 0.0, crossing.beyond, crossing.here)
+        if self.merges:
+            surface = active if crossing is None else active & crossing.surface
+            _, u = sampler.independent_pair(key, path.index, dimension + ROULETTE)
+            gathered = gathered + self.merged(si, bsdf, depth, u, surface)
         radiance = radiance + throughput * dr.select(active, gathered, 0)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(self.ambient, bsdf, si, active)
@@ -267,21 +279,33 @@ class Transport(Integrator):
             throughput, active = self.roulette(path.index, key, dimension, depth, throughput, eta, active)
 
         ray = si.spawn_ray(si.to_world(bs.wo))
+        lobe = path.lobe
+        if self.merges:
+            begun = bs.pdf / dr.maximum(abs(dr.dot(ray.d, si.n)), 1e-6)
+            lobe = dr.select(delta, lobe * dr.square(bs.eta), begun)
         # The last ray can only find light: no surface beyond it is shaded.
         end = active & last
 
         def weigh(light: Radiance, light_pdf: Float) -> Radiance:
             return dr.select(pdf > 0, light * mis(pdf, light_pdf), light) if self.samples_lights else light
 
-        if crossing is None:
+        if not self.traces_last:
             radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
             active = active & ~last
         hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         if not lights.has_environment:  # else the path goes on to meet it
             active = active & hit.is_valid()
         return _Path(
-            path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, alone, inside, active
+            path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, alone, inside, lobe, active
         )
+
+    def merged(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, depth: UInt, u: Float, active: Mask) -> Radiance:
+        """Of an integrator that merges: what particles bring to a vertex."""
+        raise NotImplementedError
+
+    def found(self, ray: Ray, lobe: Float, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
+        """Of an integrator that merges: what counts of a lamp that a path meets by way of mirrors."""
+        raise NotImplementedError
 
     def straight_on(
         self, si: SurfaceInteraction, bs: BSDFSample, weight: Radiance, through: Mask

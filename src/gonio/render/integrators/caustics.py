@@ -1,0 +1,164 @@
+"""Path tracing with a progressive map of the light behind mirrors and smooth glass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import ModuleType
+from typing import ClassVar
+
+import drjit as dr
+import numpy as np
+
+from ..photons import Photon, PhotonMap
+from ..sources import Targets
+from ..types import Float, Mask, MitsubaBSDF, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
+from .base import Settings
+from .particles import FIRST_VERTEX, VERTEX_DIMENSIONS, Flight, Particles
+from .path import Path
+
+SHARED = 4  # samples of a pixel that look at the same map
+PER_PIXEL = 2.0  # particles of a map for each pixel,
+FEWEST, MOST = 1 << 14, 1 << 19  # but so many at least, and at most
+FOOTPRINT = 1.5  # first radius of a search, in pixels as they are seen on the scene on the median
+SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
+PROBED = 48  # rays each way, to measure a pixel
+
+
+class Caustics(Path):
+    """Path tracing, where light by way of mirrors and smooth glass comes from a map of particles, too.
+
+    Of the light that mirrors or glass throw upon a surface, paths from the camera find what comes from wide lamps,
+    particles from the lamps what comes from small ones: each is weighed by how likely it was to find it. A particle counts
+    for places around it, within a radius that shrinks, so that the picture is blurred by about a pixel at first and
+    sharp in the end (consistent, not unbiased); all other light is that of `path`.
+    """
+
+    name = "caustics"
+    merges: ClassVar[bool] = True
+
+    def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
+        shapes = [shape for shape in scene.shapes() if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta)]
+        self.particles: Particles | None = None
+        super().__init__(mi, scene, sensor, settings, aovs)
+        self.merging = bool(shapes) and self.lights.count > 0 and settings.max_depth > 2
+        if not self.merging:
+            return
+        self.particles = Particles(self, Targets(mi, shapes))
+        size = sensor.film().crop_size()
+        self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
+        self.radius = FOOTPRINT * self._pixel()
+        self._map: tuple[int, PhotonMap] | None = None
+
+    def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """The samples that share a map; the map is made before them."""
+        while self.merging and first < last:
+            number = first // SHARED
+            if self._map is None or self._map[0] != number:
+                self._map = None  # before the next one: there is one at a time
+                self._map = number, self._traced(number)
+            end = min(last, (number + 1) * SHARED)
+            yield first, end
+            first = end
+        if not self.merging:
+            yield from super().stages(first, last)
+
+    def _pixel(self) -> float:
+        """The width of a pixel on what is seen, on the median."""
+        mi = self.mi
+        across = int(self.sensor.film().crop_size()[0])
+        x, y = dr.meshgrid(*[dr.linspace(mi.Float, 0.01, 0.99, PROBED)] * 2)
+        rays = []
+        for step in (0.0, 1.0 / across):
+            place = mi.Point2f(x + dr.opaque(mi.Float, step), y)
+            rays.append(self.sensor.sample_ray(0.0, 0.5, place, mi.Point2f(0.5))[0])
+        hit = self.scene.ray_intersect_preliminary(mi.Ray3f(rays[0]))
+        angle = dr.norm(rays[1].d - rays[0].d)
+        widths = np.array(dr.select(hit.is_valid(), hit.t * angle, 0))
+        widths = widths[widths > 0]
+        return float(np.median(widths)) if len(widths) else 1e-3
+
+    # ------------------------------------------------------------------ particles
+
+    def _traced(self, number: int) -> PhotonMap:
+        """Map `number` of the picture."""
+        mi, particles = self.mi, self.particles
+        assert particles is not None
+        lane = dr.arange(mi.UInt32, self.count)
+        begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
+        low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
+        particle, flight = particles.leave(key, low, mi.Bool(True))
+        photon = Photon(
+            mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0)
+        )
+
+        def vertex(flight: Flight, photon: Photon, kept: Mask) -> tuple[Flight, Photon, Mask]:
+            si, bsdf, crossing = particles.arrive(flight)
+            flags = bsdf.flags()
+            smooth, rough = mi.has_flag(flags, mi.BSDFFlags.Delta), mi.has_flag(flags, mi.BSDFFlags.Smooth)
+            at = flight.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
+            # A surface that is both a mirror and rough keeps every second particle, at twice its share.
+            both = smooth & rough & (flight.depth > 1)
+            flight.share *= dr.select(both, 2, 1)
+            stays = flight.active & rough & (flight.depth > 1) & (~both | (self._coin(key, low, at) < 0.5))
+            if crossing is not None:
+                stays &= crossing.surface
+            arrived = Photon(
+                si.p,
+                mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, -flight.ray.d)),
+                mi.Vector3f(-flight.ray.d),
+                flight.flux * flight.share / self._total,
+                particle.density * dr.square(flight.eta),
+                flight.depth,
+            )
+            photon, kept = dr.select(stays, arrived, photon), kept | stays
+            bs, weight = particles.scatter(key, low, flight, si, bsdf, crossing)
+            active = flight.active & ~stays & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            return particles.go_on(key, low, flight, si, crossing, bs, weight, active), photon, kept
+
+        self._total = dr.opaque(mi.Float, self.count)
+        state = (flight, photon, mi.Bool(False))
+        state = dr.while_loop(state, lambda f, *_: f.active, vertex, mode="symbolic", label="particles")
+        return PhotonMap(mi, state[1], state[2], self.radius * (number + 1) ** SHRINKING)
+
+    def _coin(self, key: UInt, low: UInt, at: UInt) -> Float:
+        return self.pair(key, low, at + 2)[0]
+
+    # ------------------------------------------------------------------ paths
+
+    def merged(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, depth: UInt, u: Float, active: Mask) -> Radiance:
+        """The light that particles have brought to a place, toward the path that has come there."""
+        mi = self.mi
+        if self._map is None:
+            return mi.Spectrum(0)
+        photons = self._map[1]
+        active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        normal = mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, si.to_world(si.wi)))
+
+        def visit(photon: Photon, weight: Float, here: Mask) -> Radiance:
+            here &= photon.depth + depth + 1 <= self.max_depth
+            value, pdf = bsdf.eval_pdf(self.context, si, si.to_local(photon.direction), here)
+            cosine = dr.maximum(abs(dr.dot(photon.direction, si.n)), 1e-6)
+            share = 1 - self._by_path(pdf / cosine, photon.density, photons)
+            return dr.select(here, value * photon.flux * (weight * share / cosine), 0)
+
+        return photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active)
+
+    def _by_path(self, lobe: Float, density: Float, photons: PhotonMap) -> Float:
+        """Weight of a path that finds the lamp behind mirrors by itself, beside the particles (power heuristic).
+
+        lobe     density of its last direction before the mirrors, over the cosine
+        density  of the particles' étendue at the lamp, in the medium where the path set out
+        """
+        particles = density * (self._total * dr.pi * dr.square(photons.radius))
+        ratio = particles / lobe
+        return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
+
+    def found(self, ray: Ray, lobe: Float, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
+        """What a path finds at a lamp that it meets by way of mirrors, beside the particles."""
+        if self._map is None:
+            return emitted
+        assert self.particles is not None
+        behind = active & (lobe > 0) & dr.any(emitted != 0)
+        density = self.particles.sources.density(ray.o, si, ray.d, behind)
+        return dr.select(behind, emitted * self._by_path(lobe, density, self._map[1]), emitted)
+

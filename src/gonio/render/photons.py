@@ -1,0 +1,149 @@
+"""A map of particles that lie where they have arrived: how much light comes to a place, and from where.
+
+The map is a grid of cells as wide as a search (two radii), hashed so that a row of cells along x is one row of memory:
+what may lie within the radius of a place stands in four such rows. Particles are sorted by cell and by number, so that
+sums over them do not depend on who computed them, or in what order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+
+import drjit as dr
+import numpy as np
+
+from . import sampler
+from .types import Float, Mask, Point, Radiance, UInt, Vector
+
+ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
+LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
+FACING = 0.9  # and cosine of the angle to its normal: what lies around an edge is elsewhere
+VISITED = 32  # particles of a row, about
+FIELDS = 16  # numbers of a particle, see Photon
+
+
+@dataclass
+class Photon:
+    """A particle at rest.
+
+    position, normal  where it lies, and of which surface
+    direction         where it came from, a unit vector away from the surface
+    flux              its share of the light
+    density           of étendue at its lamp, `sources.Particle.density`, over the square of the index there
+    depth             segments that it has behind it
+    """
+
+    position: Point
+    normal: Vector
+    direction: Vector
+    flux: Radiance
+    density: Float
+    depth: UInt
+
+    def packed(self) -> list[Float]:
+        """Sixteen numbers: what a search compares, then what it needs of those that it finds."""
+        mi_float = type(self.density)
+        flux = list(self.flux) + [mi_float(0)] * (4 - len(self.flux))
+        first = [*self.position, *self.normal, mi_float(self.depth), self.density]
+        return [*first, *self.direction, mi_float(0), *flux]
+
+
+class PhotonMap:
+    """Particles, found by place. `radius` is a number of the kernel like the particles: changed, it compiles nothing."""
+
+    def __init__(self, mi: ModuleType, photons: Photon, kept: Mask, radius: float):
+        self.mi = mi
+        self.radius = dr.opaque(mi.Float, radius)
+        self.per_cell = dr.opaque(mi.Float, 0.5 / radius)
+        kept = kept & dr.isfinite(dr.sum(photons.flux) + dr.sum(photons.position) + dr.sum(photons.direction))
+        total = dr.width(photons.position)
+        bits = max(int(total - 1).bit_length(), 10)
+        self.mask = dr.opaque(mi.UInt32, (1 << bits) - 1)
+        self.keys = (1 << bits) + ROW
+        cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photons.position]
+        self.low = dr.opaque(mi.Int32, -(ROW // 2))  # of cells along x, about the origin of the scene
+        key = dr.select(kept, self._row(cell[1], cell[2]) + self._along(cell[0]), self.keys)
+        values = photons.packed()
+        dr.eval(key, values)
+        # The key above the number: their order is one of whole numbers, and the same whoever sorts.
+        words = (np.array(key, np.uint64) << np.uint64(32)) | np.arange(total, dtype=np.uint64)
+        words.sort()
+        sorted_keys = (words >> np.uint64(32)).astype(np.uint32)
+        self.count = int(np.searchsorted(sorted_keys, self.keys))
+        starts = np.searchsorted(sorted_keys, np.arange(self.keys + 1, dtype=np.uint32)).astype(np.uint32)
+        self.starts = mi.UInt32(starts)
+        order = mi.UInt32(words.astype(np.uint32))
+        self.values = dr.empty(mi.Float, total * FIELDS)
+        lane = dr.arange(mi.UInt32, total)
+        for place, value in enumerate(values):
+            dr.scatter(self.values, dr.gather(mi.Float, value, order), lane * FIELDS + place)
+        dr.make_opaque(self.starts)
+        dr.eval(self.values)
+
+    def _row(self, y: UInt, z: UInt) -> UInt:
+        mi = self.mi
+        return sampler.mix(mi.UInt32(y), mi.UInt32(z)) & self.mask
+
+    def _along(self, x: UInt) -> UInt:
+        return self.mi.UInt32(dr.clip(x - self.low, 0, ROW - 1))
+
+    def gather(
+        self,
+        place: Point,
+        normal: Vector,
+        u: Float,
+        zero: Radiance,
+        visit: Callable[[Photon, Float, Mask], Radiance],
+        active: Mask,
+    ) -> Radiance:
+        """Sum over the particles around a place: `visit(particle, weight by distance in 1/m^2, mask)`.
+
+        The weight is a paraboloid over the disc of the radius, with the integral 1. Where they lie close, every second,
+        third, ... one of a row is visited, from one on that the random number `u` chooses, and stands for the others.
+        """
+        mi, radius2 = self.mi, dr.square(self.radius)
+        low = [mi.Int32(dr.floor((x - self.radius) * self.per_cell)) for x in place]
+        high = [mi.Int32(dr.floor((x + self.radius) * self.per_cell)) for x in place]
+        along = self._along(low[0]), self._along(high[0]) + 1
+
+        def row(number: UInt, wanted: Mask) -> tuple[UInt, UInt, UInt, UInt, UInt]:
+            """(cell in y, in z, first and last particle, step) of one of the four rows; empty where there are fewer."""
+            up, far = (number & 1) != 0, (number & 2) != 0
+            y, z = dr.select(up, high[1], low[1]), dr.select(far, high[2], low[2])
+            there = wanted & (number < 4) & (~up | (high[1] != low[1])) & (~far | (high[2] != low[2]))
+            begin = self._row(y, z)
+            first = dr.gather(mi.UInt32, self.starts, begin + along[0], there)
+            last = dr.select(there, dr.gather(mi.UInt32, self.starts, begin + along[1], there), first)
+            stride = 1 + (last - first) // VISITED
+            return y, z, first + dr.minimum(mi.UInt32(u * mi.Float(stride)), stride - 1), last, stride
+
+        def step(number: UInt, y: UInt, z: UInt, at: UInt, end: UInt, stride: UInt, total: Radiance):  # type: ignore[no-untyped-def]
+            here = at < end
+            record = dr.gather(mi.Matrix4f, self.values, at, here)
+            near = [record[i // 4, i % 4] for i in range(8)]
+            position, other = mi.Point3f(*near[:3]), mi.Normal3f(*near[3:6])
+            offset = position - place
+            distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
+            here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius) & (dr.dot(normal, other) > FACING)
+            # rows of other cells may share their memory
+            here &= (mi.Int32(dr.floor(position.y * self.per_cell)) == y)
+            here &= (mi.Int32(dr.floor(position.z * self.per_cell)) == z)
+            rest = [record[i // 4, i % 4] for i in range(8, 16)]
+            flux = type(zero)(*rest[4 : 4 + len(zero)])
+            photon = Photon(position, other, mi.Vector3f(*rest[:3]), flux, near[7], mi.UInt32(near[6]))
+            weight = (1 - distance2 / radius2) * (2 / (dr.pi * radius2)) * mi.Float(stride)
+            total = total + dr.select(here, visit(photon, weight, here), 0)
+            at = at + stride
+            over = at >= end
+            following = row(number + 1, over)
+            y, z, at, end, stride = (
+                dr.select(over, new, old) for new, old in zip(following, (y, z, at, end, stride), strict=True)
+            )
+            return number + dr.select(over, mi.UInt32(1), 0), y, z, at, end, stride, total
+
+        begin = mi.UInt32(dr.select(active, mi.UInt32(0), 4))
+        state = (begin, *row(begin, active), zero)
+        found = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
+        return found[-1]
