@@ -37,7 +37,8 @@ _PLACES = {
         *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "never", "number", "spectrum"),
         "width",
     ),
-    "models.library": ("fits", "material", "materials"),
+    "models.library": ("fits", "materials"),
+    "models.notation": ("material",),
     "measure.compression.compress": ("compress",),
     "measure.fitting.fit": ("fit",),
     "energy": ("Albedo", "albedo"),
@@ -85,11 +86,12 @@ if TYPE_CHECKING:
     from .models.film_conductor import FilmConductor
     from .models.film_dielectric import FilmDielectric
     from .models.lambert import Lambert
-    from .models.library import fits, material, materials
+    from .models.library import fits, materials
     from .models.metal import Metal
     from .models.mirror import Mirror
     from .models.mix import Mix
     from .models.mix import Mix as mix
+    from .models.notation import material
     from .models.oren_nayar import OrenNayar
     from .models.parameters import (
         Angle,

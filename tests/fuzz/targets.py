@@ -13,6 +13,7 @@ import io
 import json
 import shlex
 import struct
+import warnings
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -505,6 +506,40 @@ def material_notation(data: bytes, folder: Path) -> object:
     from gonio.models import notation
 
     return notation.named(data.decode("utf-8", "surrogateescape"))
+
+
+def _gltfs() -> list[bytes]:
+    import gltf_files as files
+
+    return [files.text(files.document()), files.text(files.meshed()), files.glb(*files.pictured())]
+
+
+def _glb_repaired(data: bytes) -> bytes:
+    import gltf_files
+
+    return gltf_files.glb_repaired(data)
+
+
+@target("gltf", _gltfs, [
+    b"-1", b"1e999", b"NaN", b"null", b"[]", b"{}", b"true", b'"uri"', b'"../a"', b'"http://a"', b'"data:;base64,AA"',
+    b'"children":[0]', b'"count":9999999999', b"KHR_materials_", b'"source":0', b'"bufferView":0', b"99999999999999",
+], _glb_repaired)  # fmt: skip
+def gltf(data: bytes, folder: Path) -> object:
+    """Every material, as a text names it and as a scene holds it."""
+    from gonio.models import notation
+    from gonio.models.documents import Document
+    from gonio.render.scene.reader import read
+
+    path = saved(folder / ("a.glb" if data[:4] == b"glTF" else "a.gltf"), data)
+    found = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name in Document.family.get("gltf").materials(path)[:8]:
+            found.append(notation.named(f"{path}:{name}"))
+            material = {"type": "gltf", "file": path.name, "material": name}
+            shape = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": material}
+            read(saved(folder / "scene.json", _scene(shape)))
+    return found
 
 
 def messages() -> list[bytes]:

@@ -52,7 +52,8 @@ class Material:
             return list(models)
         if len(models) > 1:
             found = notation.several(models, shared)
-            return [_text(name, named) for name, (_, named) in zip(models, found, strict=True)]
+            texts = [{key: value for key, value in named.items() if isinstance(value, str)} for _, named in found]
+            return [_text(name, given) for name, given in zip(models, texts, strict=True)]
         own = models[0].partition("(")[2].removesuffix(")")
         return [_text(models[0], dict(map(notation.assignment, shared)), own)]
 
@@ -67,7 +68,7 @@ class Material:
 
         text = str(scene)
         head = text.partition("(")[0]
-        if outside.reader_of(head) or (not scene.exists() and notation.names_material(head)):
+        if outside.names_data(head) or (not scene.exists() and notation.names_material(head)):
             return notation.named(self.text(text))[0]
         if self.param or self.preset:
             what = "parameters of a material given, and a scene"

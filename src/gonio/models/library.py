@@ -46,18 +46,6 @@ class Fit(NamedTuple):
     materials: Mapping[str, Mapping[str, Value]]
 
 
-def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
-    """A named material, `material("alum-bronze")`, by one of the published fits.
-
-    name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them
-    fit         FILE/FIT; Bagher2012's if not given
-    parameters  in place of the fitted ones
-    Raises InputError, with the nearest known name, where it is unknown or the paper left the material out.
-    """
-    cls, preset = named(f"{name}:{fit}" if fit else name)
-    return cls.preset(preset, **parameters)
-
-
 def materials() -> list[str]:
     """The names, in alphabetical order."""
     return sorted(published()[DEFAULT].materials)

@@ -3,6 +3,7 @@
     conductor                                   its name; parameters follow as NAME=VALUE
     ward.py:Ward                                a class in a Python file, which runs because the user named it
     gold.binary                                 a file of measured values
+    chest.gltf:Wood                             a material of a glTF file, with its numbers (`documents`)
     alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
     alum-bronze:low2012/lowsmooth_E2            the same by another published fit
     conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
@@ -23,11 +24,29 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..optics.indices import DispersiveIndex
-from . import is_model, library, model, outside, tree
+from . import documents, is_model, library, model, outside, tree
 from .material import BSDF
 from .parameters import IndexParameter, Parameter, Value
 
 _CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
+_SETTINGS = re.compile(r"\(\s*\w+\s*=.*\)\s*\Z", re.DOTALL)  # at a text's end
+
+
+def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
+    """A named material, `material("alum-bronze")`, by one of the published fits; or one of a file, "chest.gltf:Wood".
+
+    name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them. Or a file in which another program
+                describes materials, behind a colon which, where it holds several
+    fit         FILE/FIT; Bagher2012's if not given
+    parameters  in place of the fitted ones
+    Raises InputError, with the nearest known name, where it is unknown or the paper left the material out, and for a
+    file that cannot be read; GonioWarning for what a file has and Gonio's materials do not.
+    """
+    if documents.names_document(name) and not library.knows(name):
+        cls, given = taken_apart(name, "material")
+        return made(cls, {**given, **parameters})[0]
+    cls, preset = library.named(f"{name}:{fit}" if fit else name)
+    return cls.preset(preset, **parameters)
 
 
 def assignment(text: str, option: str = "--param") -> tuple[str, str]:
@@ -50,7 +69,7 @@ def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple
     return outside.probe(material), values
 
 
-def several(texts: Sequence[str], assignments: Sequence[str]) -> list[tuple[type[BSDF], dict[str, str]]]:
+def several(texts: Sequence[str], assignments: Sequence[str]) -> list[tuple[type[BSDF], dict[str, object]]]:
     """Of each text the class and what is set of it: its own settings, and of the shared ones those that it has.
 
     assignments  "name=value" each, shared by all; InputError for one that no material has
@@ -231,23 +250,27 @@ def spelled(cls: type[BSDF]) -> str:
         return cls.__qualname__
 
 
-def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, str]]:
-    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...)."""
+def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, object]]:
+    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); of a document's material
+    what JSON has for them."""
     if text.count("(") + text.count("{") > tree.MOST:
         raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
     head = text.strip()
     while True:  # a file's name may have brackets in it
         reader = outside.reader_of(head)
-        if reader is not None:
-            given = dict(assignment(part, where) for part in _parts(text.strip()[len(head) :].strip("() ")))
-            return reader, {"file": head, **given}
+        document = documents.names_document(head) and not _SETTINGS.search(head)
+        if reader is not None or document:
+            given: dict[str, object] = {"file": head} if reader is not None else documents.without_pictures(head)
+            cls = reader if reader is not None else class_named(str(given.pop("type")), where)
+            given.update(assignment(part, where) for part in _parts(text.strip()[len(head) :].strip("() ")))
+            return cls, given
         head, bracket, _ = head.rpartition("(")
         if not bracket:
             break
     match = _CALL.fullmatch(text)
     if not match or re.fullmatch(r"[\d.-]+", match[1]):
         raise _no_material(text, where)
-    own = dict(assignment(part, where) for part in _parts(match[2] or ""))
+    own: dict[str, object] = dict(assignment(part, where) for part in _parts(match[2] or ""))
     cls, preset = class_and_preset(match[1], where)
     return cls, {"preset": preset, **own} if preset else own
 

@@ -22,7 +22,7 @@ from .. import members
 from ..errors import GonioError, InputError, did_you_mean
 from ..ops import RecordingError
 from ..owner import alone
-from . import tree
+from . import documents, tree
 from .material import BSDF
 from .sample import Sample
 
@@ -41,6 +41,11 @@ def names_code(text: str) -> bool:
 def reader_of(text: str) -> type[BSDF] | None:
     """The material that a file of data is, by the file's name: Measured of "gold.binary"; None where it is none."""
     return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
+
+
+def names_data(text: str) -> bool:
+    """Whether a text names a file of data that is a material: measured values, or another program's description."""
+    return reader_of(text) is not None or documents.names_document(text)
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:

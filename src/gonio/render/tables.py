@@ -167,7 +167,7 @@ def _target(target: str | Path | BSDF) -> str | BSDF:
         return target
     if outside.names_code(name):
         return _own(target, name)
-    if outside.reader_of(name):
+    if outside.names_data(name):
         return notation.named(target)[0]
     known = [*distributions(), *models()]
     if name.replace("_", "-") not in known:

@@ -6,6 +6,7 @@ glass.py:my_glass        a plugin of Mitsuba's that the file registers, by that 
 mitsuba:roughplastic     a plugin, Mitsuba's or the user's, with its properties as parameters
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
+chest.gltf:Wood          a material of a glTF file
 """
 
 from __future__ import annotations
@@ -71,9 +72,9 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         return Subject(bsdf, target, values)
     if target.endswith(".py"):
         raise InputError(f"'{target}' names a file, but no class in it", "TARGET", f"give {target}:CLASS")
-    if outside.reader_of(target):
+    if outside.names_data(target):
         bsdf, values = notation.named(target, [f"{name}={value}" for name, value in given.items()])
-        return Subject(bsdf, target, {name: value for name, value in values.items() if name != "file"})
+        return Subject(bsdf, target, {name: values[name] for name in given})
     if target.lstrip().startswith("{") or target.lower().endswith((".json", ".xml")):
         return _from_file(target, given)
     if Path(target).suffix in (".merl", ".csv", ".txt") or Path(target).is_file():

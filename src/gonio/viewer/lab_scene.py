@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..models import BSDF, notation, tree
+from ..models import BSDF, documents, notation, tree
 from ..render import scene
 from ..render.scene import schema, spectra, textures
 from ..render.scene.materials import BY_TYPE, MaterialPart
@@ -223,7 +223,10 @@ def _environment(description: schema.SceneDescription, light: schema.Environment
     if not isinstance(source, ImageTexture):
         return {**found, "constant": [float(x) for x in spectra.colour(source)]}
     where = description.where("/scene/lights")
-    pixels = textures.load_image(description.locate(source.file, where), where, srgb=source.color_space == "srgb")
+    path, inside = description.locate(source.file, where), documents.inside(source.file)[1]
+    srgb = source.color_space == "srgb"
+    pixels = textures.load_image(path, where, srgb=srgb, channel=source.channel, inside=inside)
+    pixels = pixels * np.asarray(source.factor, np.float32)
     pixels = _smaller(np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
     halves = np.ones((*pixels.shape[:2], 4), "<f2")
     halves[..., :3] = np.clip(pixels, 0.0, np.finfo(np.float16).max)

@@ -69,7 +69,7 @@ def plot(
 
 def is_tables(text: str | Path) -> bool:
     """Whether this names baked tables, and no material."""
-    if outside.reader_of(str(text)):
+    if outside.names_data(str(text)):
         return False
     return os.sep in str(text) or str(text).endswith(".npz") or Path(text).is_dir()
 

@@ -216,7 +216,7 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
     for target in targets:
         head = target.partition("(")[0]
-        if ":" in head and not outside.names_code(head) and not outside.reader_of(head):
+        if ":" in head and not outside.names_code(head) and not outside.names_data(head):
             hint = "the page's shader code is written from Gonio's models only"
             raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
     found = notation.several(targets, parameters)

@@ -6,7 +6,21 @@ from typing import Self
 
 from ... import ops
 from ...errors import InputError
-from ...models import BSDF, Colour, Number, Sample, Width, binding, bsdf, method, microfacet, number, spectrum, tree
+from ...models import (
+    BSDF,
+    Colour,
+    Number,
+    Sample,
+    Width,
+    binding,
+    bsdf,
+    choice,
+    method,
+    microfacet,
+    number,
+    spectrum,
+    tree,
+)  # fmt: skip
 from ...models import width as width_parameter
 from ...models.dielectric import Dielectric
 from ...models.material import Delta
@@ -15,6 +29,10 @@ from ...optics import frame, fresnel
 from ...optics.warp import square_to_cosine_hemisphere
 from ..interior import Account, account_of
 
+BOUNCES = {
+    "coloured": "the base's, once more with each bounce: deeper and darker than the base alone",
+    "white": "the base's once, as most renderers have it: its colour is then what is seen of it",
+}
 ALMOST_ONE = 0.99999994  # the largest float32 under 1
 
 
@@ -43,6 +61,7 @@ class Coat(BSDF):
     depth: Number = number(default=1.0, doc="how thick the coat is", low=0.0)
     ndf: str = microfacet.ndf_choice()
     masking: str = microfacet.masking_choice()
+    bounces: str = choice("coloured", "colour of light that bounces between coat and base", BOUNCES)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -130,7 +149,17 @@ class Coat(BSDF):
         at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
         values, u = ops.lookup(table, at), self._crossed()
         b, p = _polynomial(u, values[-6:-3]), _polynomial(u, values[-3:])
-        return _polynomial(sqr(sqr(u)), values[:-6]) * _kept(a, b, p)
+        return _polynomial(sqr(sqr(u)), values[:-6]) * self._returned(a, b, p)
+
+    def _again_by(self, a: Spectrum) -> Spectrum:
+        """By what a base of colour a multiplies light that it meets again."""
+        return 1.0 + 0.0 * a if self.bounces == "white" else a
+
+    def _returned(self, a: Spectrum, b: Spectrum, p: Spectrum) -> Spectrum:
+        """phi(a) = a (1 - b) + b a^2 (1 - p) / (1 - a p): what a colour a of the base leaves of the rest."""
+        if self.bounces == "white":
+            return a
+        return a * (1.0 - b + b * a * (1.0 - p) / (1.0 - a * p))
 
     def _again(self, like: Direction) -> tuple[Spectrum, ...]:
         """k, b and p of the rest, the lobe's factor."""
@@ -160,8 +189,8 @@ class Coat(BSDF):
         k, b, p, factor = self._again(wo)
         crossed = self._left(o) * self._left(i) * (self._through(wo) * self._through(wi) / sqr(self.index))
         lobe = self.base.eval(o, i, mode) * (wi.z / maximum(i.z, frame.TINY))
-        lobe = lobe * crossed * (factor / maximum(1.0 - a * k, 0.01))
-        rest = self._rest(wo, a_o) * self._rest(wi, a_i) * (wi.z / maximum(_kept(a, b, p), 1e-4))
+        lobe = lobe * crossed * (factor / maximum(1.0 - self._again_by(a) * k, 0.01))
+        rest = self._rest(wo, a_o) * self._rest(wi, a_i) * (wi.z / maximum(self._returned(a, b, p), 1e-4))
         return where(above, top + lobe + rest, 0.0)
 
     @function
@@ -233,7 +262,7 @@ class Coat(BSDF):
         """T^2 t^2 / (1 - a k) of a mirror, k = (1 - T) t^2."""
         through, left2 = self._through(wo), sqr(self._left(inner))
         k = (1.0 - through) * left2
-        return sqr(through) * left2 / (1.0 - k * self.base.tint(inner))
+        return sqr(through) * left2 / (1.0 - k * self._again_by(self.base.tint(inner)))
 
     def white(self) -> Self:
         """Over the white base, and without absorption."""
@@ -256,12 +285,6 @@ class Coat(BSDF):
     def delta(self) -> Delta:
         top = microfacet.delta_of(self.plain.alpha)
         return "always" if self._mirror else "never" if top == "never" else "maybe"
-
-
-@function
-def _kept(a: Spectrum, b: Spectrum, p: Spectrum) -> Spectrum:
-    """phi(a) = a (1 - b) + b a^2 (1 - p) / (1 - a p): what a colour a of the base leaves of the rest."""
-    return a * (1.0 - b + b * a * (1.0 - p) / (1.0 - a * p))
 
 
 def _polynomial(u: Spectrum, coefficients: tuple[Scalar, ...]) -> Spectrum:

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 
 from ...errors import GonioWarning, InputError
-from ...models import Parameter
+from ...models import Parameter, documents
 from ..images import RGB
 from ..types import MitsubaBSDF, Plugin, PluginDict, Scene
 from . import meshes, schema, spectra, textures
@@ -65,7 +65,7 @@ class _Builder:
         lights.register(mi)
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
-        self.images: dict[tuple[Path, bool], RGB] = {}
+        self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
 
     def scene(self) -> Scene:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
@@ -141,7 +141,7 @@ class _Builder:
         source = light.texture if light.texture is not None else light.radiance
         assert source is not None, "one of the two is given"
         if isinstance(source, ImageTexture):
-            return textures.environment(self.mi, self.image(source, f"{where}/texture"))
+            return textures.environment(self.mi, self.values(source, f"{where}/texture"))
         return {"type": "constant", "radiance": spectra.emitted(source)}
 
     # ------------------------------------------------------------------ shapes
@@ -228,17 +228,21 @@ class _Builder:
 
     def colour(self, value: Value, parameter: Parameter, where: str) -> PluginDict:
         if isinstance(value, ImageTexture):
-            pixels = self.image(value, where)
+            pixels = self.values(value, where)
             self.check_range(pixels, parameter, value, where)
+            if value.mean:
+                return {"type": "rgb", "value": [float(x) for x in np.broadcast_to(pixels.mean((0, 1)), 3)]}
             return textures.bitmap(self.mi, np.broadcast_to(pixels, (*pixels.shape[:2], 3)), value.filter, value.wrap)
         numbers = list(numbers_in(value))
         return {"type": "rgb", "value": numbers if len(numbers) == 3 else numbers * 3}
 
     def scalar(self, value: Value, parameter: Parameter, where: str, squared: bool) -> float | PluginDict:
         if isinstance(value, ImageTexture):
-            pixels = self.image(value, where).mean(axis=2, keepdims=True)
+            pixels = self.values(value, where).mean(axis=2, keepdims=True)
             pixels = pixels**2 if squared else pixels
             self.check_range(pixels, parameter, value, where)
+            if value.mean:
+                return float(pixels.mean(dtype=np.float64))
             return textures.bitmap(self.mi, pixels, value.filter, value.wrap)
         number = next(numbers_in(value))
         return number**2 if squared else number
@@ -251,12 +255,20 @@ class _Builder:
         return {"type": "normalmap", "normalmap": bitmap, "bsdf": plugin}
 
     def image(self, texture: ImageTexture | NormalMap, where: str) -> RGB:
+        """The image's own values."""
         srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
-        path = self.description.locate(texture.file, f"{where}/file")
-        if (path, srgb) not in self.images:
+        channel = texture.channel if isinstance(texture, ImageTexture) else None
+        path, inside = self.description.locate(texture.file, f"{where}/file"), documents.inside(texture.file)[1]
+        key = (path, inside, channel, srgb)
+        if key not in self.images:
             here = self.description.where(f"{where}/file")
-            self.images[path, srgb] = textures.load_image(path, here, srgb=srgb)
-        return self.images[path, srgb]
+            self.images[key] = textures.load_image(path, here, srgb=srgb, channel=channel, inside=inside)
+        return self.images[key]
+
+    def values(self, texture: ImageTexture, where: str) -> RGB:
+        """Those times the factor."""
+        pixels = self.image(texture, where)
+        return pixels if texture.factor == 1.0 else pixels * np.asarray(texture.factor, np.float32)
 
     def check_range(self, pixels: RGB, parameter: Parameter, texture: ImageTexture, where: str) -> None:
         low, high = float(pixels.min()), float(pixels.max())

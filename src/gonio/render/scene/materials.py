@@ -46,9 +46,11 @@ from pydantic_core import PydanticCustomError
 
 from ...errors import GonioError, GonioWarning, InputError
 from ...measure import SAMPLE, parted
-from ...models import BSDF, Parameter, library, models, outside
+from ...models import BSDF, Parameter, documents, library, models, outside
+from ...models.documents import Document
 from ...models.parameters import IndexParameter
 from ...optics.dispersion import DispersiveIndex
+from .files import located
 from .values import Colour, ImageTexture, Index, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
@@ -120,6 +122,8 @@ class MaterialPart(Part):
     """Whether both sides reflect alike; by default all materials do that let no light through."""
 
     _given: bool = PrivateAttr(False)  # by a program: its files lie where it says
+    _source: str = PrivateAttr("")  # the document that it is a material of
+    _notices: tuple[str, ...] = PrivateAttr(())  # what that has and it does not
     model: ClassVar[Model]
     declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
     dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
@@ -386,13 +390,68 @@ def _pickled(name: str, model: Model, values: dict[str, Any], given: set[str]) -
     return cls.model_construct(given, **values)
 
 
+class DocumentPart(Part):
+    """A material of another program's file, as Gonio's own materials with its numbers and pictures."""
+
+    type: Literal[tuple(Document.family.all())]  # type: ignore[valid-type]
+    """The file's format."""
+    file: str = Field(min_length=1)
+    """The file, beside the scene; its own pictures lie in its folder."""
+    material: Annotated[str, Strict()] | None = None
+    """Which of its materials, by name, or by number where it has no name of its own; not needed for the only one."""
+    two_sided: Annotated[bool, Strict()] | None = None
+    """As of any material."""
+
+
+def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> MaterialPart:
+    """The material that it names."""
+    if isinstance(part, MaterialPart):
+        return part
+    context = info.context or {}
+    document = Document.family.get(part.type)
+    try:
+        path = located(part.file, context.get("folder", Path()), "", context.get("allow_outside", False))
+        if path.suffix.lower() not in document.suffixes:
+            known = ", ".join(document.suffixes)
+            raise InputError(f"'{part.file}' is no {part.type} file by its name", "", f"it ends in {known}")
+        described = documents.read(document, path, part.material or "")
+    except GonioError as error:
+        what = f"{error.where}: {error.what}" if error.where else error.what
+        raise invalid(what, error.hint, "file") from None
+    fields: Any = _beside(described.notation, Path(part.file).parent)
+    if part.two_sided is not None:
+        fields["two_sided"] = part.two_sided
+    made = part_of(fields["type"])
+    assert made is not None, "a reader names materials that there are"
+    found = made.model_validate(fields, context=context)
+    found._source, found._notices = part.file, described.notices
+    return found
+
+
+def _beside(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
+    """As scenes have it: Gonio's types by their full names, since the lab's have the short ones; files from the scene's
+    folder."""
+    found: dict[str, object] = {}
+    for key, value in notation.items():
+        if key == "type" and value != "imageTex":
+            found[key] = f"gonio-{value}"
+        elif key == "file":
+            found[key] = (folder / str(value)).as_posix()
+        else:
+            found[key] = _beside(value, folder) if isinstance(value, dict) else value
+    return found
+
+
 def _tag(value: object) -> str | None:
+    if isinstance(value, DocumentPart):
+        return value.type
     if not isinstance(value, dict):
         return value.type if isinstance(value, MaterialPart) and type(value) is BY_TYPE.get(value.type) else OWN
     name = value.get("type")
     if not isinstance(name, str):
         return None if name is None else OWN
-    own = name not in BY_TYPE and (outside.names_code(name) or part_of(name) is not None or library.resembles(name))
+    known = name in BY_TYPE or name in Document.family.all()
+    own = not known and (outside.names_code(name) or part_of(name) is not None or library.resembles(name))
     return OWN if own else name
 
 
@@ -434,7 +493,8 @@ if TYPE_CHECKING:
 else:
     _pattern = {"type": {"type": "string", "pattern": r"\.py:\w+$"}}
     _schema = {"type": "object", "properties": _pattern, "required": ["type"], "description": "A class in a file."}
-    _members = [Annotated[cls, Tag(name)] for name, cls in BY_TYPE.items()]
+    _members: list[Any] = [Annotated[cls, Tag(name)] for name, cls in BY_TYPE.items()]
+    _members += [Annotated[DocumentPart, AfterValidator(_from_document), Tag(name)] for name in Document.family.all()]
     _members.append(Annotated[MaterialPart, PlainValidator(_own), WithJsonSchema(_schema), Tag(OWN)])
     Material = Annotated[Union[tuple(_members)], Discriminator(_tag)]  # noqa: UP007
     for _cls in MATERIALS:

@@ -43,8 +43,9 @@ def read(
     raw = read_json(file)
     if overrides:
         override.apply(raw, overrides)
+    context = {"folder": file.parent, "allow_code": allow_code, "allow_outside": allow_outside}
     try:
-        description = SceneDescription.model_validate(raw, context={"folder": file.parent, "allow_code": allow_code})
+        description = SceneDescription.model_validate(raw, context=context)
     except ValidationError as error:
         raise explain(error, raw, file) from None
     description._path = file
@@ -95,7 +96,7 @@ def _check_output(description: SceneDescription) -> None:
 
 def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> list[tuple[str, str]]:
     """What to warn of, as (pointer from the material on, text). Raises InputError for one that cannot be."""
-    warnings = []
+    warnings = [("", f"{material._source}: {notice}") for notice in material._notices]
     for name, (value, key, _) in material.arguments().items():
         parameter = material.model.parameters()[name]
         if parameter.numeric and any(number > parameter.high for number in numbers_in(value)):
@@ -140,6 +141,8 @@ def sources(description: SceneDescription) -> tuple[str, dict[str, Path]]:
     for where, part in parts(description):
         if (name := part.__dict__.get("file")) is not None:
             named[str(name)] = description.locate(name, f"{where}/file")
+        if isinstance(part, MaterialPart) and part._source:
+            named[part._source] = description.locate(part._source, where)
         if isinstance(part, MaterialPart) and outside.is_outside(part.model):
             code = Path(inspect.getsourcefile(part.model) or "")
             named[code.name] = code

@@ -18,6 +18,7 @@ from ...members import Family
 from ..images import SUFFIXES
 from ..request import check_film
 from ..types import Json
+from .files import located
 from .materials import Material
 from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
 
@@ -467,34 +468,7 @@ class SceneDescription(Part):
 
     def locate(self, file: str, pointer: str) -> Path:
         """The path of a file that the scene names. Raises InputError where it is missing or outside the folder."""
-        where = self.where(pointer)
-        try:
-            folder = self.folder.resolve()
-            path = (folder / file).resolve()  # follows symbolic links, so that they cannot lead outside
-            exists, regular = path.exists(), path.is_file()
-            empty = regular and path.stat().st_size == 0
-        except (OSError, ValueError, RuntimeError) as error:  # too long, a NUL byte, a loop of links
-            raise InputError(f"no usable file name: {error}", where, "give a file beside the scene") from None
-        if not self._allow_outside and not path.is_relative_to(folder):
-            raise InputError(
-                f"'{file}' lies outside the scene's folder {folder}", where, "copy it there, or use --allow-outside"
-            )
-        if not exists:
-            near = [str(p.relative_to(folder)) for p in _siblings(path)] if path.is_relative_to(folder) else []
-            hint = did_you_mean(file, near) if near else "file names are relative to the scene's folder"
-            raise InputError(f"'{file}' does not exist", where, hint)
-        if not regular:
-            raise InputError(f"'{file}' is not a file", where, "give a file beside the scene")
-        if empty:
-            raise InputError(f"'{file}' is empty (0 bytes)", where, "is it still being written or downloaded?")
-        return path
-
-
-def _siblings(path: Path, most: int = 200) -> list[Path]:
-    """What else lies in a file's folder, for a hint."""
-    from itertools import islice
-
-    return [p for p in islice(path.parent.iterdir(), most) if p.is_file()] if path.parent.is_dir() else []
+        return located(file, self.folder, self.where(pointer), self._allow_outside)
 
 
 def json_schema() -> dict[str, Any]:

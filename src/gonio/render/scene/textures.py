@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import numpy as np
 
 from ...errors import InputError
+from ...models import documents
 from .. import formats, images
 from ..images import RGB
 from ..types import PluginDict
 
 
-def load_image(path: Path, where: str, *, srgb: bool = False) -> RGB:
+def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | None = None, inside: str = "") -> RGB:
     """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded where `srgb`.
 
+    channel  "r", "g", "b" or "a" alone; alpha is never decoded, and 1 where the image has none
+    inside   the number of the image, in a document that holds several
     Raises InputError where the file is no image, claims more pixels than it can hold, or holds NaN.
     """
     name = path.name
@@ -25,21 +30,41 @@ def load_image(path: Path, where: str, *, srgb: bool = False) -> RGB:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"'{name}' cannot be read: {error.strerror or error}", where, "check the file") from None
-    kind = formats.kind_of(content)
-    if kind is None:
-        raise InputError(f"'{name}' is no image that can be read", where, "use .png, .jpg, .exr or .hdr")
-    try:
-        values, whole = formats.decode(path, content, kind)
-    except formats.Unreadable as error:
-        raise InputError(f"'{name}' cannot be decoded: {error}", where, "save it again") from None
-    values = values[..., :3] if values.shape[2] >= 3 else values[..., :1]  # without alpha
-    if whole and srgb:
-        values = images.from_screen(values)
+    with ExitStack() as stack:
+        if inside:
+            name, content = f"{name}#{inside}", _inside(path, inside)
+            path = Path(stack.enter_context(TemporaryDirectory())) / "image"  # Mitsuba reads files
+            path.write_bytes(content)
+        values, whole = _decoded(path, content, name, where)
+    if channel == "a":
+        values = values[..., -1:] if values.shape[2] in (2, 4) else np.ones_like(values[..., :1])
+    else:
+        values = values[..., :3] if values.shape[2] >= 3 else values[..., :1]  # without alpha
+        if whole and srgb:
+            values = images.from_screen(values)
+        if channel is not None and values.shape[2] == 3:
+            values = values[..., ["rgb".index(channel)]]
     values = np.ascontiguousarray(values, np.float32)
     if not np.isfinite(values).all():
         row, column = np.argwhere(~np.isfinite(values))[0][:2]
         raise InputError(f"'{name}' is not finite at row {row}, column {column}", where, "mend the image")
     return values
+
+
+def _inside(path: Path, index: str) -> bytes:
+    found = documents.parted(str(path))
+    assert found is not None, "the name says so"
+    return found[0].image(path, index)
+
+
+def _decoded(path: Path, content: bytes, name: str, where: str) -> formats.Decoded:
+    kind = formats.kind_of(content)
+    if kind is None:
+        raise InputError(f"'{name}' is no image that can be read", where, "use .png, .jpg, .exr or .hdr")
+    try:
+        return formats.decode(path, content, kind)
+    except formats.Unreadable as error:
+        raise InputError(f"'{name}' cannot be decoded: {error}", where, "save it again") from None
 
 
 def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDict:

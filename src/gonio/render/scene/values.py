@@ -99,18 +99,46 @@ Rgb = Annotated[tuple[Number, Number, Number], _of_length(3, "[r, g, b]")]
 Light = Annotated[tuple[NonNegative, NonNegative, NonNegative], _of_length(3, "[r, g, b]")]
 
 
+def _kind_of_value(value: object) -> str | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, (int, float)):
+        return "<number>"
+    if isinstance(value, (list, tuple)):
+        return "<list>"
+    if isinstance(value, str):
+        return "<name>"
+    return "<texture>" if isinstance(value, (dict, Part)) else None
+
+
+def _either(expected: str) -> Discriminator:
+    """Tell number, list and texture apart by what the value is. The tags stand in <> so that `reader` can drop them."""
+    return Discriminator(_kind_of_value, "expected", expected)
+
+
+Factor = Annotated[
+    Annotated[NonNegative, Tag("<number>")] | Annotated[Light, Tag("<list>")], _either("a number or [r, g, b]")
+]
+
+
 class ImageTexture(Part):
     """An image over the surface's uv. v = 0 is the top of the image; 8-bit values count as v/255."""
 
     type: Literal["imageTex"]
     file: str = Field(min_length=1)
-    """Image beside the scene: .png, .jpg, .hdr or .exr."""
+    """Image beside the scene: .png, .jpg, .hdr or .exr; FILE.glb#N is the image N inside a glTF file."""
     color_space: Literal["raw", "srgb"] = Field("raw", alias="colorSpace")
     """"srgb" decodes 8-bit values to linear light; "raw" (the lab's) takes them as they stand."""
     filter: Literal["bilinear", "nearest"] = "bilinear"
     """What lies between two texels."""
     wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
     """What lies outside [0, 1]."""
+    channel: Literal["r", "g", "b", "a"] | None = None
+    """The one channel that counts, as grey; a number's is the mean of red, green and blue otherwise."""
+    factor: Factor = 1.0
+    """What the image's values are multiplied by, one number or three."""
+    mean: Annotated[bool, Strict()] = False
+    """The image's mean everywhere, for a value that must not vary over a surface."""
 
 
 class NormalMap(Part):
@@ -119,6 +147,8 @@ class NormalMap(Part):
     type: Literal["imageTex"] = "imageTex"
     file: str = Field(min_length=1)
     """Image beside the scene."""
+    scale: Number = 1.0
+    """What the slopes are multiplied by."""
 
 
 class LightSpectrum(Part):
@@ -177,23 +207,6 @@ class MeasuredLight(LightSpectrum):
         if self.wavelengths[0] >= VISIBLE[1] or self.wavelengths[-1] <= VISIBLE[0] or not any(self.values):
             raise invalid("nothing of it is visible", "in nanometres, 380 to 780", "wavelengths")
         return self
-
-
-def _kind_of_value(value: object) -> str | None:
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, (int, float)):
-        return "<number>"
-    if isinstance(value, (list, tuple)):
-        return "<list>"
-    if isinstance(value, str):
-        return "<name>"
-    return "<texture>" if isinstance(value, (dict, Part)) else None
-
-
-def _either(expected: str) -> Discriminator:
-    """Tell number, list and texture apart by what the value is. The tags stand in <> so that `reader` can drop them."""
-    return Discriminator(_kind_of_value, "expected", expected)
 
 
 Texture = Annotated[ImageTexture, Tag("<texture>")]
