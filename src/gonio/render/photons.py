@@ -20,7 +20,7 @@ from .types import Float, Mask, Point, Radiance, UInt, Vector
 ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
 LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
 FACING = 0.9  # and cosine of the angle to its normal: what lies around an edge is elsewhere
-VISITED = 32  # particles of a row, about
+VISITED = 16  # particles of a row, about
 FIELDS = 16  # numbers of a particle, see Photon
 
 
