@@ -9,12 +9,12 @@ Efficiency is 1 / (relMSE x time); relMSE = mean((x - r)^2 / (r^2 + floor)) with
 the picture. Time is that of a whole new render of a loaded scene file, from its dictionary to the picture, kernels
 cached: what a user waits for. The rate leaves the start out.
 
-References are kept in the cache folder by what the scenes are. Without caustics it is the mean of Gonio's and
-Mitsuba's own path tracer's pictures of many samples, which have to agree within their noise in blocks of 10 x 10 pixels.
+References are kept in the cache folder by what the scenes are. Without caustics it is the mean of Gonio's and Mitsuba's
+path tracers' pictures of many samples, which have to agree within their noise in blocks of 10 x 10 pixels.
 With caustics (`--integrator caustics` against Mitsuba's `path`, beside Gonio's `path`) it is Gonio's with a smaller
-radius, held against Mitsuba's `ptracer` in blocks that show no mirror or glass, and where there are none against Gonio's
-`path` on the mean of the picture. `ptracer` sees neither mirrors nor glass, so that it has no error of a whole picture; it
-is compared on the pixels that it reaches.
+radius, held against Mitsuba's `ptracer` in blocks that show no mirror or glass, and where there are none against
+Gonio's `path` on the mean of the picture. `ptracer` sees neither mirrors nor glass, so that it has no error of a whole
+picture; it is compared on the pixels that it reaches.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
 
 
 def reached(scene: Scene) -> np.ndarray:
-    """Pixels that show a surface which is neither mirror nor glass: those that a particle's way to the camera ends in."""
+    """Pixels that show a surface which is neither mirror nor glass: those that particles reach."""
     loaded = scene.load(mi)
     width, height = scene.size
     n = 4  # points a side, in each pixel
@@ -217,7 +217,7 @@ def main() -> None:
     given = parser.parse_args()
     if unknown := set(given.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
-    table = Table(title="Gonio (path; caustics where marked c), and Mitsuba's path tracer with the sampler that is best")
+    table = Table(title="Gonio (path; c: caustics), and Mitsuba's path tracer with the sampler that is best")
     titles = ("scene", "best peer", "first [s]", "peer", "M samples/s", "peer", "relMSE x spp", "peer", "efficiency")
     for title in titles:
         table.add_column(title, justify="left" if title in ("scene", "best peer") else "right")
@@ -255,177 +255,6 @@ def main() -> None:
             kind = "with" if caustic else "without"
             mean = np.exp(np.mean(np.log(found)))
             console.print(f"geometric mean of {len(found)} efficiencies, scenes {kind} caustics: {mean:.2f}")
-    if given.figure:
-        draw(given.figure, shown)
-
-
-def draw(seed: int) -> np.ndarray:
-            render = Render(loaded, Settings(integrator, scene.depth, seed=seed))
-            render.advance(spp)
-            return render.image()
-
-        return draw
-
-    return start
-
-
-def theirs(scene: Scene, sampler: str, spp: int, integrator: str = "path") -> Callable[[], Callable[[int], np.ndarray]]:
-    def start() -> Callable[[int], np.ndarray]:
-        loaded = scene.load(mi, sampler, spp)
-        method = mi.load_dict({"type": integrator, "max_depth": scene.depth})
-
-        def draw(seed: int) -> np.ndarray:
-            image = mi.render(loaded, integrator=method, spp=spp, seed=seed)
-            dr.eval(image)
-            dr.sync_thread()
-            return np.array(image)
-
-        return draw
-
-    return start
-
-
-def reference(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    """A converged picture, and how far apart the two methods are that made it: worst block of 10 x 10, in sigma."""
-    folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gonio"
-    content = (Path(__file__).with_name("scenes") / "__init__.py").read_bytes()
-    facts = f"{scene.name} {seconds:g} {mi.__version__}".encode()
-    file = folder / f"suite-{scene.name}-{hashlib.sha256(content + facts).hexdigest()[:12]}.npz"
-    if not file.exists():
-        picture, apart = (of_caustics if scene.caustic else of_paths)(scene, seconds)
-        folder.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part.npz")
-        np.savez(part, picture=picture, apart=apart)
-        part.replace(file)
-    with np.load(file) as found:
-        return found["picture"], float(found["apart"])
-
-
-def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np.ndarray]:
-    """Pictures of each, by turns, for so long, eight at least: (number, height, width, 3)."""
-    parts: list[list[np.ndarray]] = [[] for _ in draws]
-    begin, seed = time.perf_counter(), 1000
-    while time.perf_counter() - begin < seconds or len(parts[0]) < 8:
-        for found, draw in zip(parts, draws, strict=True):
-            found.append(draw(seed))
-        seed += 1
-    return [np.stack(found) for found in parts]
-
-
-def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """How far apart the means of two stacks of blocks are."""
-    squares = sum(np.var(x, 0, ddof=1) / len(x) for x in (a, b))
-    return np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + 1e-20)
-
-
-def of_paths(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    found = many_of([ours(scene, EACH)(), theirs(scene, "independent", EACH)()], seconds)
-    apart = sigmas(*(blocks(pictures) for pictures in found))
-    return np.mean(np.concatenate(found), axis=0), float(apart.max())
-
-
-def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    before = caustics.FOOTPRINT
-    caustics.FOOTPRINT = 0.5 * before
-    try:
-        one = ours(scene, 8 * EACH, "caustics")()
-        if (seen := reached(scene)).any() and (whole := blocks(seen[None, ..., None]) == 1)[0].any():
-            found, other = many_of([one, theirs(scene, "independent", 8 * EACH, "ptracer")()], 3 * seconds)
-            apart = sigmas(blocks(found), blocks(other))[whole[0]]
-        else:
-            found, other = many_of([one, ours(scene, 8 * EACH)()], 3 * seconds)
-            apart = sigmas(found.mean((1, 2, 3)), other.mean((1, 2, 3)))
-    finally:
-        caustics.FOOTPRINT = before
-    return found.mean(0), float(np.max(apart))
-
-
-def reached(scene: Scene) -> np.ndarray:
-    """Pixels that show a surface which is neither mirror nor glass: those that a particle's way to the camera ends in."""
-    loaded = scene.load(mi)
-    width, height = scene.size
-    n = 4  # points a side, in each pixel
-    index = dr.arange(mi.UInt32, width * height * n * n)
-    x = (mi.Float(index % (width * n)) + 0.5) / (width * n)
-    y = (mi.Float(index // (width * n)) + 0.5) / (height * n)
-    ray, _ = loaded.sensors()[0].sample_ray(0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5))
-    si = loaded.ray_intersect(mi.Ray3f(ray))
-    plain = si.is_valid() & ~mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Delta)
-    seen = np.array(plain).reshape(height, n, width, n)
-    return np.asarray(seen.all((1, 3)))
-
-
-def blocks(pictures: np.ndarray) -> np.ndarray:
-    """Means of blocks of 10 x 10, of grey."""
-    height, width = (10 * (n // 10) for n in pictures.shape[1:3])
-    grey = pictures[:, :height, :width].mean(-1)
-    return grey.reshape(len(grey), height // 10, 10, width // 10, 10).mean((2, 4))
-
-
-def relmse(x: np.ndarray, r: np.ndarray, where: np.ndarray | slice = slice(None)) -> float:
-    return float(np.mean(((x - r) ** 2 / (r**2 + 0.01 * np.mean(r) ** 2))[where]))
-
-
-def compete(scene: Scene, truth: np.ndarray | None) -> list[Contender]:
-    """Gonio first; all take turns, so that a busy machine is busy for all."""
-    field = [Contender("Gonio", ours(scene, scene.spp))]
-    field += [Contender(s, theirs(scene, s, scene.spp)) for s in SAMPLERS]
-    singles = [ours(scene, 1), *(theirs(scene, s, 1) for s in SAMPLERS)]
-    for round_number in range(ROUNDS + 1):  # the first compiles
-        for contender, single in zip(field, singles, strict=True):
-            begin = time.perf_counter()
-            single()(7)
-            first = time.perf_counter() - begin
-            begin = time.perf_counter()
-            draw = contender.start()
-            picture = draw(round_number)
-            whole = time.perf_counter() - begin
-            begin = time.perf_counter()
-            again = draw(100 + round_number)
-            steady = time.perf_counter() - begin
-            if round_number:
-                contender.first.append(first)
-                contender.whole.append(whole)
-                contender.steady.append(steady)
-                if truth is not None:
-                    contender.errors += [relmse(picture, truth), relmse(again, truth)]
-    return field
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", help=", ".join(SCENES))
-    parser.add_argument("--seconds", type=float, default=20, help="for each reference")
-    parser.add_argument("--figure", type=Path, help="where to draw pictures and ratios")
-    given = parser.parse_args()
-    if unknown := set(given.scenes) - set(SCENES):
-        parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
-    table = Table(title="Gonio's path tracer, and Mitsuba's with the sampler that is best there")
-    for title in ("scene", "best peer", "first sample [s]", "peer", "M samples/s", "peer", "error ratio", "efficiency"):
-        table.add_column(title, justify="left" if title in ("scene", "best peer") else "right")
-    shown: list[tuple[str, np.ndarray, str]] = []
-    ratios = []
-    for name in given.scenes or SCENES:
-        scene = SCENES[name]
-        truth, apart = (None, 0.0) if scene.caustic else reference(scene, given.seconds)
-        mine, *others = compete(scene, truth)
-        best = min(others, key=lambda c: c.cost if truth is not None else min(c.whole))
-        samples = scene.size[0] * scene.size[1] * scene.spp / 1e6
-        row = [name, best.name, f"{min(mine.first):.2f}", f"{min(best.first):.2f}"]
-        row += [f"{samples / min(c.steady):.1f}" for c in (mine, best)]
-        words = "caustic"
-        if truth is not None:
-            logs = np.log(mine.errors) - np.log(best.errors)
-            ratio, spread = best.cost / mine.cost, float(np.std(logs, ddof=1) / np.sqrt(len(logs)))
-            ratios.append(ratio)
-            words = f"{ratio:.2f} ± {ratio * spread:.2f}" + (f" ({apart:.1f} sigma apart)" if apart > 5 else "")
-            row += [f"{np.mean(mine.errors) / np.mean(best.errors):.2f}", words]
-        table.add_row(*row)
-        console.print(" ".join(row))
-        shown.append((name, truth if truth is not None else mine.start()(1), words))
-    console.print(table)
-    if ratios:
-        console.print(f"geometric mean of {len(ratios)} efficiencies: {np.exp(np.mean(np.log(ratios))):.2f}")
     if given.figure:
         draw(given.figure, shown)
 

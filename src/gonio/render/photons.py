@@ -51,7 +51,7 @@ class Photon:
 
 
 class PhotonMap:
-    """Particles, found by place. `radius` is a number of the kernel like the particles: changed, it compiles nothing."""
+    """Particles, found by place. `radius` is data of the kernel like the particles: changed, it compiles nothing."""
 
     def __init__(self, mi: ModuleType, photons: Photon, kept: Mask, radius: float):
         self.mi = mi
@@ -128,8 +128,8 @@ class PhotonMap:
             distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
             here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius) & (dr.dot(normal, other) > FACING)
             # rows of other cells may share their memory
-            here &= (mi.Int32(dr.floor(position.y * self.per_cell)) == y)
-            here &= (mi.Int32(dr.floor(position.z * self.per_cell)) == z)
+            here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
+            here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
             rest = [record[i // 4, i % 4] for i in range(8, 16)]
             flux = type(zero)(*rest[4 : 4 + len(zero)])
             photon = Photon(position, other, mi.Vector3f(*rest[:3]), flux, near[7], mi.UInt32(near[6]))

@@ -28,9 +28,13 @@ class Caustics(Path):
     """Path tracing, where light by way of mirrors and smooth glass comes from a map of particles, too.
 
     Of the light that mirrors or glass throw upon a surface, paths from the camera find what comes from wide lamps,
-    particles from the lamps what comes from small ones: each is weighed by how likely it was to find it. A particle counts
-    for places around it, within a radius that shrinks, so that the picture is blurred by about a pixel at first and
-    sharp in the end (consistent, not unbiased); all other light is that of `path`.
+    particles from the lamps what comes from small ones: each is weighed by how likely it was to find it. A particle
+    counts for places around it, within a radius that shrinks, so that the picture is blurred by about a pixel at first
+    and sharp in the end (consistent, not unbiased); all other light is that of `path`.
+
+    How likely: a path that leaves a surface with density p toward mirrors and meets the lamp behind them, and N
+    particles that come from there the other way, are as dense as p / cos and g N pi r^2 over the same étendue, with
+    the particles' density g at the lamp; what mirrors and lenses do to the width of the beam is the same for both.
     """
 
     name = "caustics"
@@ -87,9 +91,7 @@ class Caustics(Path):
         begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
         low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
         particle, flight = particles.leave(key, low, mi.Bool(True))
-        photon = Photon(
-            mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0)
-        )
+        photon = Photon(mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0))
 
         def vertex(flight: Flight, photon: Photon, kept: Mask) -> tuple[Flight, Photon, Mask]:
             si, bsdf, crossing = particles.arrive(flight)
@@ -161,4 +163,3 @@ class Caustics(Path):
         behind = active & (lobe > 0) & dr.any(emitted != 0)
         density = self.particles.sources.density(ray.o, si, ray.d, behind)
         return dr.select(behind, emitted * self._by_path(lobe, density, self._map[1]), emitted)
-
