@@ -1,19 +1,26 @@
-"""Every scene of `benchmarks/scenes`: Gonio's path tracer against Mitsuba's with its best sampler, in one process.
+"""Every scene of `benchmarks/scenes`: Gonio's integrators against Mitsuba's with its best sampler, in one process.
 
     python benchmarks/suite.py                              # all scenes, some minutes
     python benchmarks/suite.py sun-environment many         # some
+    python benchmarks/suite.py --quick                      # a quarter of the samples, references of 4 s
     python benchmarks/suite.py --figure suite.png           # and a figure of the pictures and ratios
 
 Efficiency is 1 / (relMSE x time); relMSE = mean((x - r)^2 / (r^2 + floor)) with the floor at 1 % of the squared mean of
 the picture. Time is that of a whole new render of a loaded scene file, from its dictionary to the picture, kernels
-cached: what a user waits for. The rate leaves the start out. The reference is the mean of
-Gonio's and Mitsuba's own pictures of many samples, which have to agree within their noise in blocks of 10 x 10 pixels;
-caustic scenes have no reference here that paths could reach, so that only time and rate are shown.
+cached: what a user waits for. The rate leaves the start out.
+
+References are kept in the cache folder by what the scenes are. Without caustics it is the mean of Gonio's and Mitsuba's
+path tracers' pictures of many samples, which have to agree within their noise in blocks of 10 x 10 pixels.
+With caustics (`--integrator caustics` against Mitsuba's `path`, beside Gonio's `path`) it is Gonio's with a smaller
+radius, held against Mitsuba's `ptracer` in blocks that show no mirror or glass, and where there are none against
+Gonio's `path` on the mean of the picture. `ptracer` sees neither mirrors nor glass, so that it has no error of a whole
+picture; it is compared on the pixels that it reaches.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import time
 from collections.abc import Callable
@@ -27,7 +34,7 @@ from rich.table import Table
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.render.integrators import Render, Settings  # noqa: E402
+from gonio.render.integrators import Render, Settings, caustics  # noqa: E402
 
 from scenes import SCENES, Scene  # noqa: E402
 
@@ -46,17 +53,23 @@ class Contender:
     steady: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
 
+    reached: list[float] = field(default_factory=list)  # errors on the pixels that show no mirror or glass
+
     @property
     def cost(self) -> float:
         return float(np.mean(self.errors)) * min(self.whole)
 
+    @property
+    def reached_cost(self) -> float:
+        return float(np.mean(self.reached)) * min(self.whole)
 
-def ours(scene: Scene, spp: int) -> Callable[[], Callable[[int], np.ndarray]]:
+
+def ours(scene: Scene, spp: int, integrator: str = "path") -> Callable[[], Callable[[int], np.ndarray]]:
     def start() -> Callable[[int], np.ndarray]:
         loaded = scene.load(mi)
 
         def draw(seed: int) -> np.ndarray:
-            render = Render(loaded, Settings("path", scene.depth, seed=seed))
+            render = Render(loaded, Settings(integrator, scene.depth, seed=seed))
             render.advance(spp)
             return render.image()
 
@@ -65,13 +78,13 @@ def ours(scene: Scene, spp: int) -> Callable[[], Callable[[int], np.ndarray]]:
     return start
 
 
-def theirs(scene: Scene, sampler: str, spp: int) -> Callable[[], Callable[[int], np.ndarray]]:
+def theirs(scene: Scene, sampler: str, spp: int, integrator: str = "path") -> Callable[[], Callable[[int], np.ndarray]]:
     def start() -> Callable[[int], np.ndarray]:
         loaded = scene.load(mi, sampler, spp)
-        path = mi.load_dict({"type": "path", "max_depth": scene.depth})
+        method = mi.load_dict({"type": integrator, "max_depth": scene.depth})
 
         def draw(seed: int) -> np.ndarray:
-            image = mi.render(loaded, integrator=path, spp=spp, seed=seed)
+            image = mi.render(loaded, integrator=method, spp=spp, seed=seed)
             dr.eval(image)
             dr.sync_thread()
             return np.array(image)
@@ -82,39 +95,97 @@ def theirs(scene: Scene, sampler: str, spp: int) -> Callable[[], Callable[[int],
 
 
 def reference(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    """The mean of two path tracers' pictures, and how far apart they are: worst block of 10 x 10 pixels, in sigma."""
-    parts: list[list[np.ndarray]] = [[], []]
-    drawn = [ours(scene, EACH)(), theirs(scene, "independent", EACH)()]
+    """A converged picture, and how far apart the two methods are that made it: worst block of 10 x 10, in sigma."""
+    folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gonio"
+    content = (Path(__file__).with_name("scenes") / "__init__.py").read_bytes()
+    facts = f"{scene.name} {seconds:g} {mi.__version__}".encode()
+    file = folder / f"suite-{scene.name}-{hashlib.sha256(content + facts).hexdigest()[:12]}.npz"
+    if not file.exists():
+        picture, apart = (of_caustics if scene.caustic else of_paths)(scene, seconds)
+        folder.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part.npz")
+        np.savez(part, picture=picture, apart=apart)
+        part.replace(file)
+    with np.load(file) as found:
+        return found["picture"], float(found["apart"])
+
+
+def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np.ndarray]:
+    """Pictures of each, by turns, for so long, eight at least: (number, height, width, 3)."""
+    parts: list[list[np.ndarray]] = [[] for _ in draws]
     begin, seed = time.perf_counter(), 1000
     while time.perf_counter() - begin < seconds or len(parts[0]) < 8:
-        for found, draw in zip(parts, drawn, strict=True):
-            found.append(blocks_and_picture(draw(seed)))
+        for found, draw in zip(parts, draws, strict=True):
+            found.append(draw(seed))
         seed += 1
-    means, squares = [], []
-    for found in parts:
-        stack = np.stack([blocks for blocks, _ in found])
-        means.append(stack.mean(0))
-        squares.append(stack.var(0, ddof=1) / len(stack))
-    apart = np.abs(means[0] - means[1]) / np.sqrt(squares[0] + squares[1] + 1e-20)
-    picture = np.mean([picture for found in parts for _, picture in found], axis=0)
-    return picture, float(apart.max())
+    return [np.stack(found) for found in parts]
 
 
-def blocks_and_picture(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    height, width = (10 * (n // 10) for n in picture.shape[:2])
-    grey = picture[:height, :width].mean(-1)
-    return grey.reshape(height // 10, 10, width // 10, 10).mean((1, 3)), picture
+def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """How far apart the means of two stacks of blocks are."""
+    squares = sum(np.var(x, 0, ddof=1) / len(x) for x in (a, b))
+    return np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + 1e-20)
 
 
-def relmse(x: np.ndarray, r: np.ndarray) -> float:
-    return float(np.mean((x - r) ** 2 / (r**2 + 0.01 * np.mean(r) ** 2)))
+def of_paths(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
+    found = many_of([ours(scene, EACH)(), theirs(scene, "independent", EACH)()], seconds)
+    apart = sigmas(*(blocks(pictures) for pictures in found))
+    return np.mean(np.concatenate(found), axis=0), float(apart.max())
 
 
-def compete(scene: Scene, truth: np.ndarray | None) -> list[Contender]:
-    """Gonio first; all take turns, so that a busy machine is busy for all."""
-    field = [Contender("Gonio", ours(scene, scene.spp))]
-    field += [Contender(s, theirs(scene, s, scene.spp)) for s in SAMPLERS]
-    singles = [ours(scene, 1), *(theirs(scene, s, 1) for s in SAMPLERS)]
+def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
+    before = caustics.FOOTPRINT
+    caustics.FOOTPRINT = 0.5 * before
+    try:
+        one = ours(scene, 8 * EACH, "caustics")()
+        if (seen := reached(scene)).any() and (whole := blocks(seen[None, ..., None]) == 1)[0].any():
+            found, other = many_of([one, theirs(scene, "independent", 8 * EACH, "ptracer")()], 3 * seconds)
+            apart = sigmas(blocks(found), blocks(other))[whole[0]]
+        else:
+            found, other = many_of([one, ours(scene, 8 * EACH)()], 3 * seconds)
+            apart = sigmas(found.mean((1, 2, 3)), other.mean((1, 2, 3)))
+    finally:
+        caustics.FOOTPRINT = before
+    return found.mean(0), float(np.max(apart))
+
+
+def reached(scene: Scene) -> np.ndarray:
+    """Pixels that show a surface which is neither mirror nor glass: those that particles reach."""
+    loaded = scene.load(mi)
+    width, height = scene.size
+    n = 4  # points a side, in each pixel
+    index = dr.arange(mi.UInt32, width * height * n * n)
+    x = (mi.Float(index % (width * n)) + 0.5) / (width * n)
+    y = (mi.Float(index // (width * n)) + 0.5) / (height * n)
+    ray, _ = loaded.sensors()[0].sample_ray(0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5))
+    si = loaded.ray_intersect(mi.Ray3f(ray))
+    plain = si.is_valid() & ~mi.has_flag(si.bsdf().flags(), mi.BSDFFlags.Delta)
+    seen = np.array(plain).reshape(height, n, width, n)
+    return np.asarray(seen.all((1, 3)))
+
+
+def blocks(pictures: np.ndarray) -> np.ndarray:
+    """Means of blocks of 10 x 10, of grey."""
+    height, width = (10 * (n // 10) for n in pictures.shape[1:3])
+    grey = pictures[:, :height, :width].mean(-1)
+    return grey.reshape(len(grey), height // 10, 10, width // 10, 10).mean((2, 4))
+
+
+def relmse(x: np.ndarray, r: np.ndarray, where: np.ndarray | slice = slice(None)) -> float:
+    return float(np.mean(((x - r) ** 2 / (r**2 + 0.01 * np.mean(r) ** 2))[where]))
+
+
+def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
+    """Gonio first, then Mitsuba's path tracer, then for caustics Gonio's path tracer and Mitsuba's `ptracer`; all take
+    turns, so that a busy machine is busy for all."""
+    starts = [("Gonio", lambda n: ours(scene, n, "caustics" if scene.caustic else "path"))]
+    starts += [(s, lambda n, s=s: theirs(scene, s, n)) for s in SAMPLERS]
+    if scene.caustic:
+        starts += [("Gonio's path", lambda n: ours(scene, n))]
+        starts += [("ptracer", lambda n: theirs(scene, "independent", n, "ptracer"))]
+    field = [Contender(name, make(spp)) for name, make in starts]
+    singles = [make(1) for _, make in starts]
+    where = reached(scene) if scene.caustic else slice(None)
     for round_number in range(ROUNDS + 1):  # the first compiles
         for contender, single in zip(field, singles, strict=True):
             begin = time.perf_counter()
@@ -131,45 +202,59 @@ def compete(scene: Scene, truth: np.ndarray | None) -> list[Contender]:
                 contender.first.append(first)
                 contender.whole.append(whole)
                 contender.steady.append(steady)
-                if truth is not None:
-                    contender.errors += [relmse(picture, truth), relmse(again, truth)]
+                contender.errors += [relmse(picture, truth), relmse(again, truth)]
+                if scene.caustic and np.any(where):
+                    contender.reached += [relmse(picture, truth, where), relmse(again, truth, where)]
     return field
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", help=", ".join(SCENES))
-    parser.add_argument("--seconds", type=float, default=20, help="for each reference")
+    parser.add_argument("--seconds", type=float, default=20, help="for each reference, three times that for caustics")
+    parser.add_argument("--quick", action="store_true", help="a quarter of the samples, references of 4 seconds")
     parser.add_argument("--figure", type=Path, help="where to draw pictures and ratios")
     given = parser.parse_args()
     if unknown := set(given.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
-    table = Table(title="Gonio's path tracer, and Mitsuba's with the sampler that is best there")
-    for title in ("scene", "best peer", "first sample [s]", "peer", "M samples/s", "peer", "error ratio", "efficiency"):
+    table = Table(title="Gonio (path; c: caustics), and Mitsuba's path tracer with the sampler that is best")
+    titles = ("scene", "best peer", "first [s]", "peer", "M samples/s", "peer", "relMSE x spp", "peer", "efficiency")
+    for title in titles:
         table.add_column(title, justify="left" if title in ("scene", "best peer") else "right")
     shown: list[tuple[str, np.ndarray, str]] = []
-    ratios = []
+    ratios: dict[bool, list[float]] = {False: [], True: []}
     for name in given.scenes or SCENES:
         scene = SCENES[name]
-        truth, apart = (None, 0.0) if scene.caustic else reference(scene, given.seconds)
-        mine, *others = compete(scene, truth)
-        best = min(others, key=lambda c: c.cost if truth is not None else min(c.whole))
-        samples = scene.size[0] * scene.size[1] * scene.spp / 1e6
-        row = [name, best.name, f"{min(mine.first):.2f}", f"{min(best.first):.2f}"]
+        spp = max(scene.spp // 4, 4) if given.quick else scene.spp
+        truth, apart = reference(scene, 4 if given.quick else given.seconds)
+        field = compete(scene, truth, spp)
+        mine, others = field[0], field[1 : 1 + len(SAMPLERS)]
+        best = min(others, key=lambda c: c.cost)
+        samples = scene.size[0] * scene.size[1] * spp / 1e6
+        row = [name + (" (c)" if scene.caustic else ""), best.name]
+        row += [f"{min(c.first):.2f}" for c in (mine, best)]
         row += [f"{samples / min(c.steady):.1f}" for c in (mine, best)]
-        words = "caustic"
-        if truth is not None:
-            logs = np.log(mine.errors) - np.log(best.errors)
-            ratio, spread = best.cost / mine.cost, float(np.std(logs, ddof=1) / np.sqrt(len(logs)))
-            ratios.append(ratio)
-            words = f"{ratio:.2f} ± {ratio * spread:.2f}" + (f" ({apart:.1f} sigma apart)" if apart > 5 else "")
-            row += [f"{np.mean(mine.errors) / np.mean(best.errors):.2f}", words]
-        table.add_row(*row)
-        console.print(" ".join(row))
-        shown.append((name, truth if truth is not None else mine.start()(1), words))
+        row += [f"{np.mean(c.errors) * spp:.3g}" for c in (mine, best)]
+        logs = [np.log(c.errors) for c in (mine, best)]
+        spread = float(np.sqrt(sum(np.var(x, ddof=1) / len(x) for x in logs)))
+        ratio = best.cost / mine.cost
+        ratios[scene.caustic].append(ratio)
+        words = f"{ratio:.3g} ± {ratio * spread:.2g}" + (f" ({apart:.1f} sigma apart)" if apart > 5 else "")
+        table.add_row(*row, words)
+        console.print(" | ".join([*row, words]))
+        if scene.caustic:
+            path, particles = field[-2:]
+            against = f"   against Gonio's path: {path.cost / mine.cost:.3g}"
+            if mine.reached:
+                against += f"; against ptracer, where that reaches: {particles.reached_cost / mine.reached_cost:.3g}"
+            console.print(against)
+        shown.append((name, truth, words))
     console.print(table)
-    if ratios:
-        console.print(f"geometric mean of {len(ratios)} efficiencies: {np.exp(np.mean(np.log(ratios))):.2f}")
+    for caustic, found in ratios.items():
+        if found:
+            kind = "with" if caustic else "without"
+            mean = np.exp(np.mean(np.log(found)))
+            console.print(f"geometric mean of {len(found)} efficiencies, scenes {kind} caustics: {mean:.2f}")
     if given.figure:
         draw(given.figure, shown)
 
@@ -189,7 +274,7 @@ def draw(path: Path, shown: list[tuple[str, np.ndarray, str]]) -> None:
         white = np.percentile(picture, 97) + 1e-9
         place.imshow(np.clip(picture / white, 0, 1) ** (1 / 2.2))
         place.set_title(f"{name}: {words}", fontsize=10)
-    figure.suptitle("Efficiency of Gonio's path tracer over Mitsuba's with its best sampler (above 1: Gonio is ahead)")
+    figure.suptitle("Efficiency of Gonio over Mitsuba's path tracer with its best sampler (above 1: Gonio is ahead)")
     figure.tight_layout()
     figure.savefig(path, dpi=90)
 

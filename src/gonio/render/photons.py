@@ -7,7 +7,7 @@ sums over them do not depend on who computed them, or in what order.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
@@ -20,7 +20,8 @@ from .types import Float, Mask, Point, Radiance, UInt, Vector
 ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
 LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
 FACING = 0.9  # and cosine of the angle to its normal: what lies around an edge is elsewhere
-VISITED = 32  # particles of a row, about
+VISITED = 16  # particles of a row, about
+CUBES = 1 << 16  # numbers of a Crowding
 FIELDS = 16  # numbers of a particle, see Photon
 
 
@@ -41,42 +42,47 @@ class Photon:
     flux: Radiance
     density: Float
     depth: UInt
+    again: Mask
 
     def packed(self) -> list[Float]:
         """Sixteen numbers: what a search compares, then what it needs of those that it finds."""
         mi_float = type(self.density)
         flux = list(self.flux) + [mi_float(0)] * (4 - len(self.flux))
         first = [*self.position, *self.normal, mi_float(self.depth), self.density]
-        return [*first, *self.direction, mi_float(0), *flux]
+        return [*first, *self.direction, dr.select(self.again, mi_float(1), 0), *flux]
 
 
 class PhotonMap:
-    """Particles, found by place. `radius` is a number of the kernel like the particles: changed, it compiles nothing."""
+    """Particles, found by place. `radius` is data of the kernel like the particles: changed, it compiles nothing."""
 
-    def __init__(self, mi: ModuleType, photons: Photon, kept: Mask, radius: float):
+    def __init__(self, mi: ModuleType, photons: Sequence[Photon], kept: Sequence[Mask], radius: float):
         self.mi = mi
         self.radius = dr.opaque(mi.Float, radius)
         self.per_cell = dr.opaque(mi.Float, 0.5 / radius)
-        kept = kept & dr.isfinite(dr.sum(photons.flux) + dr.sum(photons.position) + dr.sum(photons.direction))
-        total = dr.width(photons.position)
+        total = sum(dr.width(photon.position) for photon in photons)
         bits = max(int(total - 1).bit_length(), 10)
         self.mask = dr.opaque(mi.UInt32, (1 << bits) - 1)
         self.keys = (1 << bits) + ROW
-        cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photons.position]
         self.low = dr.opaque(mi.Int32, -(ROW // 2))  # of cells along x, about the origin of the scene
-        key = dr.select(kept, self._row(cell[1], cell[2]) + self._along(cell[0]), self.keys)
-        values = photons.packed()
-        dr.eval(key, values)
+        found = []
+        for photon, there in zip(photons, kept, strict=True):
+            cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photon.position]
+            values = photon.packed()
+            there = there & dr.isfinite(sum(values[1:], values[0]))
+            key = dr.select(there, self._row(cell[1], cell[2]) + self._along(cell[0]), self.keys)
+            found.append([key, *values])
+        dr.eval(found)
+        keys, *values = [dr.concat(list(parts)) for parts in zip(*found, strict=True)]
         # The key above the number: their order is one of whole numbers, and the same whoever sorts.
-        words = (np.array(key, np.uint64) << np.uint64(32)) | np.arange(total, dtype=np.uint64)
+        words = (np.array(keys, np.uint64) << np.uint64(32)) | np.arange(total, dtype=np.uint64)
+        words = words[words < np.uint64(self.keys) << np.uint64(32)]
         words.sort()
-        sorted_keys = (words >> np.uint64(32)).astype(np.uint32)
-        self.count = int(np.searchsorted(sorted_keys, self.keys))
-        starts = np.searchsorted(sorted_keys, np.arange(self.keys + 1, dtype=np.uint32)).astype(np.uint32)
-        self.starts = mi.UInt32(starts)
-        order = mi.UInt32(words.astype(np.uint32))
-        self.values = dr.empty(mi.Float, total * FIELDS)
-        lane = dr.arange(mi.UInt32, total)
+        self.count = len(words)
+        per_key = np.bincount((words >> np.uint64(32)).astype(np.int64), minlength=self.keys)
+        self.starts = mi.UInt32(np.concatenate([[0], np.cumsum(per_key)]).astype(np.uint32))
+        order = mi.UInt32(words.astype(np.uint32) if self.count else np.zeros(1, np.uint32))
+        self.values = dr.empty(mi.Float, dr.width(order) * FIELDS)
+        lane = dr.arange(mi.UInt32, dr.width(order))
         for place, value in enumerate(values):
             dr.scatter(self.values, dr.gather(mi.Float, value, order), lane * FIELDS + place)
         dr.make_opaque(self.starts)
@@ -128,11 +134,11 @@ class PhotonMap:
             distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
             here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius) & (dr.dot(normal, other) > FACING)
             # rows of other cells may share their memory
-            here &= (mi.Int32(dr.floor(position.y * self.per_cell)) == y)
-            here &= (mi.Int32(dr.floor(position.z * self.per_cell)) == z)
+            here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
+            here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
             rest = [record[i // 4, i % 4] for i in range(8, 16)]
             flux = type(zero)(*rest[4 : 4 + len(zero)])
-            photon = Photon(position, other, mi.Vector3f(*rest[:3]), flux, near[7], mi.UInt32(near[6]))
+            photon = Photon(position, other, mi.Vector3f(*rest[:3]), flux, near[7], mi.UInt32(near[6]), rest[3] > 0)
             weight = (1 - distance2 / radius2) * (2 / (dr.pi * radius2)) * mi.Float(stride)
             total = total + dr.select(here, visit(photon, weight, here), 0)
             at = at + stride
@@ -147,3 +153,35 @@ class PhotonMap:
         state = (begin, *row(begin, active), zero)
         found = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
         return found[-1]
+
+
+class Crowding:
+    """How many particles arrive per area, roughly: a number for each cube of space, from one map, that then stays.
+
+    Weights are made of it, and any number will do for those, as long as it is the same whoever asks.
+    """
+
+    def __init__(self, mi: ModuleType, photon: Photon, kept: Mask, width: float, traced: int):
+        self.mi = mi
+        self.per_cell = dr.opaque(mi.Float, 1 / width)
+        place = self._place(photon.position)
+        dr.eval(place, kept)
+        counts = np.bincount(np.array(place)[np.array(kept)], minlength=CUBES)
+        self.values = mi.Float((counts / (traced * width**2)).astype(np.float32))
+        dr.make_opaque(self.values)
+
+    @staticmethod
+    def nowhere(mi: ModuleType) -> Crowding:
+        """Nothing, for who has not seen a map yet; to a kernel it is like any other."""
+        photon = Photon(*[dr.zeros(kind, 1) for kind in (mi.Point3f, mi.Vector3f, mi.Vector3f, mi.Spectrum, mi.Float)],
+                        dr.zeros(mi.UInt32, 1), dr.zeros(mi.Bool, 1))  # fmt: skip
+        return Crowding(mi, photon, dr.zeros(mi.Bool, 1), 1.0, 1)
+
+    def at(self, place: Point) -> Float:
+        """1/m^2, of one particle that is traced."""
+        return dr.gather(self.mi.Float, self.values, self._place(place))
+
+    def _place(self, point: Point) -> UInt:
+        mi = self.mi
+        x, y, z = (mi.UInt32(mi.Int32(dr.floor(v * self.per_cell))) for v in point)
+        return sampler.mix(sampler.mix(x, y), z) & (CUBES - 1)

@@ -1,8 +1,8 @@
 """Where light begins: particles that leave the lamps.
 
 A particle is a ray from a lamp and the light that it carries, its radiance over `density`. That density is one of
-*étendue*, 1/(m^2 sr) with the cosine at the lamp: light keeps its étendue through mirrors, and through glass but for the
-square of the index, so that the same number tells how likely the particle arrives on a surface far behind (`photons.py`).
+*étendue*, 1/(m^2 sr) with the cosine at the lamp: light keeps its étendue through mirrors, and through glass but for
+the square of the index, so that the same number tells how likely particles arrive on a surface behind (`caustics.py`).
 
 With `Targets` particles go where certain shapes may stand, and nowhere else.
 """

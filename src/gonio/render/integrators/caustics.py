@@ -3,34 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from types import ModuleType
 from typing import ClassVar
 
 import drjit as dr
 import numpy as np
 
-from ..photons import Photon, PhotonMap
+from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
-from ..types import Float, Mask, MitsubaBSDF, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
+from ..types import Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
 from .base import Settings
 from .particles import FIRST_VERTEX, VERTEX_DIMENSIONS, Flight, Particles
 from .path import Path
+from .transport import PathState
 
 SHARED = 4  # samples of a pixel that look at the same map
 PER_PIXEL = 2.0  # particles of a map for each pixel,
 FEWEST, MOST = 1 << 14, 1 << 19  # but so many at least, and at most
 FOOTPRINT = 1.5  # first radius of a search, in pixels as they are seen on the scene on the median
 SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
+CROWD = 4.0  # radii wide: the cubes in which particles are counted
 PROBED = 48  # rays each way, to measure a pixel
+
+
+@dataclass
+class _Way:
+    """Particles on their way from a lamp by mirrors to a place, and from there by mirrors to a second one."""
+
+    flight: Flight
+    density: Float  # of étendue, where the present chain of mirrors began
+    mirrored: Mask  # whether such a chain has begun
+    kept: Mask
+    first: Photon
+    kept_again: Mask
+    second: Photon
 
 
 class Caustics(Path):
     """Path tracing, where light by way of mirrors and smooth glass comes from a map of particles, too.
 
     Of the light that mirrors or glass throw upon a surface, paths from the camera find what comes from wide lamps,
-    particles from the lamps what comes from small ones: each is weighed by how likely it was to find it. A particle counts
-    for places around it, within a radius that shrinks, so that the picture is blurred by about a pixel at first and
-    sharp in the end (consistent, not unbiased); all other light is that of `path`.
+    particles from the lamps what comes from small ones: each is weighed by how likely it was to find it. A particle
+    counts for places around it, within a radius that shrinks, so that the picture is blurred by about a pixel at first
+    and sharp in the end (consistent, not unbiased); all other light is that of `path`.
+
+    How likely: a path that leaves a surface with density p toward mirrors and meets the lamp behind them, and N
+    particles that come from there the other way, are as dense as p / cos and g N pi r^2 over the same étendue, with
+    the particles' density g at the lamp; what mirrors and lenses do to the width of the beam is the same for both.
     """
 
     name = "caustics"
@@ -48,14 +68,20 @@ class Caustics(Path):
         self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
         self.radius = FOOTPRINT * self._pixel()
         self._map: tuple[int, PhotonMap] | None = None
+        self._total = dr.opaque(mi.Float, self.count)
+        self._crowding = Crowding.nowhere(mi)
+        self._seen = False  # a map, from which to tell where particles crowd
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
         """The samples that share a map; the map is made before them."""
         while self.merging and first < last:
             number = first // SHARED
+            if not self._seen:
+                way, width = self._traced(0), CROWD * self.radius
+                self._crowding, self._seen = Crowding(self.mi, way.first, way.kept, width, self.count), True
             if self._map is None or self._map[0] != number:
                 self._map = None  # before the next one: there is one at a time
-                self._map = number, self._traced(number)
+                self._map = number, self._mapped(number)
             end = min(last, (number + 1) * SHARED)
             yield first, end
             first = end
@@ -79,69 +105,97 @@ class Caustics(Path):
 
     # ------------------------------------------------------------------ particles
 
-    def _traced(self, number: int) -> PhotonMap:
-        """Map `number` of the picture."""
+    def _traced(self, number: int) -> _Way:
+        """The particles of map `number`, at the end of their ways."""
         mi, particles = self.mi, self.particles
         assert particles is not None
         lane = dr.arange(mi.UInt32, self.count)
         begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
         low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
         particle, flight = particles.leave(key, low, mi.Bool(True))
-        photon = Photon(
-            mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0)
+        none = Photon(
+            mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False)
         )
 
-        def vertex(flight: Flight, photon: Photon, kept: Mask) -> tuple[Flight, Photon, Mask]:
+        def vertex(way: _Way) -> _Way:
+            flight = way.flight
             si, bsdf, crossing = particles.arrive(flight)
             flags = bsdf.flags()
             smooth, rough = mi.has_flag(flags, mi.BSDFFlags.Delta), mi.has_flag(flags, mi.BSDFFlags.Smooth)
             at = flight.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
             # A surface that is both a mirror and rough keeps every second particle, at twice its share.
-            both = smooth & rough & (flight.depth > 1)
+            both = smooth & rough & way.mirrored
             flight.share *= dr.select(both, 2, 1)
-            stays = flight.active & rough & (flight.depth > 1) & (~both | (self._coin(key, low, at) < 0.5))
+            stays = flight.active & rough & way.mirrored & (~both | (self._coin(key, low, at) < 0.5))
             if crossing is not None:
                 stays &= crossing.surface
-            arrived = Photon(
+            photon = Photon(
                 si.p,
                 mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, -flight.ray.d)),
                 mi.Vector3f(-flight.ray.d),
                 flight.flux * flight.share / self._total,
-                particle.density * dr.square(flight.eta),
+                way.density * dr.square(flight.eta),
                 flight.depth,
+                way.kept,
             )
-            photon, kept = dr.select(stays, arrived, photon), kept | stays
+            first, second = stays & ~way.kept, stays & way.kept
             bs, weight = particles.scatter(key, low, flight, si, bsdf, crossing)
-            active = flight.active & ~stays & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            return particles.go_on(key, low, flight, si, crossing, bs, weight, active), photon, kept
+            delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            # From where it has arrived it goes on once more, to a second place behind mirrors.
+            active = flight.active & ~second & (first ^ delta)
+            flight.eta = dr.select(first, 1, flight.eta)
+            following = particles.go_on(key, low, flight, si, crossing, bs, weight, active)
+            following.eta = dr.select(first, 1, following.eta)
+            return _Way(
+                following,
+                dr.select(first, self._crowding.at(si.p) * dr.inv_pi, way.density),
+                (way.mirrored & ~first) | (active & delta),
+                way.kept | first,
+                dr.select(first, photon, way.first),
+                way.kept_again | second,
+                dr.select(second, photon, way.second),
+            )
 
-        self._total = dr.opaque(mi.Float, self.count)
-        state = (flight, photon, mi.Bool(False))
-        state = dr.while_loop(state, lambda f, *_: f.active, vertex, mode="symbolic", label="particles")
-        return PhotonMap(mi, state[1], state[2], self.radius * (number + 1) ** SHRINKING)
+        way = _Way(flight, particle.density, mi.Bool(False), mi.Bool(False), none, mi.Bool(False), none)
+        return dr.while_loop((way,), lambda way: way.flight.active, lambda way: (vertex(way),), mode="symbolic",
+                             label="particles")[0]  # fmt: skip
+
+    def _mapped(self, number: int) -> PhotonMap:
+        """Map `number` of the picture, from its particles."""
+        way = self._traced(number)
+        radius = self.radius * (number + 1) ** SHRINKING
+        return PhotonMap(self.mi, [way.first, way.second], [way.kept, way.kept_again], radius)
 
     def _coin(self, key: UInt, low: UInt, at: UInt) -> Float:
         return self.pair(key, low, at + 2)[0]
 
     # ------------------------------------------------------------------ paths
 
-    def merged(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, depth: UInt, u: Float, active: Mask) -> Radiance:
-        """The light that particles have brought to a place, toward the path that has come there."""
+    def merged(
+        self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
+    ) -> tuple[Radiance, Float]:
+        """The light that particles have brought to a place, toward the path that has come there; and what counts of the
+        light behind mirrors that a path finds from there on."""
         mi = self.mi
         if self._map is None:
-            return mi.Spectrum(0)
-        photons = self._map[1]
+            return mi.Spectrum(0), mi.Float(1)
+        photons, depth = self._map[1], path.depth
         active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         normal = mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, si.to_world(si.wi)))
+        # Who has come here by mirrors shares what first particles have brought with second particles.
+        by_mirrors = (path.lobe > 0) & (path.pdf == 0)
+        crowd = self._crowding.at(si.p) * dr.inv_pi
+        counts = dr.select(by_mirrors, self._by_path(path.lobe, crowd, photons), 1)
 
         def visit(photon: Photon, weight: Float, here: Mask) -> Radiance:
             here &= photon.depth + depth + 1 <= self.max_depth
             value, pdf = bsdf.eval_pdf(self.context, si, si.to_local(photon.direction), here)
             cosine = dr.maximum(abs(dr.dot(photon.direction, si.n)), 1e-6)
             share = 1 - self._by_path(pdf / cosine, photon.density, photons)
+            share *= dr.select(photon.again, 1, counts)
             return dr.select(here, value * photon.flux * (weight * share / cosine), 0)
 
-        return photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active)
+        return photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active), counts
 
     def _by_path(self, lobe: Float, density: Float, photons: PhotonMap) -> Float:
         """Weight of a path that finds the lamp behind mirrors by itself, beside the particles (power heuristic).
@@ -153,12 +207,12 @@ class Caustics(Path):
         ratio = particles / lobe
         return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
 
-    def found(self, ray: Ray, lobe: Float, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
+    def found(self, path: PathState, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
         """What a path finds at a lamp that it meets by way of mirrors, beside the particles."""
         if self._map is None:
             return emitted
         assert self.particles is not None
-        behind = active & (lobe > 0) & dr.any(emitted != 0)
-        density = self.particles.sources.density(ray.o, si, ray.d, behind)
-        return dr.select(behind, emitted * self._by_path(lobe, density, self._map[1]), emitted)
-
+        behind = active & (path.lobe > 0) & dr.any(emitted != 0)
+        density = self.particles.sources.density(path.ray.o, si, path.ray.d, behind)
+        share = path.counts * self._by_path(path.lobe, density, self._map[1])
+        return dr.select(behind, emitted * share, emitted)

@@ -6,7 +6,6 @@ eta_i)^2 is left out, and where shading and geometric normals differ the flux is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,7 @@ from .. import sampler
 from ..adapter.variant import DISPERSES
 from ..media import Crossing
 from ..sources import Particle, Sources, Targets
-from ..types import BSDFSample, Float, Hit, Mask, MitsubaBSDF, Radiance, Ray, SurfaceInteraction, UInt
+from ..types import BSDFSample, Float, Hit, Mask, MitsubaBSDF, Radiance, Ray, SurfaceInteraction, UInt, Vector
 
 if TYPE_CHECKING:
     from .transport import Transport
@@ -127,7 +126,7 @@ class Particles:
         active: Mask,
     ) -> Flight:
         """To the next surface, in the direction of a sample."""
-        mi, of = self.mi, self.of
+        of = self.of
         share = flight.share * weight
         active = active & dr.any(share != 0) & (flight.depth + 1 < of.max_depth)
         at = flight.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
@@ -145,7 +144,7 @@ class Particles:
         return Flight(flight.depth + 1, ray, hit, flight.flux, share, eta, flight.alone, inside, active)
 
 
-def adjoint(si: SurfaceInteraction, wo: Sequence[Float]) -> Float:
+def adjoint(si: SurfaceInteraction, wo: Vector) -> Float:
     """What a particle's flux is multiplied by where the shading normal is not the geometric one, |wi.s wo.g / (wi.g
     wo.s)|; 1 where they are the same."""
     into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(wo)))

@@ -50,7 +50,7 @@ BATCH = 16
 
 
 @dataclass
-class _Path:
+class PathState:
     """A path on its way, one a lane."""
 
     index: UInt  # of the sample
@@ -65,12 +65,13 @@ class _Path:
     alone: UInt  # 1 where the first wavelength goes on without the others
     inside: UInt  # of which media, see `media.py`
     lobe: Float  # pdf over cosine with which the last lobe before mirrors chose its direction; 0 where there was none
+    counts: Float  # of the light behind mirrors that it finds from that surface on
     active: Mask
 
 
 @cache
 def _waiting_type(variant: str, media: bool, merges: bool) -> Record:
-    """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a _Path.
+    """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a PathState.
 
     A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
     cannot hold masks (in Dr.Jit 1.5 they do not compile for the CPU), so what an intersection found is kept
@@ -81,20 +82,20 @@ def _waiting_type(variant: str, media: bool, merges: bool) -> Record:
     kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
     kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
     kept |= ({"alone": mi.UInt32} if mi.is_spectral else {}) | ({"inside": mi.UInt32} if media else {})
-    kept |= {"lobe": mi.Float} if merges else {}
+    kept |= {"lobe": mi.Float, "counts": mi.Float} if merges else {}
 
-    def pack(path: _Path) -> Record:
+    def pack(path: PathState) -> Record:
         hit = {name: getattr(path.hit, name) for name in found}
         return waiting(**{name: getattr(path, name) for name in kept}, **hit)
 
-    def unpack(rest: Record) -> _Path:
+    def unpack(rest: Record) -> PathState:
         hit = dr.zeros(mi.PreliminaryIntersection3f)
         for name in found:
             setattr(hit, name, getattr(rest, name))
         hit.valid = rest.t < dr.inf
-        fields = {"alone": mi.UInt32(0), "inside": mi.UInt32(0), "lobe": mi.Float(0)}
+        fields = {"alone": mi.UInt32(0), "inside": mi.UInt32(0), "lobe": mi.Float(0), "counts": mi.Float(1)}
         fields |= {name: kind(getattr(rest, name)) for name, kind in kept.items()}
-        return _Path(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
+        return PathState(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
 
     waiting: Record = make_dataclass("Waiting", [*kept.items(), *found.items()])
     waiting.pack, waiting.unpack = staticmethod(pack), unpack
@@ -194,7 +195,7 @@ class Transport(Integrator):
         """Follow the paths put by in `waiting[0:count]` to their ends and add what they find."""
         mi = self.mi
 
-        def body(slot: UInt, path: _Path, waiting: Record, sums: Sums) -> tuple[UInt, _Path, Record, Sums]:
+        def body(slot: UInt, path: PathState, waiting: Record, sums: Sums) -> tuple[UInt, PathState, Record, Sums]:
             path = dr.select(path.active, path, waiting.read(slot).unpack())
             path = self.extend(path, key)
             ended = ~path.active
@@ -207,21 +208,21 @@ class Transport(Integrator):
         loop = dr.while_loop(state, lambda slot, *_: slot < count, body, mode="symbolic", label="further vertices")
         return loop[3]
 
-    def begin(self, pixel: UInt, key: UInt, index: UInt) -> tuple[_Path, list[Float]]:
+    def begin(self, pixel: UInt, key: UInt, index: UInt) -> tuple[PathState, list[Float]]:
         """The first vertex of a sample: (the path that goes on from it, [r, g, b, features of this vertex])."""
         path, features = self.first(pixel, key, index), list[Float]()
         path = self.extend(path, key, features)
         return path, [*self.rgb(path.radiance, path.ray.wavelengths), *features]
 
-    def first(self, pixel: UInt, key: UInt, index: UInt) -> _Path:
+    def first(self, pixel: UInt, key: UInt, index: UInt) -> PathState:
         """A sample's path up to the first thing that it meets."""
         mi = self.mi
         ray, weight, hit = self.first_hit(pixel, key, index)
         inside = self.begun if self.begun is not None else mi.UInt32(0)
-        return _Path(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
-                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), inside, mi.Float(0), mi.Bool(True))  # fmt: skip
+        return PathState(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
+                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), inside, mi.Float(0), mi.Float(1), mi.Bool(True))  # fmt: skip
 
-    def extend(self, path: _Path, key: UInt, features: list[Float] | None = None) -> _Path:
+    def extend(self, path: PathState, key: UInt, features: list[Float] | None = None) -> PathState:
         """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
 
         features  given at the first vertex: a list that gets its albedo and normal, if they are wanted
@@ -243,7 +244,7 @@ class Transport(Integrator):
             weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
             if self.merges:
-                emitted = self.found(ray, path.lobe, si, emitted, active & (path.pdf == 0))
+                emitted = self.found(path, si, emitted, active & (path.pdf == 0))
         radiance = radiance + throughput * dr.select(active, emitted, 0)
         active = active & si.is_valid() & (depth + 1 < self.max_depth)
 
@@ -262,7 +263,8 @@ class Transport(Integrator):
         if self.merges:
             surface = active if crossing is None else active & crossing.surface
             _, u = sampler.independent_pair(key, path.index, dimension + ROULETTE)
-            gathered = gathered + self.merged(si, bsdf, depth, u, surface)
+            brought, counts_here = self.merged(si, bsdf, path, u, surface)
+            gathered = gathered + brought
         radiance = radiance + throughput * dr.select(active, gathered, 0)
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(self.ambient, bsdf, si, active)
@@ -279,8 +281,9 @@ class Transport(Integrator):
             throughput, active = self.roulette(path.index, key, dimension, depth, throughput, eta, active)
 
         ray = si.spawn_ray(si.to_world(bs.wo))
-        lobe = path.lobe
+        lobe, counts = path.lobe, path.counts
         if self.merges:
+            counts = dr.select(delta, counts, counts_here)
             begun = bs.pdf / dr.maximum(abs(dr.dot(ray.d, si.n)), 1e-6)
             lobe = dr.select(delta, lobe * dr.square(bs.eta), begun)
         # The last ray can only find light: no surface beyond it is shaded.
@@ -295,15 +298,30 @@ class Transport(Integrator):
         hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         if not lights.has_environment:  # else the path goes on to meet it
             active = active & hit.is_valid()
-        return _Path(
-            path.index, depth + 1, ray, hit, throughput, eta, pdf, solid_angle, radiance, alone, inside, lobe, active
+        return PathState(
+            path.index,
+            depth + 1,
+            ray,
+            hit,
+            throughput,
+            eta,
+            pdf,
+            solid_angle,
+            radiance,
+            alone,
+            inside,
+            lobe,
+            counts,
+            active,
         )
 
-    def merged(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, depth: UInt, u: Float, active: Mask) -> Radiance:
-        """Of an integrator that merges: what particles bring to a vertex."""
+    def merged(
+        self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
+    ) -> tuple[Radiance, Float]:
+        """Of an integrator that merges: what particles bring to a vertex, and `PathState.counts` from there on."""
         raise NotImplementedError
 
-    def found(self, ray: Ray, lobe: Float, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
+    def found(self, path: PathState, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
         """Of an integrator that merges: what counts of a lamp that a path meets by way of mirrors."""
         raise NotImplementedError
 
