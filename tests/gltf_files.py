@@ -95,9 +95,9 @@ def png(values: np.ndarray) -> bytes:
 
 def pictured() -> tuple[dict[str, Any], bytes]:
     """A material whose values are pictures inside the file: colour and alpha, roughness (G) and metallic (B)."""
-    colour = np.zeros((2, 4, 4), np.uint8) + [188, 128, 0, 255]
+    colour = np.full((2, 4, 4), (188, 128, 0, 255))
     colour[:, 2:, 3] = 0
-    both = np.zeros((2, 4, 3), np.uint8) + [9, 128, 255]
+    both = np.full((2, 4, 3), (9, 128, 255))
     parts = [png(colour), png(both)]
     sizes = [len(part) for part in parts]
     views = [

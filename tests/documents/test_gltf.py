@@ -8,14 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import gonio as go
 import numpy as np
 import pytest
-from gltf_files import ALL, document, glb, meshed, pictured, text
-
-import gonio as go
 from gonio.errors import InputError
 from gonio.models import documents
 from gonio.models.documents import Document, Notation
+
+from gltf_files import ALL, document, glb, meshed, pictured, text
 
 
 @pytest.fixture

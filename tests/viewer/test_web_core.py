@@ -347,6 +347,42 @@ def test_a_gltf_finds_the_data_that_is_dropped_with_it(page: Page) -> None:
     assert page.tab.evaluate("() => gonio.app.scene().mesh.mesh.positions.length") == 9
 
 
+USED = """async ([name, text]) => {
+  document.querySelector(".toast")?.remove();
+  await gonio.useFiles(new File([text], name));
+  return document.querySelector(".toast").textContent;
+}"""
+
+
+def test_a_dropped_gltf_dresses_the_selected_ball_by_its_numbers(page: Page) -> None:
+    """The page's model is a conductor: its index without loss that reflects the base colour from above."""
+    file = json.loads(gltf())
+    pbr = {"baseColorFactor": [0.81, 0.36, 0.04, 1], "metallicFactor": 1, "roughnessFactor": 0.5}
+    file["materials"] = [{"name": "Unworn"}, {"name": "Copper", "pbrMetallicRoughness": pbr}]
+    file["meshes"][0]["primitives"][0]["material"] = 1
+    before = page.state("slots[0].balls")
+    said = page.tab.evaluate(USED, ["copper.gltf", json.dumps(file)])
+    assert 'its material "Copper" is' in said
+    slot, ball = page.state("selection.slot"), page.state("selection.ball")
+    worn = page.state(f"slots[{slot}].balls[{ball}]")
+    values = {path.removeprefix("base."): value for path, value in worn["set"].items()}
+    assert values["eta"] == pytest.approx([19, 4, 1.5]) and values["k"] == [0, 0, 0]
+    assert values["alpha"] == [0.25, 0.25] and worn["label"] == "Copper"
+    others = [b for i, b in enumerate(page.state("slots[0].balls")) if i != ball]
+    assert others == [b for i, b in enumerate(before) if i != ball]
+    page.tab.evaluate("() => gonio.converge(16)")
+    picture = page.picture(16)
+    shown = picture[picture[..., 3] > 0.99][..., :3].mean(0)
+    assert shown[0] > 1.05 * shown[1] > 1.1 * shown[2]  # one of ten, among grey ones
+
+
+def test_a_page_without_a_fitting_model_says_so(page: Page) -> None:
+    file = json.loads(gltf())
+    file["materials"] = [{"name": "Chalk", "pbrMetallicRoughness": {"metallicFactor": 0}}]
+    said = page.tab.evaluate(USED, ["chalk.gltf", json.dumps(file)])
+    assert 'no model for its material "Chalk"' in said and page.state("view.mesh") == "file"
+
+
 @pytest.mark.parametrize("mesh", ["torus", "shaderball"])
 def test_built_in_shapes_are_shaded(page: Page, mesh: str) -> None:
     page.set(f"s.view.mesh = '{mesh}'")

@@ -43,6 +43,18 @@ export function setParameter(app: PageApp, slot: number, path: string, value: Va
 
 const kindOf = (app: PageApp, slot: number, path: string) => app.shaderOf(slot).manifest.parameters.find((p) => p.path === path)?.kind;
 
+/** Values of one ball, the selected one, whatever the others of its row have. */
+export function setBall(app: PageApp, slot: number, values: Record<string, Value>, label: string): void {
+  const { ball } = app.state.selection;
+  app.store.update("slots", (state) => {
+    const balls = (state.slots[slot] as State["slots"][number]).balls;
+    const one = balls[Math.min(ball, balls.length - 1)];
+    if (!one) return;
+    one.set = { ...one.set, ...values };
+    one.label = label;
+  });
+}
+
 /** "roughness .55", from what sets a ball apart; the page's first labels are written the same way. */
 function labelOf(set: Record<string, Value>): string {
   const bits = Object.entries(set).map(([path, value]) => {

@@ -1,6 +1,7 @@
 /** Files that are dropped on the page or opened: pictures become the environment, meshes the shape. */
 import type { PageApp } from "../app";
 import { environmentFromFloats } from "../environment";
+import { readFactors, wear } from "../gltf-material";
 import { newLight } from "../lights";
 import { readMesh } from "../meshes";
 import { readRadiance } from "../radiance";
@@ -26,8 +27,11 @@ export async function useFiles(app: PageApp, files: readonly File[]): Promise<vo
     if (PICTURES.test(file.name)) {
       const picture = readRadiance(new Uint8Array(await file.arrayBuffer()), file.name);
       useEnvironment(app, picture.width, picture.height, picture.data);
-    } else if (MESHES.test(file.name)) app.useMesh(await readMesh(file, files.filter((other) => other !== file)));
-    else throw new Error(`${file.name}: drop a Radiance picture (.hdr) or a mesh (.glb, .gltf, .obj).`);
+    } else if (MESHES.test(file.name)) {
+      app.useMesh(await readMesh(file, files.filter((other) => other !== file)));
+      const factors = /\.obj$/i.test(file.name) ? null : readFactors(new Uint8Array(await file.arrayBuffer()));
+      if (factors) return app.say(`${file.name} is in use; ${wear(app, factors)}`);
+    } else throw new Error(`${file.name}: drop a Radiance picture (.hdr) or a mesh (.glb, .gltf, .obj).`);
     app.say(`${file.name} is in use.`);
   } catch (error) {
     app.say(error instanceof Error ? error.message : String(error), "error");

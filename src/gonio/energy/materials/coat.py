@@ -48,6 +48,9 @@ class Coat(BSDF):
     is absorbed. a is the base's colour, its tint over that of its white twin. Reciprocal; white on white keeps all
     light.
 
+    With `bounces="white"` a = 1 in that series: what is seen is R, and 1 - R of the base's colour, neither darker nor
+    deeper.
+
     The base stands in the coat: an index of its own is over the coat's. A rough top reflects as rough glass does, by an
     albedo R; refracted light is not blurred. k and the rest are tables found when the material is first asked. Colours
     of the base may vary over the surface, and so may the coat's own colour and depth, as the tables hold polynomials in
