@@ -66,7 +66,7 @@ from ..compensation.lobe import MissingEnergy
 from ..compensation.missing import missing_energy
 from .kulla_conty import KullaConty
 
-SMALLEST = 1e-3  # width: no lobe is a mirror's, so that any two that fall on each other can be weighed against each other
+SMALLEST = 1e-3  # width: no lobe is a mirror's, and any two that fall on each other are weighed against each other
 NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
 LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
 NODES = 6  # over the cosine, of means of what two layers let through: 1e-3 at F0 = .05
@@ -86,6 +86,7 @@ class Between(NamedTuple):
     eta          index by which it refracts, over the outside's
     medium       index of what lies above the base, over the outside's
     sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
+    filmed       how many times more that reflects under its film, by nodes of the cosine; empty without one
     joint        the same seen through the coat's
     bent         by nodes of the cosine, how far that is off its mean; both of them
     facets       factor of facets under the coat, by nodes of the cosine; empty without one
@@ -102,6 +103,7 @@ class Between(NamedTuple):
     eta: Scalar
     medium: Scalar
     sheer: Spectrum
+    filmed: tuple[Spectrum, ...]
     joint: Spectrum
     bent: tuple[tuple[Scalar, ...], tuple[Scalar, ...]]
     facets: tuple[Scalar, ...]
@@ -187,9 +189,7 @@ class OpenPBR(BSDF):
     transmission_dispersion_scale: Number = number(
         default=0.0, doc="0, or an error: `dielectric` has substances that disperse", low=0.0, high=1.0, inside=True
     )
-    transmission_dispersion_abbe_number: Number = number(
-        default=20.0, doc="of that dispersion", low=0.0, inside=True
-    )
+    transmission_dispersion_abbe_number: Number = number(default=20.0, doc="of that dispersion", low=0.0, inside=True)
     subsurface_weight: Number = number(
         default=0.0, doc="share of the opaque dielectric that scatters under its surface", low=0.0, high=1.0
     )
@@ -251,7 +251,9 @@ class OpenPBR(BSDF):
             hint = 'Dielectric(eta="bk7") in a spectral render'
             raise InputError("dispersion is not followed", "OpenPBR.transmission_dispersion_scale", hint)
         if given("subsurface_weight") and given("subsurface_radius") and not self.geometry_thin_walled:
-            text = "subsurface_radius is taken for 0: light leaves where it enters, as a diffuse lobe of subsurface_color"
+            text = (
+                "subsurface_radius is taken for 0: light leaves where it enters, as a diffuse lobe of subsurface_color"
+            )
             warnings.warn(f"OpenPBR: {text}", GonioWarning, stacklevel=3)
 
     def _has(self, name: str) -> bool:
@@ -313,11 +315,11 @@ class OpenPBR(BSDF):
         kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=self._masking)
         values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
         metal = missing_energy(binding.bound_copy(kind, values))
-        kept = _Kept(self, rough, ratio, eta, medium)
+        filmed = self._more_by_film(rough, ratio, eta, medium) if self._has("thin_film_weight") else ()
         under, over, weights = [], [], []
         for x, w in zip(*(part.tolist() for part in gauss(NODES)), strict=True):
             weights.append(4.0 * w * x**3)
-            under.append(kept(x * x + 0.0 * rough))
+            under.append(self._kept_below(x * x + 0.0 * rough, rough, ratio, filmed))
             over.append(self._coat_kept(x * x + 0.0 * rough))
         total = sum(weights)
         sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
@@ -327,7 +329,9 @@ class OpenPBR(BSDF):
             tuple(mean(one / level - 1.0) * w for one, w in zip(parts, weights, strict=True))
             for parts, level in ((under, sheer), (both, joint))
         )
-        f_metal = average(lambda mu: self._metal(mu + 0.0 * rough, eta, medium))
+        f_metal = white
+        if self._has("base_metalness"):
+            f_metal = average(lambda mu: self._metal(mu + 0.0 * rough, eta, medium))
         sheet = None
         if self.geometry_thin_walled:
             back = average(lambda mu: self._sheet(mu + 0.0 * rough, ratio, eta, medium)[0])
@@ -336,8 +340,8 @@ class OpenPBR(BSDF):
         glass = None
         if self._refracts:
             kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=self._masking)
-            values = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white}
-            glass = missing_energy(binding.bound_copy(kind_too, {**values, "absorption": zero, "priority": 0.0 * eta}))
+            clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
+            glass = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
         return Between(
             alpha=alpha,
             rough=rough,
@@ -346,6 +350,7 @@ class OpenPBR(BSDF):
             eta=eta,
             medium=medium,
             sheer=sheer,
+            filmed=filmed,
             joint=joint / sheer,
             bent=bent,  # type: ignore[arg-type]
             facets=self._balanced(rough) if self._has("coat_weight") else (),
@@ -354,6 +359,10 @@ class OpenPBR(BSDF):
             sheet_again=sheet,
             glass=glass,
         )
+
+    def _settled(self) -> OpenPBR:
+        """A copy that holds what is derived, where that differs from ray to ray: it is asked for in many places."""
+        return self if self._derived is not None else binding.with_derived(self, self.derive())
 
     def prepare(self) -> None:
         """Find the tables, before a loop is recorded."""
@@ -420,7 +429,33 @@ class OpenPBR(BSDF):
     def _let_in(self, cos: Scalar) -> Spectrum:
         """1 - E of the base's dielectric surface."""
         b = self.derived
-        return _Kept(self, b.rough, b.ratio, b.eta, b.medium)(cos)
+        return self._kept_below(cos, b.rough, b.ratio, b.filmed)
+
+    def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
+        E = reflected(cos, rough, ratio, self._masking)
+        if not filmed:
+            return 1.0 - (E + 0.0 * self.base_color)
+        nodes, x, more = gauss(NODES)[0].tolist(), sqrt(maximum(cos, 0.0)), filmed[0]
+        for n in range(NODES - 1):
+            part = clamp((x - nodes[n]) * (1.0 / (nodes[n + 1] - nodes[n])), 0.0, 1.0)
+            more = more + (filmed[n + 1] - filmed[n]) * part
+        return 1.0 - clamp(more * E, 0.0, 1.0)
+
+    def _more_by_film(self, rough: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> tuple[Spectrum, ...]:
+        """How many times more facets reflect under the film, at the nodes of the cosine: of a few of those seen."""
+        width = maximum(sqr(rough), SMALLEST)
+        ndf, alpha, found = distribution("ggx"), vec2(width, width), []
+        for x in gauss(NODES)[0].tolist():
+            o = _at(x * x + 0.0 * rough)
+            bare, filmed = 1e-6 + 0.0 * rough, 1e-6 + 0.0 * self.base_color
+            for u1, u2 in FACETS:
+                m = ndf.sample_visible(o, u1 + 0.0 * rough, u2 + 0.0 * rough, alpha)
+                i, at = frame.reflect(o, m), maximum(ops.dot(o, m), 1e-3)
+                weight = where(i.z > 0.0, 1.0 / (1.0 + ndf.Lambda(where(i.z > 0.0, i, o), alpha)), 0.0)
+                bare = bare + weight * exact.dielectric(at, fresnel.cos_transmitted(at, ratio), ratio)
+                filmed = filmed + self._glossy(at, ratio, eta, medium) * weight
+            found.append(filmed / bare)
+        return tuple(found)
 
     def _even(self, w: Direction, coated: bool) -> Scalar:
         """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
@@ -548,7 +583,9 @@ class OpenPBR(BSDF):
         b = self.derived
         white = 1.0 + 0.0 * self.base_color
         values = {"roughness": self.base_diffuse_roughness}
-        base = binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
+        base = (
+            binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
+        )
         dimmed = self._let_in(pair.wo.z) * self._let_in(pair.wi.z) / b.sheer
         dimmed = dimmed * ((1.0 - self.base_metalness) * (1.0 - self.transmission_weight))
         if self._bends:
@@ -571,7 +608,7 @@ class OpenPBR(BSDF):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The sum of all lobes times |cos theta_i|; the light that goes straight on is a delta lobe."""
-        value = self._surface(wo, wi, mode)
+        value = self._settled()._surface(wo, wi, mode)
         return value * self.geometry_opacity if self._has_holes() else value
 
     def _surface(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
@@ -713,7 +750,8 @@ class OpenPBR(BSDF):
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The mixture of the lobes' densities."""
-        density = self._density(self._shares(wo), wo, wi)
+        model = self._settled()
+        density = model._density(model._shares(wo), wo, wi)
         return density * self.geometry_opacity if self._has_holes() else density
 
     def _density(self, shares: Shares, wo: Direction, wi: Direction) -> Scalar:
@@ -744,6 +782,9 @@ class OpenPBR(BSDF):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the lobe."""
+        return self._settled()._drawn(wo, u, mode)
+
+    def _drawn(self, wo: Direction, u: Direction, mode: Mode) -> Sample:
         b, shares = self.derived, self._shares(wo)
         pick = u.x
         if self._has_holes():
@@ -850,43 +891,16 @@ class OpenPBR(BSDF):
         return _mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
 
 
-class _Kept(NamedTuple):
-    """1 - E of the base's dielectric surface at a cosine, a colour under a film."""
-
-    model: OpenPBR
-    rough: Scalar
-    ratio: Scalar
-    eta: Scalar
-    medium: Scalar
-
-    def __call__(self, cos: Scalar) -> Spectrum:
-        """Under a film the mean over some of the facets that are seen says how much more is reflected."""
-        model = self.model
-        E = reflected(cos, self.rough, self.ratio, model._masking)
-        if not model._has("thin_film_weight"):
-            return 1.0 - (E + 0.0 * model.base_color)
-        ndf, alpha, o = distribution("ggx"), vec2(sqr(self.rough), sqr(self.rough)), _at(cos)
-        alpha = vec2(maximum(alpha.x, SMALLEST), maximum(alpha.y, SMALLEST))
-        bare, filmed = 1e-6 + 0.0 * cos, 1e-6 + 0.0 * model.base_color
-        for u1, u2 in FACETS:
-            m = ndf.sample_visible(o, u1 + 0.0 * cos, u2 + 0.0 * cos, alpha)
-            i, at = frame.reflect(o, m), maximum(ops.dot(o, m), 1e-3)
-            weight = where(i.z > 0.0, 1.0 / (1.0 + ndf.Lambda(where(i.z > 0.0, i, o), alpha)), 0.0)
-            bare = bare + weight * exact.dielectric(at, fresnel.cos_transmitted(at, self.ratio), self.ratio)
-            filmed = filmed + model._glossy(at, self.ratio, self.eta, self.medium) * weight
-        return 1.0 - clamp(filmed * (E / bare), 0.0, 1.0)
-
-
 class _Interface(FilmDielectric):
     """The geometry of refraction; how much there is of it the composition says."""
 
 
-# --------------------------------------------------------------------------- the albedo of rough glass that only reflects
+# --------------------------------------------------------------------------- tables
 
 INDICES, ROUGHNESSES, COSINES = 25, 17, 49
 HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
 STEPS = 4
-FACETS = [((n + 0.5) / 4.0, (0.5 + 0.625 * n) % 1.0) for n in range(4)]  # of those seen, under a film
+FACETS = [(0.25, 0.1), (0.7, 0.4), (0.9, 0.85)]  # of those seen, under a film
 
 
 @function
@@ -926,32 +940,34 @@ def _scattering(masking: str) -> Table:
 
     def build() -> np.ndarray:
         x, w = gauss(64)
-        mu, weight = x**2, 4.0 * w * x**3
-        turns = (np.arange(96) + 0.5) / 96 * np.pi
-        sin = np.sqrt(1.0 - mu**2)
+        sin, turns = np.sqrt(1.0 - x**4), (np.arange(96) + 0.5) / 96 * np.pi
         wi = np.stack(
-            [sin[:, None] * np.cos(turns), sin[:, None] * np.sin(turns), np.tile(mu[:, None], (1, len(turns)))], -1
-        ).reshape(-1, 3)
-        hats = np.maximum(1.0 - np.abs(x[:, None] * (HATS - 1) - np.arange(HATS)), 0.0)
-        found = np.zeros((ROUGHNESSES, COSINES, HATS))
+            np.broadcast_arrays(sin[:, None] * np.cos(turns), sin[:, None] * np.sin(turns), x[:, None] ** 2), -1
+        )
+        hats = _hats(x) * (4.0 * np.pi * w * x**3)[:, None]
+        places = np.linspace(0.0, 1.0, COSINES)
+        cos = np.maximum(places**2, 1e-3)
+        wo = np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1)
+        found = np.tile(_hats(places), (ROUGHNESSES, 1, 1))
         for row, roughness in enumerate(np.linspace(0.0, 1.0, ROUGHNESSES)):
-            for column, place in enumerate(np.linspace(0.0, 1.0, COSINES)):
-                cos = max(place**2, 1e-3)
-                own = np.maximum(1.0 - np.abs(place * (HATS - 1) - np.arange(HATS)), 0.0)
-                wo = np.tile([np.sqrt(1.0 - cos * cos), 0.0, cos], (len(wi), 1))
-                value = _white_metal(roughness, masking).f(wo, wi, precision="float64")[:, 0]
-                shares = (value.reshape(len(mu), -1).mean(1) * np.pi * weight) @ hats
-                # narrower than the nodes, a lobe is a mirror's; what the nodes of the integral miss is one too
-                missed = max(1.0 - shares.sum(), 0.0)
-                found[row, column] = (shares + missed * own) / (shares.sum() + missed) if roughness > 0.12 else own
+            if roughness < 0.12:  # narrower than the nodes: a mirror's
+                continue
+            white = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking))
+            pairs = np.repeat(wo, wi[..., 0].size, 0), np.tile(wi.reshape(-1, 3), (COSINES, 1))
+            value = white.f(*pairs, precision="float64")[:, 0].reshape(COSINES, len(x), -1).mean(2)
+            shares = value @ hats
+            missed = np.maximum(1.0 - shares.sum(1, keepdims=True), 0.0)  # a peak between the integral's nodes
+            found[row] = (shares + missed * found[row]) / (shares.sum(1, keepdims=True) + missed)
         return found
 
     values = cache.remember(("openpbr-scattered", masking, ROUGHNESSES, COSINES, HATS), build)
     return Table("openpbr_scattered", values)
 
 
-def _white_metal(roughness: float, masking: str) -> BSDF:
-    return KullaConty(Conductor(alpha=max(roughness**2, SMALLEST), fresnel="one", masking=masking))
+def _hats(x: np.ndarray) -> np.ndarray:
+    """Shares of places among the nodes on both sides of them, (N, HATS)."""
+    shares: np.ndarray = np.maximum(1.0 - np.abs(x[:, None] * (HATS - 1) - np.arange(HATS)), 0.0)
+    return shares
 
 
 # --------------------------------------------------------------------------- small formulas
