@@ -105,7 +105,8 @@ class Interior(NamedTuple):
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(bsdf, file))
 class BSDF(Material):
-    """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name.
+    """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name, where a class
+    does not give its own.
 
     breaks      law -> Breach, for laws that the model breaks by nature (Phong: reciprocity, energy)
     only_rgb    whether eval gives red, green and blue, whatever channels the renderer has
@@ -129,7 +130,7 @@ class BSDF(Material):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        if not cls.__name__.startswith("_"):
+        if not cls.__name__.startswith("_") and not vars(cls).get("name"):
             letters = ("-" + c.lower() if c.isupper() else c for c in cls.__name__)
             cls.name = "".join(letters).lstrip("-").replace("_", "-")
         own = vars(cls)

@@ -1,0 +1,1009 @@
+"""OpenPBR, the surface of the Academy Software Foundation, as a composition of what this package has."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from ... import ops
+from ...errors import GonioWarning, InputError
+from ...models import BSDF, Breach, Colour, Number, Sample, binding, choice, flag, method, number, spectrum
+from ...models.conductor import Conductor
+from ...models.dielectric import Dielectric
+from ...models.eon import AVERAGE as MEAN_LOSS
+from ...models.eon import GRAZING as GRAZING_LOSS
+from ...models.eon import Eon
+from ...models.film_dielectric import FilmDielectric
+from ...models.glossy import facet
+from ...models.material import Delta, Interior
+from ...models.microfacet import upper
+from ...models.mix import ALMOST_ONE
+from ...models.sheen import Sheen
+from ...ops import (
+    Direction,
+    Mask,
+    Mode,
+    Node,
+    Pair,
+    Scalar,
+    Spectrum,
+    Table,
+    abs,
+    backend,
+    clamp,
+    function,
+    inset,
+    inv_pi,
+    log,
+    lookup,
+    maximum,
+    mean,
+    minimum,
+    safe_div,
+    safe_sqrt,
+    sqr,
+    sqrt,
+    vec2,
+    vec3,
+    where,
+)
+from ...ops.backend import Array
+from ...optics import frame, fresnel, masking
+from ...optics.fresnel import average, exact, film
+from ...optics.fresnel.f82 import GRAZING, f82
+from ...optics.fresnel.schlick import schlick
+from ...optics.ndf import distribution
+from ...optics.special import gauss
+from ...optics.warp import square_to_cosine_hemisphere
+from .. import cache
+from ..albedo import quadrature
+from ..compensation.lobe import MissingEnergy
+from ..compensation.missing import missing_energy
+from .kulla_conty import KullaConty
+
+SMALLEST = 1e-3  # width: no lobe is a mirror's, and any two that fall on each other are weighed against each other
+NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
+LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
+NODES = 6  # over the cosine, of means of what two layers let through: 1e-3 at F0 = .05
+LAYERINGS = {
+    "reciprocal": "a layer dims what lies under it at both ends, so that light may be turned round",
+    "albedo": "by one minus its albedo seen from wo, as the specification's reduction to lobes",
+}
+
+
+class Between(NamedTuple):
+    """What follows from the parameters alone.
+
+    alpha        of the base, roughened by the coat, along x and y
+    rough        its roughness; the root of alpha with one width
+    coat_alpha   of the coat
+    ratio        index by which the base reflects, over what lies above it, 1 and more
+    eta          index by which it refracts, over the outside's
+    medium       index of what lies above the base, over the outside's
+    sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
+    filmed       how many times more that reflects under its film, by nodes of the cosine; empty without one
+    joint        the same seen through the coat's
+    bent         by nodes of the cosine, how far that is off its mean; both of them
+    facets       factor of facets under the coat, by nodes of the cosine; empty without one
+    metal        what single scattering misses at F = 1
+    metal_again  colour of what a metal gives back
+    sheet_again  colours of what a thin sheet gives back, reflected and transmitted
+    glass        what it misses of glass; None where nothing is transmitted
+    """
+
+    alpha: Pair
+    rough: Scalar
+    coat_alpha: Pair
+    ratio: Scalar
+    eta: Scalar
+    medium: Scalar
+    sheer: Spectrum
+    filmed: tuple[Spectrum, ...]
+    joint: Spectrum
+    bent: tuple[tuple[Scalar, ...], tuple[Scalar, ...]]
+    facets: tuple[Scalar, ...]
+    metal: MissingEnergy
+    metal_again: Spectrum
+    sheet_again: tuple[Spectrum, Spectrum] | None
+    glass: MissingEnergy | None
+
+
+class Shares(NamedTuple):
+    """Probabilities of the lobes: fuzz, coat, facets that mirror and that refract, cosines on both sides."""
+
+    fuzz: Scalar
+    coat: Scalar
+    mirrored: Scalar
+    refracted: Scalar
+    near: Scalar
+    far: Scalar
+
+
+class _Pair(NamedTuple):
+    """A pair of directions, both turned up.
+
+    wo, wi   above the surface; the normal where a pair is not to be evaluated
+    near     whether wi lies on wo's side
+    above    whether coat and fuzz lie on that side
+    """
+
+    wo: Direction
+    wi: Direction
+    near: Mask
+    above: Mask
+
+
+class OpenPBR(BSDF):
+    """OpenPBR 1.1 (OpenPBR2025): a base of metal, glass or a glossy diffuse body under a thin film, a coat and fuzz.
+
+    f = opacity {F f_fuzz + (1 - F E_fuzz) [C f_coat + (1 - C + C T W D) f_base]} + the light that goes straight on
+    f_base = M f_metal + (1 - M) {f_glossy + (1 - E_o) (1 - E_i) / (1 - E_avg) f_diffuse}, where opaque
+
+    with the weights F, C, M of fuzz, coat and metal, E the albedo of a rough dielectric, T what the coat's colour
+    leaves on both ways, D the darkening by light that bounces under it. W is what the coat's surface lets through: by
+    `layering`, (1 - E_coat(wo)), as the specification reduces layers to lobes, or a product of one factor for each
+    direction that keeps all light of a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz `sheen`, metals are
+    F82 with what they scatter twice, glass refracts as `dielectric` and keeps what it scatters twice.
+
+    The parameters are the specification's. A width is held above .001: no lobe is a mirror's. Indices run from 1 to 5.
+    Subsurface scattering is local: with `geometry_thin_walled` as specified, else a diffuse lobe of its colour, the
+    limit of radius 0, with a warning. Scattering inside, dispersion and emission are errors, as they are no matter of
+    a surface. transmission_depth > 0 gives absorption inside, which Gonio's integrators follow.
+    """
+
+    name: ClassVar[str] = "openpbr"
+    reads_wavelengths: ClassVar[bool] = True
+    _masking: ClassVar[str] = "smith-correlated"
+
+    base_weight: Number = number(default=1.0, doc="factor on the base's colour", low=0.0, high=1.0)
+    base_color: Colour = spectrum(default=0.8, doc="diffuse colour; of metal, seen from above", low=0.0, high=1.0)
+    base_diffuse_roughness: Number = number(default=0.0, doc="of the diffuse lobe, as `eon`", low=0.0, high=1.0)
+    base_metalness: Number = number(default=0.0, doc="share of the surface that is metal", low=0.0, high=1.0)
+    specular_weight: Number = number(default=1.0, doc="factor on F0 by the index, and on metal", low=0.0, high=4.0)
+    specular_color: Colour = spectrum(
+        default=1.0, doc="tint of what is reflected outside; of metal, at the edge", low=0.0, high=1.0
+    )
+    specular_roughness: Number = number(default=0.3, doc="root of alpha", low=0.0, high=1.0)
+    specular_roughness_anisotropy: Number = number(
+        default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0
+    )
+    specular_ior: Number = number(default=1.5, doc="index of the base", low=1.0, high=5.0)
+    transmission_weight: Number = number(
+        default=0.0, doc="share of the dielectric that light passes through", low=0.0, high=1.0
+    )
+    transmission_color: Colour = spectrum(
+        default=1.0, doc="what is left of white light after `transmission_depth`; at depth 0 a tint", low=0.0, high=1.0
+    )
+    transmission_depth: Number = number(default=0.0, doc="0 tints at the surface", low=0.0, high=1e6)
+    transmission_scatter: Colour = spectrum(
+        default=0.0, doc="scattering inside, which no surface has: 0, or an error", low=0.0, inside=True
+    )
+    transmission_scatter_anisotropy: Number = number(
+        default=0.0, doc="of that scattering", low=-1.0, high=1.0, inside=True
+    )
+    transmission_dispersion_scale: Number = number(
+        default=0.0, doc="0, or an error: `dielectric` has substances that disperse", low=0.0, high=1.0, inside=True
+    )
+    transmission_dispersion_abbe_number: Number = number(default=20.0, doc="of that dispersion", low=0.0, inside=True)
+    subsurface_weight: Number = number(
+        default=0.0, doc="share of the opaque dielectric that scatters under its surface", low=0.0, high=1.0
+    )
+    subsurface_color: Colour = spectrum(default=0.8, doc="its colour", low=0.0, high=1.0)
+    subsurface_radius: Number = number(
+        default=1.0, doc="mean free path; taken for 0, with a warning", low=0.0, inside=True
+    )
+    subsurface_radius_scale: Colour = spectrum(
+        default=(1.0, 0.5, 0.25), doc="factor on it, by colour", low=0.0, inside=True
+    )
+    subsurface_scatter_anisotropy: Number = number(
+        default=0.0, doc="of a thin wall: 1 sends all light on, -1 all back", low=-1.0, high=1.0
+    )
+    coat_weight: Number = number(default=0.0, doc="share of the surface under the coat", low=0.0, high=1.0)
+    coat_color: Colour = spectrum(
+        default=1.0, doc="what the coat leaves of light that crosses it twice, straight", low=0.0, high=1.0
+    )
+    coat_roughness: Number = number(default=0.0, doc="root of alpha", low=0.0, high=1.0)
+    coat_roughness_anisotropy: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0)
+    coat_ior: Number = number(default=1.6, doc="index of the coat", low=1.0, high=5.0)
+    coat_darkening: Number = number(
+        default=1.0, doc="how much light that bounces under the coat darkens the base", low=0.0, high=1.0
+    )
+    fuzz_weight: Number = number(default=0.0, doc="share of the surface under fuzz", low=0.0, high=1.0)
+    fuzz_color: Colour = spectrum(default=1.0, doc="factor on what the fuzz scatters", low=0.0, high=1.0)
+    fuzz_roughness: Number = number(default=0.5, doc="0 is fibres along the normal, 1 dust", low=0.0, high=1.0)
+    thin_film_weight: Number = number(default=0.0, doc="share of the base under a thin film", low=0.0, high=1.0)
+    thin_film_thickness: Number = number(default=0.5, doc="of the film", low=0.0, high=3.0, unit="um")
+    thin_film_ior: Number = number(default=1.4, doc="index of the film", low=1.0, high=3.0)
+    emission_luminance: Number = number(
+        default=0.0, doc="0, or an error: a shape's emitter shines", low=0.0, unit="nit", inside=True
+    )
+    emission_color: Colour = spectrum(default=1.0, doc="of that emission", low=0.0, inside=True)
+    geometry_opacity: Number = number(
+        default=1.0, doc="share of the surface that is there; light goes straight on elsewhere", low=0.0, high=1.0
+    )
+    geometry_thin_walled: bool = flag(default=False, doc="whether it is a sheet without an inside")
+    layering: str = choice("reciprocal", "how a coat dims what lies under it", LAYERINGS)
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "reciprocity": Breach(
+            "fuzz is a table of the viewer's direction alone, and so is a coat where layering is albedo",
+            lambda model: 4.0 if model._has("fuzz_weight") or model._by_albedo() else 0.0,
+            certain=False,
+        ),
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        given = self._has
+        if given("emission_luminance"):
+            hint = "give the shape an emitter in the scene"
+            raise InputError("a surface that shines: emission_luminance 0 expected", "OpenPBR.emission_luminance", hint)
+        bulk = given("transmission_weight") and not self.geometry_thin_walled
+        if bulk and given("transmission_scatter") and given("transmission_depth"):
+            hint = "transmission_scatter 0 leaves absorption, which paths follow; or subsurface_weight for a dense body"
+            raise InputError("light scattered inside is no matter of a surface", "OpenPBR.transmission_scatter", hint)
+        if bulk and given("transmission_dispersion_scale"):
+            hint = 'Dielectric(eta="bk7") in a spectral render'
+            raise InputError("dispersion is not followed", "OpenPBR.transmission_dispersion_scale", hint)
+        if given("subsurface_weight") and given("subsurface_radius") and not self.geometry_thin_walled:
+            text = (
+                "subsurface_radius is taken for 0: light leaves where it enters, as a diffuse lobe of subsurface_color"
+            )
+            warnings.warn(f"OpenPBR: {text}", GonioWarning, stacklevel=3)
+
+    def _has(self, name: str) -> bool:
+        """Whether a weight may be other than 0, known before anything runs: then its part of the code is there. In a
+        recording all parts are, as their weights are yet to come."""
+        value = getattr(self.plain, name)
+        if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
+            return True
+        return bool(np.any(np.asarray(value, float) != 0.0))
+
+    def _by_albedo(self) -> bool:
+        return self.layering == "albedo" and self._has("coat_weight")
+
+    @property
+    def _two_widths(self) -> bool:
+        """Whether the base has, or may have, two widths; never for what is only recorded."""
+        value = self.plain.specular_roughness_anisotropy
+        return backend.is_drjit(value) or bool(np.any(np.asarray(value, float) != 0.0))
+
+    # ------------------------------------------------------------------ what follows from the parameters
+
+    @function
+    def _widths(self, roughness: Scalar, anisotropy: Scalar) -> Pair:
+        """alpha along x and y, whose squares add up to twice roughness^4."""
+        low = 1.0 - anisotropy
+        along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
+        return vec2(maximum(along, SMALLEST), maximum(along * low, SMALLEST))
+
+    @function
+    def _roughened(self) -> Scalar:
+        """Roughness of the base, whose facets are seen through a rough coat."""
+        own, over = sqr(sqr(self.specular_roughness)), sqr(sqr(self.coat_roughness))
+        under = sqrt(sqrt(clamp(own + 2.0 * over, 1e-12, 1.0)))
+        return _mix(self.specular_roughness, under, self.coat_weight)
+
+    @function
+    def _indices(self) -> tuple[Scalar, Scalar, Scalar]:
+        """(index by which the base reflects, by which it refracts, index of what lies above it).
+
+        The coat bends light before it meets the base, so that a coat of the higher index reflects nothing totally: as
+        specified, the ratio is turned round then.
+        """
+        base, coat = self.specular_ior, self.coat_ior
+        ratio = base / coat
+        met = _mix(base, maximum(ratio, 1.0 / ratio), self.coat_weight)
+        below = _mix(base, ratio, self.coat_weight)
+        medium = base / below
+        eta = maximum(medium * _modulated(below, self.specular_weight), NEAREST)
+        return _modulated(met, self.specular_weight), eta, medium
+
+    def derive(self) -> Between:
+        """Widths and indices, means over the hemisphere, and what facets scatter twice."""
+        rough = self._roughened()
+        alpha = self._widths(rough, self.specular_roughness_anisotropy)
+        coat_alpha = self._widths(self.coat_roughness, self.coat_roughness_anisotropy)
+        ratio, eta, medium = self._indices()
+        zero, white = 0.0 * self.base_color, 1.0 + 0.0 * self.base_color
+        two = self._two_widths
+        kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=self._masking)
+        values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
+        metal = missing_energy(binding.bound_copy(kind, values))
+        filmed = self._more_by_film(rough, ratio, eta, medium) if self._has("thin_film_weight") else ()
+        under, over, weights = [], [], []
+        for x, w in zip(*(part.tolist() for part in gauss(NODES)), strict=True):
+            weights.append(4.0 * w * x**3)
+            under.append(self._kept_below(x * x + 0.0 * rough, rough, ratio, filmed))
+            over.append(self._coat_kept(x * x + 0.0 * rough))
+        total = sum(weights)
+        sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
+        both = [one * other for one, other in zip(under, over, strict=True)]
+        joint = _sum([one * (w / total) for one, w in zip(both, weights, strict=True)])
+        bent = tuple(
+            tuple(mean(one / level - 1.0) * w for one, w in zip(parts, weights, strict=True))
+            for parts, level in ((under, sheer), (both, joint))
+        )
+        f_metal = white
+        if self._has("base_metalness"):
+            f_metal = average(lambda mu: self._metal(mu + 0.0 * rough, eta, medium))
+        sheet = None
+        if self.geometry_thin_walled:
+            back = average(lambda mu: self._sheet(mu + 0.0 * rough, ratio, eta, medium)[0])
+            through = average(lambda mu: self._sheet(mu + 0.0 * rough, ratio, eta, medium)[1])
+            sheet = back, through
+        glass = None
+        if self._refracts:
+            kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=self._masking)
+            clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
+            glass = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
+        return Between(
+            alpha=alpha,
+            rough=rough,
+            coat_alpha=coat_alpha,
+            ratio=ratio,
+            eta=eta,
+            medium=medium,
+            sheer=sheer,
+            filmed=filmed,
+            joint=joint / sheer,
+            bent=bent,  # type: ignore[arg-type]
+            facets=self._balanced(rough) if self._has("coat_weight") else (),
+            metal=metal,
+            metal_again=_again(f_metal, metal.average),
+            sheet_again=sheet,
+            glass=glass,
+        )
+
+    def _settled(self) -> OpenPBR:
+        """A copy that holds what is derived, where that differs from ray to ray: it is asked for in many places."""
+        return self if self._derived is not None else binding.with_derived(self, self.derive())
+
+    def prepare(self) -> None:
+        """Find the tables, before a loop is recorded."""
+        _albedos(self._masking)
+        _scattering(self._masking)
+
+    def _balanced(self, rough: Scalar) -> tuple[Scalar, ...]:
+        """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
+
+        A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
+        light all over and the rest on, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
+        """
+        rows, kept, w = [], [], []
+        q = sqrt(self._coat_kept(0.45 + 0.0 * rough))
+        for n in range(HATS):
+            cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
+            rows.append(scattered(cos, rough, self._masking))
+            kept.append(self._coat_kept(cos))
+            b = sqr(rough) / (sqr(rough) + cos + 1e-3)
+            w.append(2.0 * kept[-1] / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * kept[-1] + 1e-12)))
+        for _ in range(STEPS):
+            met = [_sum([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
+            w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
+        return tuple(w)
+
+    # ------------------------------------------------------------------ reflectances
+
+    def _film(self, cos: Scalar, eta: Spectrum, k: Spectrum, medium: Scalar) -> Spectrum:
+        """R of the film over a base of index eta + i k, both over the medium's, under a cosine outside."""
+        inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(medium))
+        thickness = 1000.0 * self.thin_film_thickness
+        one = film.Film(eta, k, self.thin_film_ior / medium, thickness, "belcour-barla", self.wavelengths)
+        return film.reflectance(inner, one)
+
+    def _glossy(self, cos: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
+        """F of the dielectric from outside, without its tint."""
+        white = 1.0 + 0.0 * self.base_color
+        bare = white * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
+        if not self._has("thin_film_weight"):
+            return bare
+        filmed = self._film(cos, white * (eta / medium), 0.0 * white, medium)
+        return _mix(bare, filmed, self.thin_film_weight)
+
+    def _metal(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
+        """F of the metal: F82 by its colours; under a film of the index that Gulbrandsen2014 finds for them."""
+        weight, r0 = minimum(self.specular_weight, 1.0), self.base_color * self.base_weight
+        bare = f82(cos, r0, self.specular_color * schlick(GRAZING, r0))
+        if not self._has("thin_film_weight"):
+            return bare * weight
+        r = clamp(r0, 1e-4, 0.999)
+        least, root = (1.0 - r) / (1.0 + r), sqrt(r)
+        n = self.specular_color * least + (1.0 - self.specular_color) * ((1.0 + root) / (1.0 - root))
+        k = safe_sqrt((r * sqr(n + 1.0) - sqr(n - 1.0)) / (1.0 - r))
+        return _mix(bare, self._film(cos, n, k, medium), self.thin_film_weight) * weight
+
+    def _sheet(self, cos: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> tuple[Spectrum, Spectrum]:
+        """What a thin sheet reflects and lets through, all bounces between its faces together."""
+        f = self._glossy(cos, ratio, eta, medium)
+        inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(eta))
+        t = _power(self.transmission_color, 1.0 / maximum(inner, 0.05))
+        rest = sqr(1.0 - f) * t / maximum(1.0 - sqr(f * t), 1e-6)
+        return f + rest * f * t, rest
+
+    def _let_in(self, cos: Scalar) -> Spectrum:
+        """1 - E of the base's dielectric surface."""
+        b = self.derived
+        return self._kept_below(cos, b.rough, b.ratio, b.filmed)
+
+    def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
+        E = reflected(cos, rough, ratio, self._masking)
+        if not filmed:
+            return 1.0 - (E + 0.0 * self.base_color)
+        nodes, x, more = gauss(NODES)[0].tolist(), sqrt(maximum(cos, 0.0)), filmed[0]
+        for n in range(NODES - 1):
+            part = clamp((x - nodes[n]) * (1.0 / (nodes[n + 1] - nodes[n])), 0.0, 1.0)
+            more = more + (filmed[n + 1] - filmed[n]) * part
+        return 1.0 - clamp(more * E, 0.0, 1.0)
+
+    def _more_by_film(self, rough: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> tuple[Spectrum, ...]:
+        """How many times more facets reflect under the film, at the nodes of the cosine: of a few of those seen."""
+        width = maximum(sqr(rough), SMALLEST)
+        ndf, alpha, found = distribution("ggx"), vec2(width, width), []
+        for x in gauss(NODES)[0].tolist():
+            o = _at(x * x + 0.0 * rough)
+            bare, filmed = 1e-6 + 0.0 * rough, 1e-6 + 0.0 * self.base_color
+            for u1, u2 in FACETS:
+                m = ndf.sample_visible(o, u1 + 0.0 * rough, u2 + 0.0 * rough, alpha)
+                i, at = frame.reflect(o, m), maximum(ops.dot(o, m), 1e-3)
+                weight = where(i.z > 0.0, 1.0 / (1.0 + ndf.Lambda(where(i.z > 0.0, i, o), alpha)), 0.0)
+                bare = bare + weight * exact.dielectric(at, fresnel.cos_transmitted(at, ratio), ratio)
+                filmed = filmed + self._glossy(at, ratio, eta, medium) * weight
+            found.append(filmed / bare)
+        return tuple(found)
+
+    def _even(self, w: Direction, coated: bool) -> Scalar:
+        """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
+
+        The lobe sends more light to some cosines than Lambert's, and those surfaces let less through there. Its mean
+        over azimuth is known: the factor makes a white base whole to second order.
+        """
+        rough = self.base_diffuse_roughness
+        lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": 1.0 + 0.0 * self.base_color, "roughness": rough})
+        sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), 0.0 * w.z
+        nodes = [x * x for x in gauss(NODES)[0].tolist()]
+        for node, off in zip(nodes, self.derived.bent[coated], strict=True):
+            slant = sin * (math.sqrt(1.0 - node * node) * inv_pi) * (1.0 / maximum(w.z, node) - 1.0)
+            twice = lost * (lobe._lost(_at(node + 0.0 * w.z)) / (GRAZING_LOSS - MEAN_LOSS))
+            total = total + off * (slant + twice)
+        return 1.0 / (1.0 + lobe._single() * rough * total)
+
+    @property
+    def _bends(self) -> bool:
+        return self.layering == "reciprocal" and self._has("base_diffuse_roughness")
+
+    @function
+    def _coat_kept(self, cos: Scalar) -> Scalar:
+        """1 - E of the coat's surface."""
+        return 1.0 - reflected(cos, self.coat_roughness, self.coat_ior, self._masking)
+
+    # ------------------------------------------------------------------ layers
+
+    @function
+    def _inside(self, cos: Scalar) -> Scalar:
+        """The cosine in the coat."""
+        return maximum(safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(self.coat_ior)), 0.05)
+
+    @function
+    def _darkened(self, cos: Scalar) -> Spectrum:
+        """(1 - K) / (1 - E_b K), K what the coat sends back down, E_b the base's albedo from above."""
+        b = self.derived
+        outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, self.coat_ior), self.coat_ior)
+        broad = 1.0 - (1.0 - fresnel.kind("exact").dielectric_average(self.coat_ior)) / sqr(self.coat_ior)
+        f0 = fresnel.r0_dielectric(b.ratio)
+        rough = _mix(1.0, self.specular_roughness, f0)
+        K = _mix(outer, broad, _mix(rough, self.specular_roughness, self.base_metalness))
+        body = _mix(self.base_color * self.base_weight, self.subsurface_color, self.subsurface_weight)
+        body = _mix(body, 1.0 + 0.0 * body, self.transmission_weight)
+        metal = self.base_color * (self.base_weight * minimum(self.specular_weight, 1.0))
+        E_b = _mix(f0 + (1.0 - f0) * body, metal, self.base_metalness)
+        return _mix(1.0, (1.0 - K) / (1.0 - E_b * K), self.coat_darkening)
+
+    def _under(self, cos: Scalar) -> tuple[Scalar, Spectrum, Scalar]:
+        """At a direction outside: what the coat's surface lets through, what its colour leaves of one crossing with
+        the root of the darkening, and the factor of a lobe of facets.
+
+        A last step of the iteration (`_balanced`): of a mirror the root of 1 - E, as exact as that itself.
+        """
+        b = self.derived
+        kept = self._coat_kept(cos)
+        tint = _power(self.coat_color, 0.5 / self._inside(cos)) * sqrt(self._darkened(cos))
+        place = sqrt(maximum(cos, 0.0)) * (HATS - 1.0)
+        here = _sum([maximum(1.0 - abs(place - float(n)), 0.0) * w for n, w in enumerate(b.facets)])
+        met = _sum([p * w for p, w in zip(scattered(cos, b.rough, self._masking), b.facets, strict=True)])
+        return kept, tint, sqrt(here * kept / maximum(met, 1e-4))
+
+    def _through_coat(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
+        """Factors of the base's facets and of its diffuse lobe; 1 where there is no coat on their side."""
+        C = self.coat_weight
+        kept_o, tint_o, facet_o = self._under(pair.wo.z)
+        if self.layering == "albedo":
+            coated = _mix(1.0, self._darkened(pair.wo.z), C)
+            tint = _power(self.coat_color, 0.5 / self._inside(pair.wo.z) + 0.5 / self._inside(pair.wi.z))
+            both = coated * ((1.0 - C) + tint * (kept_o * C))
+            both = where(pair.above, both, 1.0)
+            return both, both
+        kept_i, tint_i, facet_i = self._under(pair.wi.z)
+        tint = tint_o * tint_i
+        facets = (1.0 - C) + tint * (facet_o * facet_i * C)
+        both = kept_o * kept_i / self.derived.joint
+        if self._bends:
+            for w in (pair.wo, pair.wi):
+                both = both * (self._even(w, True) / self._even(w, False))
+        diffuse = (1.0 - C) + tint * (both * C)
+        return where(pair.above, facets, 1.0), where(pair.above, diffuse, 1.0)
+
+    def _past_layers(self, cos: Scalar) -> Spectrum:
+        """What coat and fuzz leave of light that passes them once, on its way in or out."""
+        left = 1.0 + 0.0 * self.base_color
+        if self._has("coat_weight"):
+            kept, tint, _ = self._under(cos)
+            left = _mix(1.0, tint * kept, self.coat_weight) * left
+        if self._has("fuzz_weight"):
+            left = left * (1.0 - self.fuzz_weight * self._fuzz()._lobe(_at(cos)).R)
+        return left
+
+    # ------------------------------------------------------------------ lobes
+
+    def _fuzz(self) -> Sheen:
+        return binding.bound_copy(Sheen(), {"albedo": self.fuzz_color, "roughness": self.fuzz_roughness})
+
+    def _interface(self) -> _Interface:
+        """The base's surface as glass."""
+        b = self.derived
+        zero = 0.0 * self.base_color
+        kind = _Interface(alpha=(0.1, 0.2) if self._two_widths else 0.1, masking=self._masking)
+        return binding.bound_copy(
+            kind,
+            {"eta": b.eta, "alpha": b.alpha, "rotation": None, "albedo": 1.0 + zero, "absorption": zero}
+            | {"priority": 0.0 * b.eta, "thickness": 0.0 * b.eta, "film_eta": 1.0 + 0.0 * b.eta},
+        )
+
+    def _pair(self, wo: Direction, wi: Direction) -> _Pair:
+        """Both turned up; a thin wall looks alike from both sides."""
+        near = wo.z * wi.z > 0.0
+        above = wo.z > 0.0
+        valid = (wo.z != 0.0) & (wi.z != 0.0)
+        if self.geometry_thin_walled:
+            above = wo.z != 0.0
+            wi = where(wo.z < 0.0, -wi, wi)
+            wi = where(near, wi, vec3(wi.x, wi.y, -wi.z))
+        elif not self._two_faced:
+            valid = near = near & above
+        o, i = upper(wo), where(wi.z < 0.0, -wi, wi)
+        return _Pair(where(valid, o, frame.upright(o)), where(valid, i, frame.upright(i)), near & valid, above)
+
+    def _diffuse(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
+        """What the body under the dielectric reflects and, of a thin wall, lets through, times cos theta_i."""
+        b = self.derived
+        white = 1.0 + 0.0 * self.base_color
+        values = {"roughness": self.base_diffuse_roughness}
+        base = (
+            binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
+        )
+        dimmed = self._let_in(pair.wo.z) * self._let_in(pair.wi.z) / b.sheer
+        dimmed = dimmed * ((1.0 - self.base_metalness) * (1.0 - self.transmission_weight))
+        if self._bends:
+            dimmed = dimmed * (self._even(pair.wo, False) * self._even(pair.wi, False))
+        if not self._has("subsurface_weight"):
+            return base * dimmed, 0.0 * white
+        S = self.subsurface_weight
+        if not self.geometry_thin_walled:
+            below = binding.bound_copy(Eon(), {**values, "albedo": self.subsurface_color}).eval(pair.wo, pair.wi)
+            return _mix(base, below, S) * dimmed, 0.0 * white
+        even = binding.bound_copy(Eon(), {**values, "albedo": white}).eval(pair.wo, pair.wi)
+        half, g = even * self.subsurface_color * (0.5 * S), self.subsurface_scatter_anisotropy
+        return (base * (1.0 - S) + half * (1.0 - g)) * dimmed, half * (1.0 + g) * dimmed
+
+    def _returned(self, wo: Direction, wi: Direction) -> Scalar:
+        """What facets that lose nothing scatter more than once, times cos theta_i."""
+        lost = self.derived.metal
+        return lost.at(wo) * lost.at(wi) * lost.over_average(wi) * wi.z
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The sum of all lobes times |cos theta_i|; the light that goes straight on is a delta lobe."""
+        value = self._settled()._surface(wo, wi, mode)
+        return value * self.geometry_opacity if self._has_holes() else value
+
+    def _surface(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+        """Where the surface is there."""
+        b = self.derived
+        pair = self._pair(wo, wi)
+        o, i = pair.wo, pair.wi
+        M, T = self.base_metalness, self.transmission_weight
+        zero = 0.0 * self.base_color * o.z
+        h, cos = facet(o, i)
+        ndf = distribution("ggx")
+        g = masking.masking_shadowing(self._masking, ndf, o, i, h, b.alpha)
+        facets = ndf.D(h, b.alpha) * g / (4.0 * o.z)
+        again = self._returned(o, i)
+        glossy = self._glossy(cos, b.ratio, b.eta, b.medium)
+        dielectric = glossy * self.specular_color
+        through = zero
+        if self.geometry_thin_walled and self._has("transmission_weight"):
+            assert b.sheet_again is not None, "derived where walls are thin"
+            back, on = self._sheet(cos, b.ratio, b.eta, b.medium)
+            sheet = back * self.specular_color * facets + b.sheet_again[0] * self.specular_color * again
+            opaque = dielectric * facets
+            dielectric = _mix(opaque, sheet, T)
+            through = (on * facets + b.sheet_again[1] * again) * ((1.0 - M) * T)
+        elif self._refracts:
+            assert b.glass is not None, "derived where light is transmitted"
+            # from inside, what coat and fuzz would send back comes back with what the base reflects
+            cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
+            inner = where(cos_t > 0.0, self._glossy(cos_t, b.ratio, b.eta, b.medium), 1.0 + zero)
+            inner = 1.0 - (1.0 - inner) * self._past_layers(maximum(cos_t, 1e-4))
+            lost = b.glass
+            twice = lost.at(wo) * lost.at(wi) * lost.over_average(wi) * lost.share(wo, wi) * abs(wi.z)
+            twice = twice * lost.radiance(wo, wi, mode)
+            tint = where(wo.z > 0.0, self.specular_color, 1.0 + zero)
+            mirrored = where(wo.z > 0.0, dielectric, _mix(glossy, inner, T))
+            dielectric = mirrored * facets + tint * (T * twice)
+            outside = self._past_layers(where(wo.z > 0.0, o.z, i.z))
+            colour = where(self.transmission_depth > 0.0, 1.0 + zero, self.transmission_color)
+            through = (self._refracted(wo, wi, mode) + twice) * colour * outside * ((1.0 - M) * T)
+        else:
+            dielectric = dielectric * facets
+        base = dielectric * (1.0 - M)
+        if self._has("base_metalness"):
+            metal = self._metal(cos, b.eta, b.medium) * facets + b.metal_again * again
+            base = base + metal * M
+        body, passed = self._diffuse(pair)
+        if self._has("coat_weight"):
+            by_facets, by_body = self._through_coat(pair)
+            coat = self._coat(o, i) * self.coat_weight
+            base = base * by_facets + where(pair.above, coat, 0.0)
+            body, passed = body * by_body, passed * by_body
+            if self.geometry_thin_walled:
+                through = through * by_facets
+        total = base + body
+        if self.geometry_thin_walled:
+            through = through + passed
+        if self._has("fuzz_weight"):
+            fuzz = self._fuzz()
+            left = 1.0 - self.fuzz_weight * fuzz._lobe(o).R
+            total = where(pair.above, total * left + fuzz.eval(o, i) * self.fuzz_weight, total)
+            if self.geometry_thin_walled:
+                through = through * left
+        if not self._two_faced:
+            return where(pair.near, total, 0.0)
+        return where(pair.near, total, where((wo.z != 0.0) & (wi.z != 0.0), through, 0.0))
+
+    @function
+    def _coat(self, o: Direction, i: Direction) -> Scalar:
+        """The coat's own lobe, times cos theta_i."""
+        h, cos = facet(o, i)
+        ndf, alpha = distribution("ggx"), self.derived.coat_alpha
+        g = masking.masking_shadowing(self._masking, ndf, o, i, h, alpha)
+        f = exact.dielectric(cos, fresnel.cos_transmitted(cos, self.coat_ior), self.coat_ior)
+        return f * (ndf.D(h, alpha) * g / (4.0 * o.z))
+
+    def _refracted(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+        """What facets refract to the other side."""
+        b, glass = self.derived, self._interface()
+        eta = glass._relative_eta(wo)
+        at = glass._facet(wo, wi, eta)
+        outer = where(wo.z > 0.0, abs(at.dot_o), abs(at.dot_i))
+        value = glass._value(at)
+        value = value * sqr(eta) if mode == "importance" else value
+        return (1.0 - self._glossy(outer, b.ratio, b.eta, b.medium)) * where(at.reflects, 0.0, value)
+
+    # ------------------------------------------------------------------ sampling
+
+    def _shares(self, wo: Direction) -> Shares:
+        """Of each lobe about what it reflects or lets through, with a little of all, so that no weight grows."""
+        b = self.derived
+        o = upper(wo)
+        cos = maximum(o.z, 1e-4)
+        zero, M, T = 0.0 * cos, self.base_metalness, self.transmission_weight
+        above = wo.z != 0.0 if self.geometry_thin_walled else wo.z > 0.0
+        fuzz, coat, left = zero, zero, 1.0 + zero
+        if self._has("fuzz_weight"):
+            fuzz = where(above, self.fuzz_weight * self._fuzz()._lobe(o).R, 0.0)
+            left = left - fuzz
+        if self._has("coat_weight"):
+            coat = where(above, self.coat_weight * (1.0 - self._coat_kept(cos)), 0.0) * left
+            left = left - coat
+        glossy = mean(self._glossy(cos, b.ratio, b.eta, b.medium))
+        body = self.base_color * self.base_weight
+        thin = self.geometry_thin_walled and self._has("subsurface_weight")
+        S = self.subsurface_weight
+        even = mean(_mix(body, self.subsurface_color, S)) * (1.0 - M) * (1.0 - T) * (1.0 - glossy)
+        passed = zero
+        if thin:
+            passed = mean(self.subsurface_color) * S * (0.5 + 0.5 * self.subsurface_scatter_anisotropy)
+            passed = passed * (1.0 - M) * (1.0 - T) * (1.0 - glossy)
+        even = maximum(even - passed, 0.0)
+        lost = b.metal.at(o)
+        metal = mean(self._metal(cos, b.eta, b.medium)) if self._has("base_metalness") else zero
+        refracted, back = zero, glossy
+        near, far = lost * metal * M, zero
+        if self.geometry_thin_walled and self._has("transmission_weight"):
+            on = self._sheet(cos, b.ratio, b.eta, b.medium)
+            back = _mix(glossy, mean(on[0]), T)
+            refracted = mean(on[1]) * (1.0 - M) * T
+            near, far = near + lost * T * mean(on[0]), lost * T * mean(on[1])
+        elif self._refracts:
+            assert b.glass is not None, "derived where light is transmitted"
+            cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
+            inner = where(cos_t > 0.0, mean(self._glossy(cos_t, b.ratio, b.eta, b.medium)), 1.0)
+            inner = clamp(inner, 0.02, 0.98)
+            here = where(wo.z > 0.0, clamp(glossy, 0.02, 1.0), inner)
+            back = _mix(glossy, here, T)
+            refracted = (1.0 - here) * ((1.0 - M) * T)
+            twice = b.glass.at(wo) * (1.0 - M) * T
+            near, far = near + 0.5 * twice, 0.5 * twice
+        mirrored = metal * M + back * (1.0 - M) * mean(self.specular_color) + 0.01
+        near, far = even + near + 0.01, far + passed
+        if self._two_faced:
+            far = far + 0.01 * (1.0 - M)
+        mirrored, refracted, near, far = (left * share for share in (mirrored, refracted, near, far))
+        total = 1.0 / (fuzz + coat + mirrored + refracted + near + far)
+        return Shares(*(share * total for share in (fuzz, coat, mirrored, refracted, near, far)))
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The mixture of the lobes' densities."""
+        model = self._settled()
+        density = model._density(model._shares(wo), wo, wi)
+        return density * self.geometry_opacity if self._has_holes() else density
+
+    def _density(self, shares: Shares, wo: Direction, wi: Direction) -> Scalar:
+        b = self.derived
+        pair = self._pair(wo, wi)
+        o, i = pair.wo, pair.wi
+        h, _ = facet(o, i)
+        ndf = distribution("ggx")
+        mirrored = 0.25 * ndf.visible_per_cosine(o, h, b.alpha)
+        cosine = i.z * inv_pi
+        density = shares.mirrored * mirrored + shares.near * cosine
+        if self._has("coat_weight"):
+            density = density + shares.coat * (0.25 * ndf.visible_per_cosine(o, h, b.coat_alpha))
+        if self._has("fuzz_weight"):
+            density = density + shares.fuzz * self._fuzz().pdf(o, i)
+        if not self._two_faced:
+            return where(pair.near, density, 0.0)
+        if self.geometry_thin_walled:
+            through = shares.refracted * mirrored
+        else:
+            glass = self._interface()
+            eta = glass._relative_eta(wo)
+            at = glass._facet(wo, wi, eta)
+            through = shares.refracted * where(at.reflects, 0.0, glass._density(at, eta))
+        through = through + shares.far * cosine
+        return where(pair.near, density, where((wo.z != 0.0) & (wi.z != 0.0), through, 0.0))
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks the lobe."""
+        return self._settled()._drawn(wo, u, mode)
+
+    def _drawn(self, wo: Direction, u: Direction, mode: Mode) -> Sample:
+        b, shares = self.derived, self._shares(wo)
+        pick = u.x
+        if self._has_holes():
+            covered = u.x < self.geometry_opacity
+            pick = minimum(safe_div(u.x, self.geometry_opacity), ALMOST_ONE)
+        o = upper(wo) if self._two_faced else wo
+        o = where(o.z > 0.0, o, frame.upright(o))
+        ndf = distribution("ggx")
+        ends = [shares.fuzz]
+        for share in shares[1:]:
+            ends.append(ends[-1] + share)
+        on_fuzz, on_coat = pick < ends[0], (pick >= ends[0]) & (pick < ends[1])
+        on_facets, on_refracted = (pick >= ends[1]) & (pick < ends[2]), (pick >= ends[2]) & (pick < ends[3])
+        on_near = (pick >= ends[3]) & (pick < ends[4])
+        alpha = vec2(where(on_coat, b.coat_alpha.x, b.alpha.x), where(on_coat, b.coat_alpha.y, b.alpha.y))
+        m = ndf.sample_visible(o, u.y, u.z, alpha)
+        mirrored = frame.reflect(o, m)
+        cosine = square_to_cosine_hemisphere(u.y, u.z)
+        wi = where(on_coat | on_facets, mirrored, cosine)
+        valid = wi.z > 0.0
+        if self._has("fuzz_weight"):
+            wi = where(on_fuzz, self._fuzz().sample(o, u, mode).wi, wi)
+            valid = wi.z > 0.0
+        if self._two_faced:
+            far = ~on_fuzz & ~on_coat & ~on_facets & ~on_near
+            if self.geometry_thin_walled:
+                bent, passes = mirrored, mirrored.z > 0.0
+                bent = vec3(bent.x, bent.y, -bent.z)
+            else:
+                eta = where(wo.z >= 0.0, b.eta, 1.0 / b.eta)
+                cos_m = ops.dot(o, m)
+                cos_t = fresnel.cos_transmitted(cos_m, eta)
+                bent = frame.refract(o, m, cos_t, eta)
+                passes = (cos_t > 0.0) & (bent.z < 0.0)
+            below = vec3(wi.x, wi.y, -wi.z)
+            wi = where(on_refracted, bent, where(far, below, wi))
+            valid = where(on_refracted, passes, where(far, wi.z < 0.0, valid))
+            wi = where(wo.z < 0.0, -wi, wi)
+        density = where(valid, self._density(shares, wo, wi), 0.0)
+        weight = self._surface(wo, wi, mode) * safe_div(1.0, density)
+        one = 1.0 + 0.0 * density
+        eta = one
+        if self._refracts:
+            eta = where(wo.z * wi.z > 0.0, one, where(wo.z >= 0.0, b.eta, 1.0 / b.eta))
+        delta = density != density
+        if self._has_holes():
+            through = 1.0 - self.geometry_opacity
+            wi, weight = where(covered, wi, -wo), where(covered, weight, one)
+            density = where(covered, density * self.geometry_opacity, through)
+            eta, delta = where(covered, eta, one), ~covered
+        return Sample(wi, weight, density, delta, eta)
+
+    # ------------------------------------------------------------------ facts
+
+    def _has_holes(self) -> bool:
+        value = self.plain.geometry_opacity
+        if isinstance(self.geometry_opacity, Node) or backend.is_drjit(value):
+            return True
+        return bool(np.any(np.asarray(value, float) != 1.0))
+
+    @property
+    def transmits(self) -> bool:
+        return self._two_faced or self.plain._has_holes()
+
+    @property
+    def _refracts(self) -> bool:
+        """Whether light goes on into a body."""
+        return not self.geometry_thin_walled and self.plain._has("transmission_weight")
+
+    @property
+    def _two_faced(self) -> bool:
+        """Whether there is anything to see from below."""
+        return self.geometry_thin_walled or self._refracts
+
+    @property
+    def delta(self) -> Delta:
+        return "maybe" if self.plain._has_holes() else "never"
+
+    @property
+    def isotropic(self) -> bool:
+        plain = self.plain
+        widths = plain.specular_roughness_anisotropy, plain.coat_roughness_anisotropy
+        return all(isinstance(one, int | float) and one == 0 for one in widths)
+
+    @property
+    def interior(self) -> Interior | None:
+        if self.geometry_thin_walled or not self.plain._has("transmission_weight"):
+            return None
+        if not self.is_bound:
+            return Interior(self.specular_ior, 0.0 * self.transmission_depth, 0.0)  # type: ignore[arg-type]
+        some = self.transmission_depth > 0.0
+        colour = maximum(self.transmission_color, 1e-6)
+        loss = where(some, -log(colour) / where(some, self.transmission_depth, 1.0), 0.0)
+        return Interior(self._indices()[1], loss, 0.0 * self.transmission_depth)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The base's colours under a cosine."""
+        b = self.derived
+        cos = abs(wo.z)
+        f = self._glossy(cos, b.ratio, b.eta, b.medium)
+        body = _mix(self.base_color * self.base_weight, self.subsurface_color, self.subsurface_weight)
+        body = _mix(body, self.transmission_color, self.transmission_weight)
+        dielectric = f * self.specular_color + (1.0 - f) * body
+        return _mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
+
+
+class _Interface(FilmDielectric):
+    """The geometry of refraction; how much there is of it the composition says."""
+
+
+# --------------------------------------------------------------------------- tables
+
+INDICES, ROUGHNESSES, COSINES = 25, 17, 49
+HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
+STEPS = 4
+FACETS = [(0.25, 0.1), (0.7, 0.4), (0.9, 0.85)]  # of those seen, under a film
+
+
+@function
+def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
+    """E of GGX facets of a dielectric of an index of 1 to 5, what they reflect at once."""
+    table = _albedos(masking)
+    f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
+    at = [inset(x, count) for x, count in zip((f0, roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    return clamp(lookup(table, *at)[0], 0.0, 1.0)
+
+
+@lru_cache
+def _albedos(masking: str) -> Table:
+    """E over (root of F0, roughness, root of the cosine)."""
+
+    def build() -> np.ndarray:
+        root = np.linspace(0.0, LARGEST, INDICES)[:, None, None]
+        alpha = np.maximum(np.linspace(0.0, 1.0, ROUGHNESSES) ** 2, SMALLEST)[None, :, None]
+        mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
+        eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
+        return quadrature.glass("ggx", masking, "exact", mu, alpha, eta).reflected
+
+    values = cache.remember(("openpbr", masking, INDICES, ROUGHNESSES, COSINES), build)
+    return Table("openpbr_reflected", values[..., None])
+
+
+def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
+    """Shares of light that white facets, all bounces together, send to the neighbourhoods of `HATS` cosines."""
+    table = _scattering(masking)
+    at = [inset(x, count) for x, count in zip((roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    return lookup(table, *at)
+
+
+@lru_cache
+def _scattering(masking: str) -> Table:
+    """Those shares over (roughness, root of the cosine)."""
+
+    def build() -> np.ndarray:
+        x, w = gauss(64)
+        sin, turns = np.sqrt(1.0 - x**4), (np.arange(96) + 0.5) / 96 * np.pi
+        wi = np.stack(
+            np.broadcast_arrays(sin[:, None] * np.cos(turns), sin[:, None] * np.sin(turns), x[:, None] ** 2), -1
+        )
+        hats = _hats(x) * (4.0 * np.pi * w * x**3)[:, None]
+        places = np.linspace(0.0, 1.0, COSINES)
+        cos = np.maximum(places**2, 1e-3)
+        wo = np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1)
+        found = np.tile(_hats(places), (ROUGHNESSES, 1, 1))
+        for row, roughness in enumerate(np.linspace(0.0, 1.0, ROUGHNESSES)):
+            if roughness < 0.12:  # narrower than the nodes: a mirror's
+                continue
+            white = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking))
+            pairs = np.repeat(wo, wi[..., 0].size, 0), np.tile(wi.reshape(-1, 3), (COSINES, 1))
+            value = white.f(*pairs, precision="float64")[:, 0].reshape(COSINES, len(x), -1).mean(2)
+            shares = value @ hats
+            missed = np.maximum(1.0 - shares.sum(1, keepdims=True), 0.0)  # a peak between the integral's nodes
+            found[row] = (shares + missed * found[row]) / (shares.sum(1, keepdims=True) + missed)
+        return found
+
+    values = cache.remember(("openpbr-scattered", masking, ROUGHNESSES, COSINES, HATS), build)
+    return Table("openpbr_scattered", values)
+
+
+def _hats(x: np.ndarray) -> np.ndarray:
+    """Shares of places among the nodes on both sides of them, (N, HATS)."""
+    shares: np.ndarray = np.maximum(1.0 - np.abs(x[:, None] * (HATS - 1) - np.arange(HATS)), 0.0)
+    return shares
+
+
+# --------------------------------------------------------------------------- small formulas
+
+
+def _mix(a: Array, b: Array, share: Scalar) -> Array:
+    """a at share 0, b at share 1."""
+    return a * (1.0 - share) + b * share
+
+
+@function
+def _modulated(ratio: Scalar, weight: Scalar) -> Scalar:
+    """The index whose F0 is that of `ratio` times a weight, held at index 5."""
+    root = (ratio - 1.0) / (ratio + 1.0)
+    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-12)), LARGEST), root)
+    return (1.0 + epsilon) / (1.0 - epsilon)
+
+
+def _sum(terms: list[Array]) -> Array:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def _again(f: Spectrum, lost: Scalar) -> Spectrum:
+    """Colour of light that facets scatter twice or more: F^2 E_avg / (1 - F (1 - E_avg))."""
+    return sqr(f) * (1.0 - lost) / (1.0 - f * lost)
+
+
+@function
+def _power(colour: Spectrum, exponent: Scalar) -> Spectrum:
+    """A colour to a power; black stays black."""
+    return ops.exp(log(maximum(colour, 1e-6)) * exponent)
+
+
+def _at(cos: Scalar) -> Direction:
+    """A direction of a cosine."""
+    return vec3(safe_sqrt(1.0 - sqr(cos)), 0.0 * cos, cos)
