@@ -51,7 +51,7 @@ def test_labels_carry_the_last_word_of_the_path(path: str, name: str) -> None:
 def test_values_are_shown_short() -> None:
     assert figures.show_value([0.1, 0.25, 1.0]) == "(0.1, 0.25, 1)"
     assert figures.show_value({"type": "matte", "albedo": 1}) == "matte"
-    assert len(figures.show_value("x" * 99)) == 28
+    assert len(figures.show_value("x" * 99)) == len(figures.show_value(10**400)) == 28
 
 
 def _colours(count: int) -> list[np.ndarray]:

@@ -137,7 +137,7 @@ def show_value(value: object, longest: int = 28) -> str:
     """A value as a label shows it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, int | float):
+    if isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 64):  # others no float can hold
         return f"{value:g}"
     if isinstance(value, list | tuple):
         text = "(" + ", ".join(show_value(item) for item in value) + ")"
