@@ -14,7 +14,7 @@ from types import ModuleType
 import drjit as dr
 import numpy as np
 
-from . import sampler
+from . import engine, sampler
 from .types import Float, Mask, Point, Radiance, UInt, Vector
 
 ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
@@ -79,13 +79,12 @@ class PhotonMap:
         words.sort()
         self.count = len(words)
         per_key = np.bincount((words >> np.uint64(32)).astype(np.int64), minlength=self.keys)
-        self.starts = mi.UInt32(np.concatenate([[0], np.cumsum(per_key)]).astype(np.uint32))
-        order = mi.UInt32(words.astype(np.uint32) if self.count else np.zeros(1, np.uint32))
+        self.starts = engine.own(mi.UInt32, np.concatenate([[0], np.cumsum(per_key)]).astype(np.uint32))
+        order = engine.own(mi.UInt32, words.astype(np.uint32) if self.count else np.zeros(1, np.uint32))
         self.values = dr.empty(mi.Float, dr.width(order) * FIELDS)
         lane = dr.arange(mi.UInt32, dr.width(order))
         for place, value in enumerate(values):
             dr.scatter(self.values, dr.gather(mi.Float, value, order), lane * FIELDS + place)
-        dr.make_opaque(self.starts)
         dr.eval(self.values)
 
     def _row(self, y: UInt, z: UInt) -> UInt:
@@ -167,8 +166,7 @@ class Crowding:
         place = self._place(photon.position)
         dr.eval(place, kept)
         counts = np.bincount(np.array(place)[np.array(kept)], minlength=CUBES)
-        self.values = mi.Float((counts / (traced * width**2)).astype(np.float32))
-        dr.make_opaque(self.values)
+        self.values = engine.own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
 
     @staticmethod
     def nowhere(mi: ModuleType) -> Crowding:

@@ -10,6 +10,7 @@ from typing import ClassVar
 import drjit as dr
 import numpy as np
 
+from .. import engine
 from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
 from ..types import Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
@@ -82,6 +83,8 @@ class Caustics(Path):
             if self._map is None or self._map[0] != number:
                 self._map = None  # before the next one: there is one at a time
                 self._map = number, self._mapped(number)
+            for read in (self._crowding, self._map[1]):
+                engine.renew(read)  # after the sums, in every stage
             end = min(last, (number + 1) * SHARED)
             yield first, end
             first = end
@@ -157,8 +160,12 @@ class Caustics(Path):
             )
 
         way = _Way(flight, particle.density, mi.Bool(False), mi.Bool(False), none, mi.Bool(False), none)
-        return dr.while_loop((way,), lambda way: way.flight.active, lambda way: (vertex(way),), mode="symbolic",
-                             label="particles")[0]  # fmt: skip
+        state = dr.while_loop(
+            (way,), lambda w: w.flight.active, lambda w: (vertex(w),), mode="symbolic", label="particles"
+        )
+        found: _Way = state[0]
+        dr.eval(found.kept, found.kept_again, found.first, found.second)  # all, that it be one kernel for all who ask
+        return found
 
     def _mapped(self, number: int) -> PhotonMap:
         """Map `number` of the picture, from its particles."""
