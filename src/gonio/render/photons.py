@@ -44,6 +44,12 @@ class Photon:
     depth: UInt
     again: Mask
 
+    @staticmethod
+    def none(mi: ModuleType) -> Photon:
+        """One that carries nothing."""
+        zero = mi.Vector3f(0)
+        return Photon(mi.Point3f(0), zero, zero, mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False))
+
     def packed(self) -> list[Float]:
         """Sixteen numbers: what a search compares, then what it needs of those that it finds."""
         mi_float = type(self.density)
@@ -171,9 +177,8 @@ class Crowding:
     @staticmethod
     def nowhere(mi: ModuleType) -> Crowding:
         """Nothing, for who has not seen a map yet; to a kernel it is like any other."""
-        photon = Photon(*[dr.zeros(kind, 1) for kind in (mi.Point3f, mi.Vector3f, mi.Vector3f, mi.Spectrum, mi.Float)],
-                        dr.zeros(mi.UInt32, 1), dr.zeros(mi.Bool, 1))  # fmt: skip
-        return Crowding(mi, photon, dr.zeros(mi.Bool, 1), 1.0, 1)
+        photon = Photon.none(mi)
+        return Crowding(mi, photon, mi.Bool(False), 1.0, 1)
 
     def at(self, place: Point) -> Float:
         """1/m^2, of one particle that is traced."""

@@ -172,6 +172,9 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
     if not isinstance(prepared.render, Render):
         what = "Mitsuba's own integrator renders on one machine"
         raise InputError(what, where, "add --integrator path (or direct), or leave the cluster out")
+    if prepared.render.settings.program.splats:
+        what = f"{prepared.render.settings.integrator} adds to the whole picture, and workers render parts of it"
+        raise InputError(what, where, "render on one machine, or use path")
     named = dict(prepared.sources.files)
     folder = ""
     if request.material is None:

@@ -10,6 +10,7 @@ from typing import ClassVar
 import drjit as dr
 import numpy as np
 
+from ...errors import InputError
 from .. import engine
 from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
@@ -58,17 +59,19 @@ class Caustics(Path):
     merges: ClassVar[bool] = True
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
-        shapes = [shape for shape in scene.shapes() if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta)]
-        self.particles: Particles | None = None
         super().__init__(mi, scene, sensor, settings, aovs)
-        self.merging = bool(shapes) and self.lights.count > 0 and settings.max_depth > 2
+        self.particles: Particles | None = None
+        self._map: tuple[int, PhotonMap] | None = None
+        self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         if not self.merging:
             return
-        self.particles = Particles(self, Targets(mi, shapes))
+        if mi.is_spectral:
+            what = "light by wavelength, of which a particle has others than the paths around it"
+            raise InputError(what, "integrator caustics", "leave out --spectral, or use path")
+        self.particles = Particles(self, Targets(mi, self.smooth))
         size = sensor.film().crop_size()
         self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
         self.radius = FOOTPRINT * self._pixel()
-        self._map: tuple[int, PhotonMap] | None = None
         self._total = dr.opaque(mi.Float, self.count)
         self._crowding = Crowding.nowhere(mi)
         self._seen = False  # a map, from which to tell where particles crowd
