@@ -103,8 +103,8 @@ class Rendering:
 
     spp: Annotated[int | None, Option(metavar="N", help="Samples per pixel.")] = None
     size: Annotated[str | None, Option(metavar="WxH", help="Film size in pixels, such as 640x480.")] = None
-    integrator: Annotated[str | None, Option(metavar="NAME", help="direct, path, whitted, normal, ...")] = None
-    max_depth: Annotated[int | None, Option(metavar="N", help="Longest path, for the integrator path.")] = None
+    integrator: Annotated[str | None, Option(metavar="NAME", help="direct, path, caustics, light, normal, ...")] = None
+    max_depth: Annotated[int | None, Option(metavar="N", help="Longest path, for path, caustics and light.")] = None
     sampler: Annotated[str | None, Option(metavar="NAME", help="Where random numbers come from.")] = None
     seed: Annotated[int | None, Option(metavar="N", help="Same seed, same picture, to the bit.")] = None
     device: Device = "cpu"

@@ -46,8 +46,8 @@ def render(
     output         file to write, .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
-    integrator     "direct", "path", "whitted", "normal", ...
-    max_depth      longest path, segments, for the integrator "path"
+    integrator     "direct", "path", "caustics", "light", "whitted", "normal", ...
+    max_depth      longest path, segments, for the integrators "path", "caustics" and "light"
     sampler        where random numbers come from, such as "sobol"
     seed           same seed, same picture, to the bit
     device         "cpu", "cuda" or "auto"

@@ -8,10 +8,14 @@ import functools
 import sys
 from collections.abc import Iterator
 from types import ModuleType
+from typing import Any
+
+from numpy.typing import NDArray
 
 from .. import llvm
 from ..errors import InputError, MachineError
 from ..owner import COMPUTING, alone
+from .types import OfVariant
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -133,3 +137,26 @@ def file_threads() -> Iterator[None]:
         yield
     finally:
         dr.set_thread_count(count)
+
+
+def own(kind: OfVariant, values: NDArray[Any]) -> OfVariant:
+    """An array of Dr.Jit's with these values, in memory of its own.
+
+    It would take NumPy's as it is, and compile another kernel where that is not aligned. Times one, which keeps every
+    bit, also the sign of a zero.
+    """
+    import drjit as dr
+
+    copied = kind(values) * dr.opaque(kind, 1)
+    dr.eval(copied)
+    dr.sync_thread()  # while NumPy's memory is there
+    return copied
+
+
+def renew(thing: object) -> None:
+    """Copy every array that an object has: kernels are told apart by the order too in which what they read was made."""
+    import drjit as dr
+
+    for name, value in vars(thing).items():
+        if dr.is_array_v(value):
+            setattr(thing, name, own(type(value), value))

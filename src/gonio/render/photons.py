@@ -14,7 +14,7 @@ from types import ModuleType
 import drjit as dr
 import numpy as np
 
-from . import sampler
+from . import engine, sampler
 from .types import Float, Mask, Point, Radiance, UInt, Vector
 
 ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
@@ -43,6 +43,12 @@ class Photon:
     density: Float
     depth: UInt
     again: Mask
+
+    @staticmethod
+    def none(mi: ModuleType) -> Photon:
+        """One that carries nothing."""
+        zero = mi.Vector3f(0)
+        return Photon(mi.Point3f(0), zero, zero, mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False))
 
     def packed(self) -> list[Float]:
         """Sixteen numbers: what a search compares, then what it needs of those that it finds."""
@@ -79,13 +85,12 @@ class PhotonMap:
         words.sort()
         self.count = len(words)
         per_key = np.bincount((words >> np.uint64(32)).astype(np.int64), minlength=self.keys)
-        self.starts = mi.UInt32(np.concatenate([[0], np.cumsum(per_key)]).astype(np.uint32))
-        order = mi.UInt32(words.astype(np.uint32) if self.count else np.zeros(1, np.uint32))
+        self.starts = engine.own(mi.UInt32, np.concatenate([[0], np.cumsum(per_key)]).astype(np.uint32))
+        order = engine.own(mi.UInt32, words.astype(np.uint32) if self.count else np.zeros(1, np.uint32))
         self.values = dr.empty(mi.Float, dr.width(order) * FIELDS)
         lane = dr.arange(mi.UInt32, dr.width(order))
         for place, value in enumerate(values):
             dr.scatter(self.values, dr.gather(mi.Float, value, order), lane * FIELDS + place)
-        dr.make_opaque(self.starts)
         dr.eval(self.values)
 
     def _row(self, y: UInt, z: UInt) -> UInt:
@@ -167,15 +172,13 @@ class Crowding:
         place = self._place(photon.position)
         dr.eval(place, kept)
         counts = np.bincount(np.array(place)[np.array(kept)], minlength=CUBES)
-        self.values = mi.Float((counts / (traced * width**2)).astype(np.float32))
-        dr.make_opaque(self.values)
+        self.values = engine.own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
 
     @staticmethod
     def nowhere(mi: ModuleType) -> Crowding:
         """Nothing, for who has not seen a map yet; to a kernel it is like any other."""
-        photon = Photon(*[dr.zeros(kind, 1) for kind in (mi.Point3f, mi.Vector3f, mi.Vector3f, mi.Spectrum, mi.Float)],
-                        dr.zeros(mi.UInt32, 1), dr.zeros(mi.Bool, 1))  # fmt: skip
-        return Crowding(mi, photon, dr.zeros(mi.Bool, 1), 1.0, 1)
+        photon = Photon.none(mi)
+        return Crowding(mi, photon, mi.Bool(False), 1.0, 1)
 
     def at(self, place: Point) -> Float:
         """1/m^2, of one particle that is traced."""

@@ -128,8 +128,15 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
         output,
         _metadata(request, mi, **how),
         Sources.of(mi, *scene.sources(description), _how(settings, request)),
-        tuple(description.warnings),
+        (*description.warnings, *_advice(render)),
     )
+
+
+def _advice(render: Renders) -> list[str]:
+    """What to tell of the integrator that was chosen."""
+    from . import integrators
+
+    return [render.advice] if isinstance(render, integrators.Render) and render.advice else []
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
@@ -224,7 +231,8 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
         all_ = _how(None, request, **how)
     all_ += f", size {width}x{height}"
     sources = Sources.of(mi, *files, all_)
-    return Prepared(request, render, spp, (width, height), output, _metadata(request, mi, **how), sources)
+    about = _metadata(request, mi, **how)
+    return Prepared(request, render, spp, (width, height), output, about, sources, tuple(_advice(render)))
 
 
 def work(

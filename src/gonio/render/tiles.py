@@ -175,6 +175,9 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
         if isinstance(prepared.render, PolarizedRender):
             what, instead = "a scene with a polarizer is rendered by Mitsuba's own integrator, on one machine", ""
         raise InputError(what, where, f"{instead}leave --workers, or the cluster, out")
+    if prepared.render.settings.program.splats:
+        what = f"{prepared.render.settings.integrator} adds to the whole picture, and workers render parts of it"
+        raise InputError(what, where, "render on one machine, or use path")
     named = dict(prepared.sources.files)
     folder = ""
     if request.material is None:

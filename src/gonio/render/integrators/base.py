@@ -156,6 +156,10 @@ class Integrator:
         time = self.sensor.shutter_open() + time * self.sensor.shutter_open_time()
         return self.sensor.sample_ray(time, wavelength, position, aperture)
 
+    def advice(self) -> str:
+        """What to tell a person who chose it for this scene; "" is nothing."""
+        return ""
+
     def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
         """Lanes whose surface sees the point."""
         return active & ~self.scene.ray_test(si.spawn_ray_to(point), active)

@@ -10,6 +10,8 @@ from typing import ClassVar
 import drjit as dr
 import numpy as np
 
+from ...errors import InputError
+from .. import engine
 from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
 from ..types import Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
@@ -57,17 +59,19 @@ class Caustics(Path):
     merges: ClassVar[bool] = True
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
-        shapes = [shape for shape in scene.shapes() if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta)]
-        self.particles: Particles | None = None
         super().__init__(mi, scene, sensor, settings, aovs)
-        self.merging = bool(shapes) and self.lights.count > 0 and settings.max_depth > 2
+        self.particles: Particles | None = None
+        self._map: tuple[int, PhotonMap] | None = None
+        self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         if not self.merging:
             return
-        self.particles = Particles(self, Targets(mi, shapes))
+        if mi.is_spectral:
+            what = "light by wavelength, of which a particle has others than the paths around it"
+            raise InputError(what, "integrator caustics", "leave out --spectral, or use path")
+        self.particles = Particles(self, Targets(mi, self.smooth))
         size = sensor.film().crop_size()
         self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
         self.radius = FOOTPRINT * self._pixel()
-        self._map: tuple[int, PhotonMap] | None = None
         self._total = dr.opaque(mi.Float, self.count)
         self._crowding = Crowding.nowhere(mi)
         self._seen = False  # a map, from which to tell where particles crowd
@@ -82,6 +86,8 @@ class Caustics(Path):
             if self._map is None or self._map[0] != number:
                 self._map = None  # before the next one: there is one at a time
                 self._map = number, self._mapped(number)
+            for read in (self._crowding, self._map[1]):
+                engine.renew(read)  # after the sums, in every stage
             end = min(last, (number + 1) * SHARED)
             yield first, end
             first = end
@@ -157,8 +163,12 @@ class Caustics(Path):
             )
 
         way = _Way(flight, particle.density, mi.Bool(False), mi.Bool(False), none, mi.Bool(False), none)
-        return dr.while_loop((way,), lambda way: way.flight.active, lambda way: (vertex(way),), mode="symbolic",
-                             label="particles")[0]  # fmt: skip
+        state = dr.while_loop(
+            (way,), lambda w: w.flight.active, lambda w: (vertex(w),), mode="symbolic", label="particles"
+        )
+        found: _Way = state[0]
+        dr.eval(found.kept, found.kept_again, found.first, found.second)  # all, that it be one kernel for all who ask
+        return found
 
     def _mapped(self, number: int) -> PhotonMap:
         """Map `number` of the picture, from its particles."""

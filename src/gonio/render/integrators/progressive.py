@@ -72,6 +72,12 @@ class Render:
     def _program(self) -> Integrator:
         return self.settings.program(self.mi, self.scene, self.sensor, self.settings, self.aovs)
 
+    @property
+    def advice(self) -> str:
+        """What to tell a person who chose this integrator for this scene; "" is nothing."""
+        with dr.suspend_grad():
+            return self._integrator.advice()
+
     def advance(self, count: int) -> None:
         """Render `count` more samples of every pixel; returns when they are done.
 

@@ -11,6 +11,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import engine
 from ..types import Float, Mask, UInt, Whole
 
 
@@ -58,18 +59,13 @@ class Sums:
             if name not in arrays or arrays[name].shape != (entries,) or arrays[name].dtype != values.dtype:
                 raise ValueError(f"no sums '{name}' of {lanes} lanes")
 
-        def own(values: NDArray[Any]) -> Float:
-            # In memory of Dr.Jit's own: it would take NumPy's as it is, and compile another kernel where that is not
-            # aligned. Times one, which keeps every bit, also the sign of a zero.
-            kind = {"f": mi.Float64, "i": mi.Int64, "u": mi.UInt32}[values.dtype.kind]
-            copied = kind(values) * dr.opaque(kind, 1)
-            dr.eval(copied)
-            return copied
+        def taken(name: str) -> Float:
+            kind = {"f": mi.Float64, "i": mi.Int64, "u": mi.UInt32}[arrays[name].dtype.kind]
+            return engine.own(kind, arrays[name])
 
-        near = [own(arrays[f"near{i}"]) for i in range(len(like.near))]
-        found = Sums(near, [own(arrays[f"far{i}"]) for i in range(len(like.far))], own(arrays["invalid"]))
-        found.splats = [own(arrays[f"splat{i}"]) for i in range(len(like.splats))]
-        dr.sync_thread()  # while NumPy's memory is there
+        near = [taken(f"near{i}") for i in range(len(like.near))]
+        found = Sums(near, [taken(f"far{i}") for i in range(len(like.far))], taken("invalid"))
+        found.splats = [taken(f"splat{i}") for i in range(len(like.splats))]
         return found
 
     def add_near(self, values: Sequence[Float]) -> Sums:

@@ -127,7 +127,8 @@ class Transport(Integrator):
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
-        self.follows_delta = any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta) for shape in scene.shapes())
+        self.smooth = [shape for shape in scene.shapes() if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta)]
+        self.follows_delta = bool(self.smooth)
         self.disperses = any(shape.bsdf().flags() & DISPERSES for shape in scene.shapes())
         eye = mi.Point3f(sensor.world_transform() @ mi.Point3f(0.0)) if self.media.known else None
         self.begun = None if eye is None else self.media.around(eye)
@@ -219,8 +220,9 @@ class Transport(Integrator):
         mi = self.mi
         ray, weight, hit = self.first_hit(pixel, key, index)
         inside = self.begun if self.begun is not None else mi.UInt32(0)
-        return PathState(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), mi.Float(1), mi.Float(0),
-                     mi.Float(0), mi.Spectrum(0), mi.UInt32(0), inside, mi.Float(0), mi.Float(1), mi.Bool(True))  # fmt: skip
+        zero, one = mi.Float(0), mi.Float(1)
+        return PathState(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), one, zero, zero, mi.Spectrum(0),
+                         mi.UInt32(0), inside, zero, one, mi.Bool(True))  # fmt: skip
 
     def extend(self, path: PathState, key: UInt, features: list[Float] | None = None) -> PathState:
         """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
