@@ -422,7 +422,8 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
     if part.two_sided is not None:
         fields["two_sided"] = part.two_sided
     made = part_of(fields["type"])
-    assert made is not None, "a reader names materials that there are"
+    if made is None:
+        raise invalid(f"it needs the material {described.notation['type']}", "see `gonio models`", "file")
     found = made.model_validate(fields, context=context)
     found._source, found._notices = part.file, described.notices
     return found
