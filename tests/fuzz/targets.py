@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib.util
 import io
 import json
 import shlex
@@ -540,6 +541,28 @@ def gltf(data: bytes, folder: Path) -> object:
             shape = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": material}
             read(saved(folder / "scene.json", _scene(shape)))
     return found
+
+
+MTLX = b"""<?xml version="1.0"?>\n<materialx version="1.39">
+<open_pbr_surface name="S" type="surfaceshader"><input name="base_color" type="color3" value="0.1, 0.2, 0.3" />
+<input name="specular_roughness" type="float" value="0.25" /></open_pbr_surface>
+<standard_surface name="T" type="surfaceshader"><input name="coat" type="float" value=".5" /></standard_surface>
+<surfacematerial name="M" type="material"><input name="surfaceshader" type="surfaceshader" nodename="S" />
+</surfacematerial></materialx>"""
+
+if importlib.util.find_spec("MaterialX"):
+
+    @target("materialx", lambda: [MTLX], [
+        b"<!DOCTYPE m [<!ENTITY x 'y'>]>", b"&x;", b'nodename="T"', b'nodegraph="G"', b'interfacename="a"',
+        b'<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="a.mtlx"/>',
+        b"1e999", b"nan", b"-1", b'type="integer"', b'value=""',
+        b"<nodegraph name='G'>", b'inherit="S"', b'version="9"', b'xpos="1"', b"<!--", b"<![CDATA[",
+    ])  # fmt: skip
+    def materialx(data: bytes, folder: Path) -> object:
+        from gonio.models.documents import Document
+
+        document, path = Document.family.get("materialx"), saved(folder / "a.mtlx", data)
+        return [document.read(path, name) for name in document.materials(path)]
 
 
 def messages() -> list[bytes]:

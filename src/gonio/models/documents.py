@@ -9,12 +9,14 @@ stand in the room `gonio.documents`.
 
 from __future__ import annotations
 
+import json
 import re
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, NamedTuple, TypeAlias
 
+from .. import files
 from ..errors import GonioWarning, InputError, did_you_mean
 from ..members import Family, instances_of
 
@@ -38,11 +40,13 @@ class Document:
 
     name      what a scene calls it: {"type": "gltf", "file": ...}
     suffixes  by which its files are recognised
+    writes    the type of material that `write` takes, by name; "" where the format cannot be written
     """
 
     family: ClassVar[Family[Document]]
     name: ClassVar[str] = ""
     suffixes: ClassVar[tuple[str, ...]] = ()
+    writes: ClassVar[str] = ""
 
     def materials(self, path: Path) -> list[str]:
         """The names by which a file's materials are asked for. InputError for a file that is none of the format."""
@@ -55,6 +59,10 @@ class Document:
     def image(self, path: Path, index: str) -> bytes:
         """The bytes of a picture that lies inside a file, which textures name FILE#INDEX."""
         raise InputError(f"no picture '{index}' in it", str(path))
+
+    def write(self, notation: Notation, name: str) -> bytes:
+        """The file of one material of the type `writes`, under that name."""
+        raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
 
 Document.family = Family("document", "gonio.documents", ["gonio.documents"], instances_of(Document), where="FILE")
@@ -110,6 +118,40 @@ def without_pictures(text: str) -> Notation:
     for notice in (*described.notices, *lost):
         warnings.warn(f"{text}: {notice}", GonioWarning, stacklevel=3)
     return notation
+
+
+def convert(source: str, output: Path) -> tuple[str, ...]:
+    """Write a document's material as JSON in Gonio's notation, or such JSON as a document. What the notation lacks.
+
+    source  FILE or FILE:MATERIAL, or a .json file that holds one material: {"type": ..., ...}
+    output  .json, or a document's suffix
+    """
+    found, target = parted(source), parted(str(output))
+    described = read(*found) if found else Described(_from_json(Path(source)), ())
+    if output.suffix.lower() == ".json":
+        text = json.dumps(described.notation, indent=2) + "\n"
+        files.write_whole(output, text.encode())
+        return described.notices
+    if target is None:
+        known = sorted({suffix for one in Document.family.all().values() if one.writes for suffix in one.suffixes})
+        raise InputError(f"'{output.suffix}' is no format of materials", str(output), f"{', '.join(known)} or .json")
+    kind = str(described.notation.get("type")).replace("_", "-").removeprefix("gonio-")
+    if target[0].writes and kind != target[0].writes:
+        raise InputError(f"a {kind} given, and {target[0].name} holds {target[0].writes}", str(output))
+    files.write_whole(output, target[0].write(described.notation, output.stem))
+    return described.notices
+
+
+def _from_json(path: Path) -> Notation:
+    try:
+        found = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"no JSON: {str(error)[:200]}", str(path)) from None
+    if not isinstance(found, dict) or not isinstance(found.get("type"), str):
+        raise InputError('an object with a "type" expected', str(path), 'such as {"type": "openpbr", ...}')
+    return found
 
 
 def _plain(notation: Mapping[str, object], lost: list[str]) -> Notation:

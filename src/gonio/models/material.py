@@ -112,6 +112,7 @@ class BSDF(Material):
     only_rgb    whether eval gives red, green and blue, whatever channels the renderer has
     stochastic  whether eval, pdf and weight are random numbers that only in the mean are what they are called
     reads_wavelengths  whether it wants to know the rays' wavelengths, as `wavelengths` of its bound copy
+    reads_surface  whether it wants to know dp/du.x, dp/dv.x and dp/dv.y at a hit, as `surface` of its bound copy
     lossless    the greatest loss that a white furnace may find (where F = 1 and every albedo 1); None claims nothing
     """
 
@@ -122,6 +123,8 @@ class BSDF(Material):
     only_rgb: ClassVar[bool] = False
     reads_wavelengths: ClassVar[bool] = False
     wavelengths: ClassVar[Spectrum | None] = None  # nm, one for each channel, on copies bound in spectral variants
+    reads_surface: ClassVar[bool] = False
+    surface: ClassVar[tuple[Scalar, Scalar, Scalar] | None] = None  # on copies bound in scenes
     lossless: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
     gives_way: ClassVar[bool] = False  # whether a user's own class may take its name: of Gonio's, those of papers do

@@ -79,6 +79,8 @@ def _indices(part: MaterialPart, path: str = "") -> Iterator[tuple[str, Value]]:
 def _textured(part: MaterialPart) -> Iterator[str]:
     if part.normalmap is not None:
         yield "normal map"
+    if part.bump is not None:
+        yield "bump map"
     for name, (value, _, _) in part.arguments().items():
         if isinstance(value, MaterialPart):
             yield from _textured(value)

@@ -15,15 +15,16 @@ from .base import PICTURES, verb
 
 @verb(PICTURES, place=5)
 def convert(
-    source: Annotated[str, Argument(metavar="IN", help="A picture (.exr, .hdr, .png, .npz), or measured values.")],
+    source: Annotated[str, Argument(metavar="IN", help="A picture, measured values, or a material.")],
     output: Annotated[Path, Argument(metavar="OUT", help="The file to write, in the format of its suffix.")],
     exposure: Exposure = "0",
     as_json: Json = False,
 ) -> None:
-    """Write a picture, or a measured material, in another format.
+    """Write a picture, a measured material, or another program's material in another format.
 
     A picture is brought to the screen without rendering it again. Measured values are written as they are where both
-    formats have the same kind of table; else they are resampled, and the error is measured and said.
+    formats have the same kind of table; else they are resampled, and the error is measured and said. A material of a
+    glTF or MaterialX file becomes JSON as scenes hold it, and an openpbr in JSON a MaterialX file.
 
     \b
     Examples:
@@ -31,9 +32,19 @@ def convert(
       gonio convert ball.exr ball.png --exposure auto
       gonio convert ball.exr ball.hdr
       gonio convert gold.binary gold.bsdf
+      gonio convert paint.mtlx paint.json
     """
     from ...measure import names_table
+    from ...models import documents
 
+    if documents.names_document(source) or documents.names_document(str(output)):
+        notices = documents.convert(source, output)
+        if as_json:
+            print(json.dumps({"output": str(output), "notices": notices}))
+            return
+        print_warnings(notices)
+        print(output)
+        return
     if names_table(source):
         from ...measure import compare
 

@@ -127,6 +127,9 @@ class PlacedMaterial:
             )
         if self._by_wavelength:
             values["wavelengths"] = self.variant.spectrum(si.wavelengths)
+        if self.model.reads_surface:
+            x, y = si.sh_frame.s, si.sh_frame.t
+            values["surface"] = (dr.dot(si.dp_du, x), dr.dot(si.dp_dv, x), dr.dot(si.dp_dv, y))
         # what was derived once is that of the index over the vacuum's
         bound = binding.bound_copy(self.model, values, self.derived if outer is None else None)
         return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound

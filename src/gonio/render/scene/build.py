@@ -12,12 +12,13 @@ import numpy as np
 
 from ...errors import GonioWarning, InputError
 from ...models import Parameter, documents
+from ...models.normal_map import leans
 from ..images import RGB
 from ..types import MitsubaBSDF, Plugin, PluginDict, Scene
 from . import meshes, schema, spectra, textures
 from .materials import BY_TYPE, MaterialPart, Value, numbers_in
 from .text import pointer
-from .values import ImageTexture, NormalMap
+from .values import BumpMap, ImageTexture, NormalMap
 
 # Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
 # format's +y, +z, +x: u about y from z toward x, v from +y.
@@ -224,6 +225,8 @@ class _Builder:
                 plugin[name] = self.scalar(value, parameters[name], here, squared)
         if material.normalmap is not None:
             plugin = self.normal_mapped(plugin, material.normalmap, f"{where}/normalmap")
+        if material.bump is not None:
+            plugin = self.bumped(plugin, material.bump, f"{where}/bump")
         return plugin
 
     def colour(self, value: Value, parameter: Parameter, where: str) -> PluginDict:
@@ -251,10 +254,21 @@ class _Builder:
         pixels = self.image(texture, where)
         if pixels.shape[2] != 3:
             raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
-        bitmap = textures.bitmap(self.mi, pixels, "bilinear", "repeat") | {"raw": True}
-        return {"type": "normalmap", "normalmap": bitmap, "bsdf": plugin}
+        return self.leaning("normal-map", plugin, leans(2.0 * pixels - 1.0, texture.scale))
 
-    def image(self, texture: ImageTexture | NormalMap, where: str) -> RGB:
+    def bumped(self, plugin: PluginDict, texture: BumpMap, where: str) -> PluginDict:
+        """The slopes of the heights, by differences over two texels; the image repeats."""
+        heights = texture.scale * self.image(texture, where).mean(axis=2)
+        across, down = ((np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) / 2.0 for axis in (1, 0))
+        return self.leaning("bump", plugin, np.dstack([across * heights.shape[1], down * heights.shape[0]]))
+
+    def leaning(self, name: str, plugin: PluginDict, values: np.ndarray) -> PluginDict:
+        """A plugin inside one of those that lean its normal."""
+        maps = (textures.bitmap(self.mi, values[..., [axis]], "bilinear", "repeat") for axis in (0, 1))
+        found = {"type": self.adapter.plugin_name(name), "base": plugin, "two_sided": plugin["two_sided"]}
+        return {**found, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
+
+    def image(self, texture: ImageTexture | NormalMap | BumpMap, where: str) -> RGB:
         """The image's own values."""
         srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
         channel = texture.channel if isinstance(texture, ImageTexture) else None

@@ -51,7 +51,7 @@ from ...models.documents import Document
 from ...models.parameters import IndexParameter
 from ...optics.dispersion import DispersiveIndex
 from .files import located
-from .values import Colour, ImageTexture, Index, NormalMap, Part, Scalar, Width, invalid
+from .values import BumpMap, Colour, ImageTexture, Index, NormalMap, Part, Scalar, Width, invalid
 
 Model = type[BSDF]
 Locate: TypeAlias = Callable[[str, str], Path]
@@ -118,6 +118,8 @@ class MaterialPart(Part):
     type: str
     normalmap: NormalMap | None = None
     """Normals from an image."""
+    bump: BumpMap | None = None
+    """Heights from an image."""
     two_sided: Annotated[bool, Strict()] | None = None
     """Whether both sides reflect alike; by default all materials do that let no light through."""
 
@@ -208,6 +210,8 @@ class MaterialPart(Part):
             needed = [key for key in keys if self.lab and key in self.lab.required]
             if needed and not given:
                 raise invalid(f"key '{needed[0]}' is missing", f"give one of {', '.join(keys)}")
+        if self.normalmap is not None and self.bump is not None:
+            raise invalid("both 'normalmap' and 'bump' are given", "both say where the normal leans; keep one", "bump")
         self._check_preset()
         return self
 
@@ -422,7 +426,8 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
     if part.two_sided is not None:
         fields["two_sided"] = part.two_sided
     made = part_of(fields["type"])
-    assert made is not None, "a reader names materials that there are"
+    if made is None:
+        raise invalid(f"it needs the material {described.notation['type']}", "see `gonio models`", "file")
     found = made.model_validate(fields, context=context)
     found._source, found._notices = part.file, described.notices
     return found

@@ -151,6 +151,16 @@ class NormalMap(Part):
     """What the slopes are multiplied by."""
 
 
+class BumpMap(Part):
+    """An image of heights over the surface's uv, 0 to 1 (8-bit values count as v/255) times `scale`."""
+
+    type: Literal["imageTex"] = "imageTex"
+    file: str = Field(min_length=1)
+    """Image beside the scene."""
+    scale: Number
+    """What 1 stands for, in units of the scene."""
+
+
 class LightSpectrum(Part):
     """A lamp by its spectrum: in RGB its colour, with `--spectral` itself."""
 
