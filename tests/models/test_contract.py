@@ -284,3 +284,10 @@ def test_compensation_is_measured_once_and_not_around_itself() -> None:
     once = go.KullaConty(go.mix(go.Conductor(alpha=0.3), go.Lambert(0.5), 0.5))
     with pytest.raises(InputError, match="not again around it"):
         go.KullaConty(go.KullaConty(once))
+
+
+def test_a_part_of_a_model_does_not_take_its_bases_name() -> None:
+    class _Facets(go.Conductor):
+        pass
+
+    assert _Facets.name == "" and go.model("conductor") is go.Conductor

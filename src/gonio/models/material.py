@@ -136,6 +136,8 @@ class BSDF(Material):
         if not cls.__name__.startswith("_") and not vars(cls).get("name"):
             letters = ("-" + c.lower() if c.isupper() else c for c in cls.__name__)
             cls.name = "".join(letters).lstrip("-").replace("_", "-")
+        elif cls.__name__.startswith("_") and "name" not in vars(cls):
+            cls.name = ""  # a part of some model: it must not stand in its base's place
         own = vars(cls)
         for formula in ("eval", "pdf", "sample", "terms"):
             if formula in own:
