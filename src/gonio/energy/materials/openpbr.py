@@ -18,7 +18,6 @@ from ...models.dielectric import Dielectric
 from ...models.eon import AVERAGE as MEAN_LOSS
 from ...models.eon import GRAZING as GRAZING_LOSS
 from ...models.eon import Eon
-from ...models.film_dielectric import FilmDielectric
 from ...models.glossy import facet
 from ...models.material import Delta, Interior
 from ...models.microfacet import upper
@@ -558,16 +557,12 @@ class OpenPBR(BSDF):
     def _fuzz(self) -> Sheen:
         return binding.bound_copy(Sheen(), {"albedo": self.fuzz_color, "roughness": self.fuzz_roughness})
 
-    def _interface(self) -> _Interface:
-        """The base's surface as glass."""
-        b = self.derived
-        zero = 0.0 * self.base_color
-        kind = _Interface(alpha=(0.1, 0.2) if self._two_widths else 0.1, masking=self._masking)
-        return binding.bound_copy(
-            kind,
-            {"eta": b.eta, "alpha": b.alpha, "rotation": None, "albedo": 1.0 + zero, "absorption": zero}
-            | {"priority": 0.0 * b.eta, "thickness": 0.0 * b.eta, "film_eta": 1.0 + 0.0 * b.eta},
-        )
+    def _interface(self) -> Dielectric:
+        """The geometry of refraction at the base's facets; how much goes that way is said elsewhere."""
+        b, zero = self.derived, 0.0 * self.base_color
+        kind = Dielectric(alpha=(0.1, 0.2) if self._two_widths else 0.1, masking=self._masking)
+        clear = {"rotation": None, "albedo": 1.0 + zero, "absorption": zero, "priority": 0.0 * b.eta}
+        return binding.bound_copy(kind, {"eta": b.eta, "alpha": b.alpha, **clear})
 
     def _pair(self, wo: Direction, wi: Direction) -> _Pair:
         """Both turned up; a thin wall looks alike from both sides."""
@@ -894,10 +889,6 @@ class OpenPBR(BSDF):
         body = _mix(body, self.transmission_color, self.transmission_weight)
         dielectric = f * self.specular_color + (1.0 - f) * body
         return _mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
-
-
-class _Interface(FilmDielectric):
-    """The geometry of refraction; how much there is of it the composition says."""
 
 
 # --------------------------------------------------------------------------- tables
