@@ -33,7 +33,7 @@ NAMES = (
 COLOURS = {name for name in NAMES if name.endswith("color")}
 
 
-class Separable(go.OpenPBR):  # type: ignore[name-defined, misc]
+class Separable(go.OpenPBR):
     """OpenPBR with the masking of the reference."""
 
     name: ClassVar[str] = "openpbr-separable"
@@ -99,24 +99,40 @@ def kinds(rng: np.random.Generator) -> dict[str, tuple[int, object]]:
             "coat_ior": rng.uniform(1.2, 2.0),
         }  # fmt: skip
 
-    film = {"thin_film_weight": 1.0}
-    glass = {"transmission_weight": 1.0}
+    film: dict[str, object] = {"thin_film_weight": 1.0}
+    metal: dict[str, object] = {"base_metalness": 1.0}
+
+    def widths() -> dict[str, object]:
+        return {"specular_roughness_anisotropy": rng.uniform(0.1, 0.9)}
+
+    def glass(low: float, high: float) -> dict[str, object]:
+        rough, index = rng.uniform(low, high), rng.uniform(1.2, 2.2)
+        return {"transmission_weight": 1.0, "specular_roughness": rough, "specular_ior": index}
+
+    def paper() -> dict[str, object]:
+        sheet: dict[str, object] = {
+            "geometry_thin_walled": True,
+            "subsurface_weight": 1.0,
+            "subsurface_color": colour(),
+        }
+        return sheet | {"subsurface_scatter_anisotropy": rng.uniform(-1.0, 1.0)}
+
     return {
-        "metal, smooth": (8, lambda: surface() | {"base_metalness": 1.0, "specular_roughness": rng.uniform(0.1, 0.3)}),
-        "metal, white, rough": (4, lambda: {"base_metalness": 1.0, "base_color": 1.0, "specular_roughness": rng.uniform(0.3, 1.0)}),
-        "metal, coloured, rough": (8, lambda: surface(0.3) | {"base_metalness": 1.0}),
-        "metal, two widths": (6, lambda: surface() | {"base_metalness": 1.0, "specular_roughness": 0.25, "specular_roughness_anisotropy": rng.uniform(0.1, 0.9)}),
+        "metal, smooth": (8, lambda: surface() | metal | {"specular_roughness": rng.uniform(0.1, 0.3)}),
+        "metal, white, rough": (4, lambda: metal | {"base_color": 1.0, "specular_roughness": rng.uniform(0.3, 1.0)}),
+        "metal, coloured, rough": (8, lambda: surface(0.3) | metal),
+        "metal, two widths": (6, lambda: surface() | metal | {"specular_roughness": 0.25} | widths()),
         "glossy": (12, surface),
         "glossy, rough diffuse": (8, lambda: surface() | {"base_diffuse_roughness": rng.uniform()}),
         "fuzz over it": (8, lambda: surface() | fuzz()),
-        "subsurface, thin wall": (6, lambda: surface() | {"geometry_thin_walled": True, "subsurface_weight": 1.0, "subsurface_color": colour(), "subsurface_scatter_anisotropy": rng.uniform(-1.0, 1.0)}),
-        "clear coat over metal": (8, lambda: surface() | coat() | {"base_metalness": 1.0, "coat_roughness": 0.1, "specular_roughness": 0.3}),
+        "subsurface, thin wall": (6, lambda: surface() | paper()),
+        "clear coat over metal": (8, lambda: surface() | coat(0.1) | metal | {"specular_roughness": 0.3}),
         "coat over glossy": (6, lambda: surface() | coat(0.1)),
         "coat, darkening": (6, lambda: surface() | coat(0.1, 1.0)),
         "rough coat": (4, lambda: surface() | coat(rng.uniform(0.3, 0.8))),
-        "glass, smooth": (6, lambda: glass | {"specular_roughness": rng.uniform(0.1, 0.3), "specular_ior": rng.uniform(1.2, 2.2), "transmission_color": colour()}),
-        "glass, rough": (4, lambda: glass | {"specular_roughness": rng.uniform(0.4, 1.0), "specular_ior": rng.uniform(1.2, 2.2)}),
-        "pane": (3, lambda: glass | {"specular_roughness": rng.uniform(0.1, 0.3), "geometry_thin_walled": True}),
+        "glass, smooth": (6, lambda: glass(0.1, 0.3) | {"transmission_color": colour()}),
+        "glass, rough": (4, lambda: glass(0.4, 1.0)),
+        "pane": (3, lambda: glass(0.1, 0.3) | {"geometry_thin_walled": True}),
         "film on glossy": (3, lambda: surface() | film | {"thin_film_thickness": rng.uniform(0.1, 0.8)}),
     }  # fmt: skip
 

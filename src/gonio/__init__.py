@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from .energy.albedo import Albedo, albedo
     from .energy.materials.fdez_aguera import FdezAguera
     from .energy.materials.kulla_conty import KullaConty
+    from .energy.materials.openpbr import OpenPBR
     from .energy.materials.random_walk import RandomWalk
     from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
@@ -161,10 +162,10 @@ __all__ = [
     "BSDF", "NDF", "Albedo", "Angle", "BlinnPhong", "Breach", "Cluster", "Colour", "Conductor", "Dielectric",
     "Direction", "FdezAguera", "FilmConductor", "FilmDielectric", "Fresnel", "GonioError", "GonioWarning", "Index",
     "InputError", "Integrator", "Interface", "KullaConty", "Lambert", "Law", "MachineError", "Mask", "Masking",
-    "Measured", "Metal", "Mirror", "Mix", "Mode", "Number", "OrenNayar", "Pair", "Panel", "Parameter", "Phong",
-    "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "ThinDielectric", "Turquin", "TwoSided",
-    "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare", "compress", "emit",
-    "file", "fit", "fits", "flag", "fresnel", "get_precision", "index", "indices", "material", "materials",
+    "Measured", "Metal", "Mirror", "Mix", "Mode", "Number", "OpenPBR", "OrenNayar", "Pair", "Panel", "Parameter",
+    "Phong", "Preset", "RandomWalk", "Sample", "Scalar", "Spectrum", "Stretched", "ThinDielectric", "Turquin",
+    "TwoSided", "Width", "albedo", "angle", "bake", "bsdf", "capture", "choice", "cluster", "compare", "compress",
+    "emit", "file", "fit", "fits", "flag", "fresnel", "get_precision", "index", "indices", "material", "materials",
     "measure", "method", "mix", "model", "models", "never", "number", "ops", "plot", "refractive_index", "register",
     "render", "resume", "set_precision", "spectrum", "study", "two_sided", "verify", "view", "width",
 ]  # fmt: skip

@@ -49,11 +49,12 @@ assert_type(go.two_sided(lambert), go.TwoSided)
 mixture = go.Mix(gold, lambert, 0.25)
 assert_type(go.mix(a=gold, b=lambert, weight=0.25), go.Mix)
 compensated = go.KullaConty(go.Conductor(alpha=0.8))
+car = go.OpenPBR(base_color=(0.7, 0.1, 0.1), coat_weight=1.0, geometry_thin_walled=False, layering="reciprocal")
 turquin, fdez_aguera, walk = go.Turquin(metal), go.FdezAguera(metal), go.RandomWalk(metal)
 
 everything: list[go.BSDF] = [
     *(gold, lambert, grey, coloured, textured, metal, glass, phong, blinn, rough, mirror, sides, mixture),
-    *(compensated, turquin, fdez_aguera, walk),
+    *(compensated, turquin, fdez_aguera, walk, car),
 ]
 
 # ---------------------------------------------------------------------- arrays in, arrays out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import ClassVar, NamedTuple
 
@@ -18,7 +18,6 @@ from ...models.dielectric import Dielectric
 from ...models.eon import AVERAGE as MEAN_LOSS
 from ...models.eon import GRAZING as GRAZING_LOSS
 from ...models.eon import Eon
-from ...models.film_dielectric import FilmDielectric
 from ...models.glossy import facet
 from ...models.material import Delta, Interior
 from ...models.microfacet import upper
@@ -54,7 +53,7 @@ from ...ops import (
 )
 from ...ops.backend import Array
 from ...optics import frame, fresnel, masking
-from ...optics.fresnel import average, exact, film
+from ...optics.fresnel import exact, film
 from ...optics.fresnel.f82 import GRAZING, f82
 from ...optics.fresnel.schlick import schlick
 from ...optics.ndf import distribution
@@ -70,6 +69,7 @@ SMALLEST = 1e-3  # width: no lobe is a mirror's, and any two that fall on each o
 NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
 LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
 NODES = 6  # over the cosine, of means of what two layers let through: 1e-3 at F0 = .05
+FEW = [(0.5, 0.0, 1 / 3), (0.5, 1 / 3, 2 / 3)]  # one ring, where means are taken: films take long to compile
 LAYERINGS = {
     "reciprocal": "a layer dims what lies under it at both ends, so that light may be turned round",
     "albedo": "by one minus its albedo seen from wo, as the specification's reduction to lobes",
@@ -86,7 +86,6 @@ class Between(NamedTuple):
     eta          index by which it refracts, over the outside's
     medium       index of what lies above the base, over the outside's
     sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
-    filmed       how many times more that reflects under its film, by nodes of the cosine; empty without one
     joint        the same seen through the coat's
     bent         by nodes of the cosine, how far that is off its mean; both of them
     facets       factor of facets under the coat, by nodes of the cosine; empty without one
@@ -103,7 +102,6 @@ class Between(NamedTuple):
     eta: Scalar
     medium: Scalar
     sheer: Spectrum
-    filmed: tuple[Spectrum, ...]
     joint: Spectrum
     bent: tuple[tuple[Scalar, ...], tuple[Scalar, ...]]
     facets: tuple[Scalar, ...]
@@ -315,11 +313,10 @@ class OpenPBR(BSDF):
         kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=self._masking)
         values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
         metal = missing_energy(binding.bound_copy(kind, values))
-        filmed = self._more_by_film(rough, ratio, eta, medium) if self._has("thin_film_weight") else ()
         under, over, weights = [], [], []
         for x, w in zip(*(part.tolist() for part in gauss(NODES)), strict=True):
             weights.append(4.0 * w * x**3)
-            under.append(self._kept_below(x * x + 0.0 * rough, rough, ratio, filmed))
+            under.append(self._kept_below(x * x + 0.0 * rough, rough, ratio, eta, medium, FEW))
             over.append(self._coat_kept(x * x + 0.0 * rough))
         total = sum(weights)
         sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
@@ -331,11 +328,11 @@ class OpenPBR(BSDF):
         )
         f_metal = white
         if self._has("base_metalness"):
-            f_metal = average(lambda mu: self._metal(mu + 0.0 * rough, eta, medium))
+            f_metal = _mean_of(lambda mu: self._metal(mu, eta, medium), rough)
         sheet = None
         if self.geometry_thin_walled:
-            back = average(lambda mu: self._sheet(mu + 0.0 * rough, ratio, eta, medium)[0])
-            through = average(lambda mu: self._sheet(mu + 0.0 * rough, ratio, eta, medium)[1])
+            back = _mean_of(lambda mu: self._sheet(mu, ratio, eta, medium)[0], rough)
+            through = _mean_of(lambda mu: self._sheet(mu, ratio, eta, medium)[1], rough)
             sheet = back, through
         glass = None
         if self._refracts:
@@ -350,7 +347,6 @@ class OpenPBR(BSDF):
             eta=eta,
             medium=medium,
             sheer=sheer,
-            filmed=filmed,
             joint=joint / sheer,
             bent=bent,  # type: ignore[arg-type]
             facets=self._balanced(rough) if self._has("coat_weight") else (),
@@ -403,7 +399,9 @@ class OpenPBR(BSDF):
         bare = white * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
         if not self._has("thin_film_weight"):
             return bare
-        filmed = self._film(cos, white * (eta / medium), 0.0 * white, medium)
+        # one value for all channels, so that compilers do the work for one
+        alike, none = ((ops.of_channels(white, [one] * len(ops.channels(white)))) for one in (eta / medium, 0.0 * eta))
+        filmed = self._film(cos, alike, none, medium)
         return _mix(bare, filmed, self.thin_film_weight)
 
     def _metal(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
@@ -426,36 +424,42 @@ class OpenPBR(BSDF):
         rest = sqr(1.0 - f) * t / maximum(1.0 - sqr(f * t), 1e-6)
         return f + rest * f * t, rest
 
-    def _let_in(self, cos: Scalar) -> Spectrum:
-        """1 - E of the base's dielectric surface."""
+    def _let_in(self, w: Direction) -> Spectrum:
+        """1 - E of the base's dielectric surface; of two widths that of the one seen along w."""
         b = self.derived
-        return self._kept_below(cos, b.rough, b.ratio, b.filmed)
+        rough = b.rough
+        if self._two_widths:
+            along2, across2 = sqr(b.alpha.x * w.x), sqr(b.alpha.y * w.y)
+            sin2 = frame.sin2(w)
+            turned = sin2 > 1e-12
+            seen2 = where(turned, (along2 + across2) / maximum(sin2, 1e-12), sqr(b.alpha.x))
+            rough = where(turned, minimum(sqrt(sqrt(seen2)), 1.0), rough)
+        return self._kept_below(w.z, rough, b.ratio, b.eta, b.medium, FACETS)
 
-    def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
+    def _kept_below(
+        self,
+        cos: Scalar,
+        rough: Scalar,
+        ratio: Scalar,
+        eta: Scalar,
+        medium: Scalar,
+        facets: Sequence[tuple[float, float, float]],
+    ) -> Spectrum:
+        """The same by what follows from the parameters; a few of the facets seen say what a film adds."""
         E = reflected(cos, rough, ratio, self._masking)
-        if not filmed:
+        if not self._has("thin_film_weight"):
             return 1.0 - (E + 0.0 * self.base_color)
-        nodes, x, more = gauss(NODES)[0].tolist(), sqrt(maximum(cos, 0.0)), filmed[0]
-        for n in range(NODES - 1):
-            part = clamp((x - nodes[n]) * (1.0 / (nodes[n + 1] - nodes[n])), 0.0, 1.0)
-            more = more + (filmed[n + 1] - filmed[n]) * part
-        return 1.0 - clamp(more * E, 0.0, 1.0)
-
-    def _more_by_film(self, rough: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> tuple[Spectrum, ...]:
-        """How many times more facets reflect under the film, at the nodes of the cosine: of a few of those seen."""
         width = maximum(sqr(rough), SMALLEST)
-        ndf, alpha, found = distribution("ggx"), vec2(width, width), []
-        for x in gauss(NODES)[0].tolist():
-            o = _at(x * x + 0.0 * rough)
-            bare, filmed = 1e-6 + 0.0 * rough, 1e-6 + 0.0 * self.base_color
-            for u1, u2 in FACETS:
-                m = ndf.sample_visible(o, u1 + 0.0 * rough, u2 + 0.0 * rough, alpha)
-                i, at = frame.reflect(o, m), maximum(ops.dot(o, m), 1e-3)
-                weight = where(i.z > 0.0, 1.0 / (1.0 + ndf.Lambda(where(i.z > 0.0, i, o), alpha)), 0.0)
-                bare = bare + weight * exact.dielectric(at, fresnel.cos_transmitted(at, ratio), ratio)
-                filmed = filmed + self._glossy(at, ratio, eta, medium) * weight
-            found.append(filmed / bare)
-        return tuple(found)
+        ndf, alpha, o = distribution("ggx"), vec2(width, width), _at(cos)
+        bare, filmed = 1e-6 + 0.0 * rough, 1e-6 + 0.0 * self.base_color
+        for u1, u2, share in facets:
+            m = ndf.sample_visible(o, u1 + 0.0 * cos, u2 + 0.0 * cos, alpha)
+            i, at = frame.reflect(o, m), maximum(ops.dot(o, m), 1e-3)
+            above = i.z > 0.0
+            weight = where(above, share / (1.0 + ndf.Lambda(where(above, i, o), alpha)), 0.0)
+            bare = bare + weight * exact.dielectric(at, fresnel.cos_transmitted(at, ratio), ratio)
+            filmed = filmed + self._glossy(at, ratio, eta, medium) * weight
+        return 1.0 - clamp(filmed * (E / bare), 0.0, 1.0)
 
     def _even(self, w: Direction, coated: bool) -> Scalar:
         """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
@@ -553,16 +557,12 @@ class OpenPBR(BSDF):
     def _fuzz(self) -> Sheen:
         return binding.bound_copy(Sheen(), {"albedo": self.fuzz_color, "roughness": self.fuzz_roughness})
 
-    def _interface(self) -> _Interface:
-        """The base's surface as glass."""
-        b = self.derived
-        zero = 0.0 * self.base_color
-        kind = _Interface(alpha=(0.1, 0.2) if self._two_widths else 0.1, masking=self._masking)
-        return binding.bound_copy(
-            kind,
-            {"eta": b.eta, "alpha": b.alpha, "rotation": None, "albedo": 1.0 + zero, "absorption": zero}
-            | {"priority": 0.0 * b.eta, "thickness": 0.0 * b.eta, "film_eta": 1.0 + 0.0 * b.eta},
-        )
+    def _interface(self) -> Dielectric:
+        """The geometry of refraction at the base's facets; how much goes that way is said elsewhere."""
+        b, zero = self.derived, 0.0 * self.base_color
+        kind = Dielectric(alpha=(0.1, 0.2) if self._two_widths else 0.1, masking=self._masking)
+        clear = {"rotation": None, "albedo": 1.0 + zero, "absorption": zero, "priority": 0.0 * b.eta}
+        return binding.bound_copy(kind, {"eta": b.eta, "alpha": b.alpha, **clear})
 
     def _pair(self, wo: Direction, wi: Direction) -> _Pair:
         """Both turned up; a thin wall looks alike from both sides."""
@@ -586,7 +586,7 @@ class OpenPBR(BSDF):
         base = (
             binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
         )
-        dimmed = self._let_in(pair.wo.z) * self._let_in(pair.wi.z) / b.sheer
+        dimmed = self._let_in(pair.wo) * self._let_in(pair.wi) / b.sheer
         dimmed = dimmed * ((1.0 - self.base_metalness) * (1.0 - self.transmission_weight))
         if self._bends:
             dimmed = dimmed * (self._even(pair.wo, False) * self._even(pair.wi, False))
@@ -891,16 +891,19 @@ class OpenPBR(BSDF):
         return _mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
 
 
-class _Interface(FilmDielectric):
-    """The geometry of refraction; how much there is of it the composition says."""
-
-
 # --------------------------------------------------------------------------- tables
 
 INDICES, ROUGHNESSES, COSINES = 25, 17, 49
 HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
 STEPS = 4
-FACETS = [(0.25, 0.1), (0.7, 0.4), (0.9, 0.85)]  # of those seen, under a film
+# Of those seen, under a film, (u1, u2, share): by Gauss in the radius, three rings of three, mirrored at the plane
+FACETS = [
+    (radius, turn, weight * share)
+    for (radius, weight), turns in zip(
+        ((0.1127, 5 / 18), (0.5, 4 / 9), (0.8873, 5 / 18)), ((0.0, 1 / 3), (0.5, 1 / 6), (0.0, 1 / 3)), strict=True
+    )
+    for turn, share in zip(turns, (1 / 3, 2 / 3), strict=True)
+]
 
 
 @function
@@ -991,6 +994,13 @@ def _sum(terms: list[Array]) -> Array:
     for term in terms[1:]:
         total = total + term
     return total
+
+
+def _mean_of(reflectance: Callable[[Scalar], Spectrum], like: Scalar) -> Spectrum:
+    """2 int F mu dmu, as `fresnel.average` with as many nodes as the other means here."""
+    x, w = (part.tolist() for part in gauss(NODES))
+    terms = [reflectance(one * one + 0.0 * like) * (4.0 * weight * one**3) for one, weight in zip(x, w, strict=True)]
+    return _sum(terms)
 
 
 def _again(f: Spectrum, lost: Scalar) -> Spectrum:
