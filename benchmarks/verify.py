@@ -60,6 +60,8 @@ def correct() -> dict[str, go.BSDF]:
     for name in ("shifted-gamma", "ward", "ward-duer"):
         found[name] = go.model(name)()
     found["opacity"] = go.model("opacity")(go.Dielectric(1.5, 0.2), 0.3)
+    found["normal-map"] = go.model("normal-map")(go.Conductor.preset("Au", alpha=0.3), 0.4, -0.2)
+    found["bump"] = go.model("bump")(go.Lambert((0.8, 0.5, 0.2)), 0.5, 0.3)
     found["coat"] = go.model("coat")(go.Lambert((0.8, 0.5, 0.2)), absorption=(0.1, 0.3, 0.5))
     found["openpbr"] = go.OpenPBR(base_color=(0.7, 0.4, 0.2), coat_weight=0.5, fuzz_weight=0.2, specular_roughness=0.4)
     if "kulla-conty" in go.models():

@@ -49,6 +49,7 @@ NESTED = {
     "mix-with-mirror": go.mix(go.Mirror(), go.OrenNayar(0.7, 0.2), 0.6),
     "mix-with-glass": go.mix(go.Dielectric(1.4, 0.3), go.Lambert(0.5), 0.4),
     "opacity": go.model("opacity")(go.Dielectric(1.5, 0.3), 0.7),
+    "normal-map": go.model("normal-map")(go.Conductor.preset("Au", alpha=0.3), 0.4, -0.2),
     "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=(0.2, 0.5), rotation=0.4)),
 }
 

@@ -9,15 +9,14 @@ import numpy as np
 
 from .. import ops
 from ..ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
-from ..optics.frame import TINY
 from .calling import method
 from .material import BSDF, Breach, Delta
 from .mix import ALMOST_ONE
 from .parameters import Number, bsdf, number
 from .sample import Sample
 
-STEEPEST = 100.0  # lean of a normal, to which a map's are held: nearer the horizon than that no 8-bit map can tell
-LEAST = 0.01  # cosine under which no view of a leaning glass comes to lie
+STEEPEST = 20.0  # lean of a normal to which a map's are held, 87 degrees
+LEAST = 0.01  # cosine under which a leaning glass is not seen, unless the surface is
 DIGITS = 4096.0  # of the number that picks a lobe, the digits behind decide on masking
 
 
@@ -45,12 +44,15 @@ class NormalMap(BSDF):
     mirror goes on to the base, light that leaves toward it is reflected there: nothing turns black where light grazes,
     and no light is made. With areas a = (w.n') / n'.n and (w.t) sin / n'.n of the two as w sees them, 0 from behind,
 
-    f cos theta_i = p(o) s(o, i) + (1 - p(o)) s(o', i),  s(o, i) = b(o, i) G(i) + b(o, i') (1 - G(i'))
+    f cos theta_i = p(o) s(o, i) + (1 - p(o)) s(o', i)
+    s(o, i) = b(o, i) G(i) + b(o, i') (1 - G(i')) + b(o, -i)
     p = a_base / (a_base + a_mirror),  G = min(1, cos theta / (a_base + a_mirror)),  w' mirrored at t
 
-    b is the base's value in the leaning frame. (The paper lets go of what meets the mirror twice.) What the base sends
-    below the surface is lost. A base that transmits is seen in the leaning frame itself, which is bent toward the view
-    where that would lie behind it; what leaves on the wrong side is lost. Not reciprocal. Polarization is lost.
+    b is the base's value in the leaning frame, -i the direction below i. The paper lets go of what meets the mirror
+    twice and of what the base sends below the surface, half of 1 - n'.n of matt white; here neighbours send that up
+    again, so that a white base is white however it leans. A base that transmits is seen in the leaning frame itself,
+    which is bent toward the view where that would lie behind it; what leaves on the wrong side is lost. Not reciprocal.
+    Polarization is lost.
     """
 
     base: BSDF = bsdf("the material")
@@ -60,11 +62,8 @@ class NormalMap(BSDF):
     breaks: ClassVar[Mapping[str, Breach]] = {
         "reciprocity": Breach(
             "what leaves toward the mirror is reflected whole, what comes from there in parts",
-            lambda model: 0.0 if model.flat else 2.0,
+            lambda model: 2.0 if model.leans else 0.0,
             certain=False,
-        ),
-        "delta": Breach(
-            "a mirror is seen about the leaning normal", lambda model: 0.0 if model.flat else 1.0, certain=False
         ),
     }
 
@@ -79,9 +78,10 @@ class NormalMap(BSDF):
         return vec3(x * over, y * over, over)
 
     def _frame(self, n: Direction) -> _Frame:
-        """n's tangents, of which x' has no part along y of the surface where that can be: the map's own axes."""
-        x = vec3(1.0 - sqr(n.x), -(n.x * n.y), -(n.x * n.z))
-        x = x * ops.rsqrt(maximum(1.0 - sqr(n.x), TINY))
+        """n's tangents, x' as near to x as it can be, from its slopes: 1 - n.x^2 would cancel where it lies low."""
+        a, b = n.x / n.z, n.y / n.z
+        x = vec3(1.0 + sqr(b), -(a * b), -a)
+        x = x * ops.rsqrt((1.0 + sqr(b)) * (1.0 + sqr(a) + sqr(b)))
         return _Frame(x, vec3(n.y * x.z - n.z * x.y, n.z * x.x - n.x * x.z, n.x * x.y - n.y * x.x), n)
 
     def _mirrored(self, w: Direction, n: Direction) -> Direction:
@@ -119,7 +119,8 @@ class NormalMap(BSDF):
 
         def seen(o: Direction) -> Spectrum:
             straight = self.base.eval(o, frame.local(wi), mode) * self._unmasked(wi, n)
-            return straight + self.base.eval(o, frame.local(again), mode) * (1.0 - self._unmasked(again, n))
+            masked = self.base.eval(o, frame.local(again), mode) * (1.0 - self._unmasked(again, n))
+            return straight + masked + self.base.eval(o, frame.local(_turned(wi)), mode)
 
         value = seen(frame.local(wo)) * share + seen(frame.local(self._mirrored(wo, n))) * (1.0 - share)
         return where((wo.z > 0.0) & (wi.z > 0.0), value, 0.0)
@@ -137,7 +138,8 @@ class NormalMap(BSDF):
 
         def seen(o: Direction) -> Scalar:
             straight = self.base.pdf(o, frame.local(wi)) * self._unmasked(wi, n)
-            return straight + self.base.pdf(o, frame.local(again)) * (1.0 - self._unmasked(again, n))
+            masked = self.base.pdf(o, frame.local(again)) * (1.0 - self._unmasked(again, n))
+            return straight + masked + self.base.pdf(o, frame.local(_turned(wi)))
 
         density = share * seen(frame.local(wo)) + (1.0 - share) * seen(frame.local(self._mirrored(wo, n)))
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
@@ -162,10 +164,11 @@ class NormalMap(BSDF):
         s = self.base.sample(frame.local(from_), vec3(rest, u.y, u.z), mode)
         sent = frame.back(s.wi)
         open_ = self._unmasked(sent, n)
-        masked = ~(digits < open_)
-        wi = where(masked, self._mirrored(sent, n), sent)
+        below = sent.z < 0.0
+        masked = ~below & ~(digits < open_)
+        wi = where(below, _turned(sent), where(masked, self._mirrored(sent, n), sent))
         valid = (wo.z > 0.0) & (wi.z > 0.0) & (s.pdf > 0.0)
-        chance = where(straight, share, 1.0 - share) * where(masked, 1.0 - open_, open_)
+        chance = where(straight, share, 1.0 - share) * where(below, 1.0, where(masked, 1.0 - open_, open_))
         density = self.pdf(wo, wi)
         pdf = where(valid, where(s.delta, chance * s.pdf, density), 0.0)
         smooth = self.eval(wo, wi, mode) * safe_div(1.0, density)
@@ -176,7 +179,7 @@ class NormalMap(BSDF):
         """The leaning frame, bent until wo lies on its own side; whether it does."""
         n = self._normal()
         side = where(wo.z < 0.0, -1.0, 1.0 + 0.0 * wo.z)
-        lacking = maximum(LEAST - dot(wo, n) * side, 0.0)
+        lacking = maximum(minimum(wo.z * side, LEAST) - dot(wo, n) * side, 0.0)
         n = n + wo * (side * lacking)
         n = n * ops.rsqrt(dot(n, n))
         return self._frame(n), dot(wo, n) * side > 0.0
@@ -190,10 +193,10 @@ class NormalMap(BSDF):
         return self.base.tint(self._frame(n).local(seen))
 
     @property
-    def flat(self) -> bool:
-        """Whether nothing leans, as far as plain numbers tell."""
-        values = [value for name, value in vars(self.plain).items() if name in self.parameters() and name != "base"]
-        return all(isinstance(value, int | float) and value == 0 for value in values)
+    def leans(self) -> bool:
+        """Whether its normal is another than the surface's, as far as plain numbers tell."""
+        values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
+        return not all(isinstance(value, int | float) and value == 0 for value in values)
 
     @property
     def transmits(self) -> bool:
@@ -201,7 +204,7 @@ class NormalMap(BSDF):
 
     @property
     def isotropic(self) -> bool:
-        return self.flat and self.base.isotropic
+        return not self.leans and self.base.isotropic
 
     @property
     def delta(self) -> Delta:
@@ -215,6 +218,11 @@ class NormalMap(BSDF):
     def ambient(self) -> Spectrum | None:
         """The base's."""
         return self.base.ambient
+
+
+def _turned(w: Direction) -> Direction:
+    """Up where it points down."""
+    return vec3(w.x, w.y, -w.z)
 
 
 class Bump(NormalMap):
@@ -232,14 +240,14 @@ class Bump(NormalMap):
 
     def _leans(self) -> tuple[Scalar, Scalar]:
         if self.surface is None:
-            return -self.lean_x, -self.lean_y
+            return ops.clamp(-self.lean_x, -STEEPEST, STEEPEST), ops.clamp(-self.lean_y, -STEEPEST, STEEPEST)
         length, sheared, across = self.surface
         x = safe_div(self.lean_x, length)
         y = safe_div(self.lean_y - sheared * x, across)
-        most = 1e3  # steeper, where dp/dv vanishes, as at a sphere's poles, the square would overflow
-        return ops.clamp(-x, -most, most), ops.clamp(-y, -most, most)
+        # steeper ones are none of a picture's: dp/dv vanishes at a sphere's poles
+        return ops.clamp(-x, -STEEPEST, STEEPEST), ops.clamp(-y, -STEEPEST, STEEPEST)
 
 
-def leans(normals: np.ndarray, scale: float = 1.0) -> np.ndarray:
+def slopes(normals: np.ndarray, scale: float = 1.0) -> np.ndarray:
     """x / z and y / z of normals (..., 3) as `normal-map` takes them, times `scale`."""
     return np.clip(scale * normals[..., :2] / np.maximum(normals[..., 2:], 1.0 / STEEPEST), -STEEPEST, STEEPEST)

@@ -65,6 +65,11 @@ class Subject:
         return bool(self.model.isotropic)
 
     @property
+    def leans(self) -> bool:
+        """Whether its mirror is another than the surface."""
+        return bool(getattr(self.model, "leans", False))
+
+    @property
     def stochastic(self) -> bool:
         """Whether `eval` and the weight are random numbers with the right expectation."""
         return bool(getattr(self.model, "stochastic", False))

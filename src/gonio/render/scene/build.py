@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import GonioWarning, InputError
 from ...models import Parameter, documents
-from ...models.normal_map import leans
+from ...models.normal_map import slopes
 from ..images import RGB
 from ..types import MitsubaBSDF, Plugin, PluginDict, Scene
 from . import meshes, schema, spectra, textures
@@ -254,7 +254,7 @@ class _Builder:
         pixels = self.image(texture, where)
         if pixels.shape[2] != 3:
             raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
-        return self.leaning("normal-map", plugin, leans(2.0 * pixels - 1.0, texture.scale))
+        return self.leaning("normal-map", plugin, slopes(2.0 * pixels - 1.0, texture.scale))
 
     def bumped(self, plugin: PluginDict, texture: BumpMap, where: str) -> PluginDict:
         """The slopes of the heights, by differences over two texels; the image repeats."""

@@ -55,6 +55,8 @@ class DeltaLobes(Law):
         power = lobes.of(subject, wo, seed, "importance") if subject.transmits else seen
         if not seen.found.any() and not power.found.any():
             raise DoesNotApply("it has no delta lobe")
+        if subject.leans:
+            raise DoesNotApply("its normal leans, and the law is about the surface's own")
         exact = subject.best == "float64"
         tolerance = EXACT if exact else SINGLE
         finding = Finding(
