@@ -7,6 +7,7 @@ eta_i)^2 is left out, and where shading and geometric normals differ the flux is
 from __future__ import annotations
 
 import re
+import weakref
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -52,7 +53,9 @@ class Particles:
     """
 
     def __init__(self, transport: Transport, targets: Targets | None = None):
-        self.of, self.mi = transport, transport.mi
+        # No circle: who goes by the collector of garbage, with the scene, goes at any time.
+        self.of: Transport = weakref.proxy(transport)
+        self.mi = transport.mi
         mi = self.mi
         self.sources = Sources(mi, transport.scene, transport.sensor, transport.lights, targets)
         self.context = mi.BSDFContext(mi.TransportMode.Importance)
