@@ -31,6 +31,7 @@ import numpy as np
 from gonio.render import engine
 from rich.console import Console
 from rich.table import Table
+from scipy import stats
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -122,9 +123,10 @@ def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np
 
 
 def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """How far apart the means of two stacks of blocks are."""
+    """How far apart the means of two stacks of blocks are: Student's t, as sigmas that are as rare."""
     squares = sum(np.var(x, 0, ddof=1) / len(x) for x in (a, b))
-    return np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + 1e-20)
+    t = np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + 1e-20)
+    return np.asarray(stats.norm.isf(stats.t.sf(t, min(len(a), len(b)) - 1)))
 
 
 def of_paths(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:

@@ -287,8 +287,9 @@ class Lights:
         self.mi, self.scene = mi, scene
         self.surfaces = Surfaces(mi, scene) if surfaces is None else surfaces
         found = scene.emitters()
+        kept = [index for index in range(len(found)) if not _is_black(mi, found[index])]
         # Mitsuba merges the shapes of a file in an order of chance, and that of their lights must not follow it
-        order = sorted(range(len(found)), key=lambda index: _order(found[index]))
+        order = sorted(kept, key=lambda index: _order(found[index]))
         self.emitters = [found[index] for index in order]
         self.count = len(self.emitters)
         self.rectangle: Rectangle | None = None
@@ -415,6 +416,14 @@ class Lights:
         active &= ~self.scene.ray_test(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
         return weigh(dr.select(active, radiance, 0), pdf)
+
+
+def _is_black(mi: ModuleType, emitter: Emitter) -> bool:
+    """Whether an environment is black all over: a density of Mitsuba's is then 0 / 0."""
+    if not mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite):
+        return False
+    pixels = dict(mi.traverse(emitter)).get("data")
+    return pixels is not None and not dr.any(pixels.array != 0)
 
 
 def _order(emitter: Emitter) -> tuple[str, list[float]]:

@@ -35,6 +35,7 @@ from .types import (
 )
 
 SURFACE, POINT, INFINITE = 0, 1, 2
+UNMET = 1e30  # larger than what any lamp with an extent has, and small enough to be counted with
 MOST_TARGETS = 8  # spheres that particles are aimed at; the code for each stands in the kernel
 
 
@@ -48,7 +49,7 @@ class Particle:
     place      of a lamp with a surface, the point on it
     kind       SURFACE, POINT or INFINITE
     flux       radiance over density; of a lamp that is a point or a parallel beam, its limit
-    density    1/(m^2 sr), of étendue; 0 for those two, which no ray from elsewhere meets
+    density    1/(m^2 sr), of étendue; UNMET for those two, which no ray from elsewhere meets
     seen       how much of it a camera that sees the lamp itself is sent: of a surface one over its density by area, of
                infinity the radiance over its density by solid angle
     """
@@ -180,7 +181,7 @@ class Sources:
             found.place,
             kind,
             found.flux / probability,
-            found.density * probability,
+            dr.select(found.density < UNMET, found.density * probability, UNMET),
             found.seen / probability,
         )
 
@@ -275,7 +276,7 @@ class Sources:
         _, intensity = emitter.sample_direction(it, place, active)
         flux = dr.select(active & (pdf > 0), intensity / pdf, 0)
         place_ = self._nowhere(wavelengths)
-        return Particle(origin, direction, emitter, place_, mi.UInt32(POINT), flux, mi.Float(0), mi.Spectrum(0))
+        return Particle(origin, direction, emitter, place_, mi.UInt32(POINT), flux, mi.Float(UNMET), mi.Spectrum(0))
 
     def _from_afar(
         self,
@@ -300,7 +301,7 @@ class Sources:
         by_area = self._line_pdf(point, direction)
         outside = dr.norm(point - self.centre) + 2 * self.radius
         parallel = dr.gather(mi.Bool, self.parallel, number, active)
-        density = dr.select(parallel, 0, ds.pdf * by_area)
+        density = dr.select(parallel, UNMET, ds.pdf * by_area)
         flux = dr.select(active & (by_area > 0), weight / by_area, 0)
         origin = mi.Point3f(point - direction * outside)
         seen = dr.select(parallel, 0, weight)

@@ -10,10 +10,10 @@ import numpy as np
 
 from ...errors import InputError
 from .. import sampler
-from ..sources import INFINITE, POINT, SURFACE, Particle
+from ..sources import INFINITE, POINT, SURFACE, UNMET, Particle
 from ..types import Mask, Point, Radiance, Record, Scene, Sensor, SurfaceInteraction, UInt, Vector
 from .base import Settings
-from .particles import FIRST_VERTEX, LENS, VERTEX_DIMENSIONS, Flight, Particles, adjoint
+from .particles import FIRST_VERTEX, LENS, VERTEX_DIMENSIONS, Flight, Particles
 from .sums import Sums
 from .transport import Transport
 
@@ -70,7 +70,7 @@ class Light(Transport):
         particle, _ = self.particles.leave(self.particles.key(mi.UInt32(0)), low, mi.Bool(True))
         size = dr.square(NEAREST * sources.radius)
         bright = dr.select(particle.kind == POINT, particle.flux / size, particle.flux * particle.density)
-        bright = dr.select((particle.kind == INFINITE) & (particle.density == 0), particle.flux, bright)
+        bright = dr.select((particle.kind == INFINITE) & (particle.density >= UNMET), particle.flux, bright)
         values = np.array(dr.max(bright), np.float64)
         values = values[np.isfinite(values)]
         largest = float(values.max()) if len(values) else 0.0
@@ -94,7 +94,7 @@ class Light(Transport):
                 at = flight.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
                 ds, importance = self._camera(key, low, at, si, flight.active)
                 toward = si.to_local(ds.d)
-                value = bsdf.eval(particles.context, si, toward, flight.active) * adjoint(si, toward) * importance
+                value = particles.sent(si, bsdf, toward, flight.active) * importance
                 if crossing is not None:
                     side = dr.select(si.wi.z * toward.z < 0.0, crossing.beyond, crossing.here)
                     value *= self.media.transmitted(side, si, ds.dist) & crossing.surface

@@ -1,11 +1,13 @@
 """Particles on their way from the lamps: what those who trace light forward share.
 
 A particle arrives at a surface with a flux; what leaves again is the adjoint of what a path does: radiance's (eta_o /
-eta_i)^2 is left out, and where shading and geometric normals differ the flux is corrected (Veach 1997, eq. 5.19).
+eta_i)^2 is left out, and where shading and geometric normals differ the flux is corrected (Veach1997, sec. 5.3).
 """
 
 from __future__ import annotations
 
+import re
+import weakref
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 # Dimensions of a particle: at the lamp, and at each vertex.
 PICK, PLACE, WAY, AIM, FIRST_VERTEX = 0, 1, 2, 3, 4
 LOBE, CHOICE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
+
+BENDS = re.compile("NormalMap|BumpMap")
 
 ROULETTE_DEPTH = 5  # segments, as along paths
 
@@ -49,12 +53,16 @@ class Particles:
     """
 
     def __init__(self, transport: Transport, targets: Targets | None = None):
-        self.of, self.mi = transport, transport.mi
+        # No circle: who goes by the collector of garbage, with the scene, goes at any time.
+        self.of: Transport = weakref.proxy(transport)
+        self.mi = transport.mi
         mi = self.mi
         self.sources = Sources(mi, transport.scene, transport.sensor, transport.lights, targets)
         self.context = mi.BSDFContext(mi.TransportMode.Importance)
         self.context.type_mask = transport.context.type_mask
         self.seed = dr.opaque(mi.UInt32, transport.settings.seed)
+        # Plugins of Mitsuba's that bend normals keep that to themselves.
+        self.bent = any(BENDS.search(str(shape.bsdf())) for shape in transport.scene.shapes())
 
     def key(self, high: UInt) -> UInt:
         return sampler.pixel_key(high, self.seed)
@@ -71,7 +79,7 @@ class Particles:
         ray = particle.place.spawn_ray(particle.direction)  # off the lamp's own surface
         ray.o = dr.select(particle.place.is_valid(), ray.o, particle.origin)
         ray.wavelengths = wavelengths
-        active = active & dr.any(particle.flux != 0)
+        active = active & dr.any(particle.flux != 0) & (of.max_depth > 1)
         hit = of.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         flight = Flight(
             mi.UInt32(1),
@@ -112,7 +120,23 @@ class Particles:
         bs, weight = bsdf.sample(self.context, si, lobe, u, flight.active)
         if crossing is not None:
             bs, weight = of.straight_on(si, bs, weight, flight.active & ~crossing.surface)
-        return bs, weight * adjoint(si, bs.wo)
+        if not self.bent:
+            return bs, weight * adjoint(si, bs.wo)
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        value = self.sent(si, bsdf, bs.wo, flight.active & ~delta) / dr.select(bs.pdf > 0, bs.pdf, 1)
+        between = si.wi + bs.wo * bs.eta  # along the normal that mirrors or refracts
+        bend = adjoint(si, bs.wo, si.to_world(between * dr.rsqrt(dr.maximum(dr.squared_norm(between), 1e-12))))
+        return bs, dr.select(delta, weight * dr.select(dr.squared_norm(between) > 1e-6, bend, 1), value)
+
+    def sent(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, toward: Vector, active: Mask) -> Radiance:
+        """The share that a rough surface sends in a direction, with its cosine: what a path from there would find."""
+        if not self.bent:
+            return bsdf.eval(self.context, si, toward, active) * adjoint(si, toward)
+        mi = self.mi
+        seen = mi.SurfaceInteraction3f(si)
+        seen.wi = toward
+        into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(toward)))
+        return bsdf.eval(self.context, seen, si.wi, active) * (out / dr.maximum(into, 1e-12))
 
     def go_on(
         self,
@@ -144,9 +168,11 @@ class Particles:
         return Flight(flight.depth + 1, ray, hit, flight.flux, share, eta, flight.alone, inside, active)
 
 
-def adjoint(si: SurfaceInteraction, wo: Vector) -> Float:
+def adjoint(si: SurfaceInteraction, wo: Vector, normal: Vector | None = None) -> Float:
     """What a particle's flux is multiplied by where the shading normal is not the geometric one, |wi.s wo.g / (wi.g
-    wo.s)|; 1 where they are the same."""
+    wo.s)|; 1 where they are the same. `normal` is s where it is not that of the surface."""
     into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(wo)))
-    factor = abs(si.wi.z) * out / dr.maximum(into * abs(wo.z), 1e-12)
-    return dr.select(dr.dot(si.n, si.sh_frame.n) > 1 - 1e-6, 1, factor)
+    shading = si.sh_frame.n if normal is None else normal
+    from_light, onward = abs(dr.dot(shading, si.to_world(si.wi))), abs(dr.dot(shading, si.to_world(wo)))
+    factor = from_light * out / dr.maximum(into * onward, 1e-12)
+    return dr.select(abs(dr.dot(si.n, shading)) > 1 - 1e-6, 1, factor)

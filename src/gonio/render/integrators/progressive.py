@@ -66,7 +66,7 @@ class Render:
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
-        with dr.suspend_grad():
+        with dr.suspend_grad(), garbage.kept():
             self._integrator = self._program()
 
     def _program(self) -> Integrator:

@@ -1,0 +1,228 @@
+"""Particle tracing and the map of caustics: against the path tracer, and to the bit against themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import InputError
+from gonio.render import engine, lights
+from gonio.render.integrators import Render, Settings
+
+mi = engine.load()
+import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
+
+T = mi.ScalarTransform4f
+EXAMPLES = Path(__file__).parents[2] / "examples"
+lights.register(mi)
+
+
+def rgb(value: Any) -> dict:
+    return {"type": "rgb", "value": value}
+
+
+def rectangle(origin: tuple, half: float, angle: float = 0.0, **rest: Any) -> dict:
+    return {"type": "rectangle", "to_world": T().translate(origin).rotate([1, 0, 0], angle).scale(half), **rest}
+
+
+AREA = {"type": "area", "radiance": rgb([8, 6, 4])}
+LAMP = rectangle((0, 2.5, 1), 0.75, 90, emitter=AREA)
+PATTERN = mi.Bitmap(np.linspace(0.1, 2.0, 8 * 4 * 3).reshape(4, 8, 3).astype(np.float32))
+LAMPS: dict[str, dict] = {
+    "two-sided": {"lamp": rectangle((0.6, 0.8, 0.4), 0.3, 30, emitter={**AREA, "type": "gonio_area"})},
+    "ball, point and sky": {
+        "lamp": {"type": "sphere", "center": [1, 2, 1], "radius": 0.3, "emitter": AREA},
+        "point": {"type": "point", "position": [1, 2, 2], "intensity": rgb([3, 2, 1])},
+        "sky": {"type": "envmap", "bitmap": PATTERN},
+    },
+    "beam": {"lamp": {"type": "directional", "direction": [0.3, -1, -0.5], "irradiance": rgb([3, 2, 1])}},
+}
+GREY = {"type": "diffuse", "reflectance": rgb([0.7, 0.5, 0.3])}
+BUMPS = np.full((2, 2, 3), 0.5, np.float32) + np.array([[[0.2, 0, 0.45], [0, 0.2, 0.45]]] * 2, np.float32)
+BUMPY = {
+    "type": "normalmap",
+    "normalmap": {"type": "bitmap", "bitmap": mi.Bitmap(BUMPS), "raw": True},
+    "bsdf": {"type": "diffuse", "reflectance": rgb(0.7)},
+}
+GLASS = {"type": "dielectric", "int_ior": 1.5}
+
+
+def scene(lamp: dict, ball: dict, size: int = 24, **rest: Any) -> Any:
+    """A floor and a ball under a lamp."""
+    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
+    eye = T().look_at([0, 1.5, 4], [0, 0, 0], [0, 1, 0])
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "sensor": {"type": "perspective", "fov": 40, "to_world": eye, "film": film},
+            "floor": rectangle((0, -0.5, 0), 3, -90, bsdf=GREY),
+            "ball": {"type": "sphere", "center": [0, 0, 0], "radius": 0.5, "bsdf": ball},
+            **lamp,
+            **rest,
+        }
+    )
+
+
+def pictures(scene: Any, integrator: str, spp: int, runs: int = 4, depth: int = 5) -> np.ndarray:
+    found = []
+    for seed in range(runs):
+        render = Render(scene, Settings(integrator, depth, seed=seed))
+        render.advance(spp)
+        assert render.invalid == 0
+        found.append(render.image())
+    return np.array(found)
+
+
+def sigmas(a: np.ndarray, b: np.ndarray, side: int = 4) -> float:
+    """How far apart the worst block of two stacks of pictures is; the error of a block is pooled with all blocks'."""
+
+    def blocks(images: np.ndarray) -> np.ndarray:
+        n, h, w, _ = images.shape
+        grey = images.mean(-1)
+        return grey.reshape(n, h // side, side, w // side, side).mean((2, 4)).reshape(n, -1)
+
+    a, b = blocks(a), blocks(b)
+    error = np.sqrt(a.var(0, ddof=1) / len(a) + b.var(0, ddof=1) / len(b))
+    error = np.maximum(error, error.mean()) + 1e-4 * a.mean()
+    return float((abs(a.mean(0) - b.mean(0)) / error).max())
+
+
+@pytest.mark.parametrize("lamp", LAMPS)
+def test_particles_make_the_picture_of_paths(lamp: str) -> None:
+    drawn = scene(LAMPS[lamp], GREY)
+    assert sigmas(pictures(drawn, "path", 64), pictures(drawn, "light", 256)) < 6
+
+
+def test_particles_see_bent_normals_and_rough_glass_as_paths_do() -> None:
+    rough = {"type": "roughdielectric", "alpha": 0.5, "distribution": "ggx"}
+    other = {"type": "sphere", "center": [0.9, 0, 0.3], "radius": 0.4, "bsdf": BUMPY}
+    drawn = scene({"lamp": LAMP}, rough, other=other)
+    assert sigmas(pictures(drawn, "path", 64, depth=7), pictures(drawn, "light", 256, depth=7)) < 6
+
+
+def test_particles_of_short_paths_show_the_lamp_alone() -> None:
+    drawn = scene(LAMPS["two-sided"], GREY)
+    a, b = pictures(drawn, "path", 16, depth=1), pictures(drawn, "light", 64, depth=1)
+    assert a.max() > 1 and sigmas(a, b) < 6
+
+
+WIDE = rectangle((0.5, 2.0, 0.5), 0.6, 90, emitter=AREA)
+MIRROR = rectangle((0, 0.3, -1.2), 1.0, bsdf={"type": "conductor", "material": "Ag"})
+
+
+@pytest.mark.parametrize("lamp", ["wide", pytest.param("ball, point and sky", marks=pytest.mark.slow)])
+def test_the_map_of_caustics_takes_nothing_and_adds_nothing(lamp: str) -> None:
+    found = {"lamp": WIDE} if lamp == "wide" else {n: LAMPS[lamp][n] for n in ("lamp", "sky")}
+    drawn = scene(found, GLASS, mirror=MIRROR)
+    a, b = pictures(drawn, "path", 256, depth=8), pictures(drawn, "caustics", 32, depth=8)
+    assert sigmas(a, b) < 6
+    assert b.mean() == pytest.approx(a.mean(), rel=0.01)
+
+
+def test_caustics_of_a_point_which_no_path_finds_are_those_of_particles() -> None:
+    lamp = {"type": "point", "position": [2.5, 1.6, 0.5], "intensity": rgb(20)}
+    drawn = scene({"lamp": lamp}, GLASS, size=32)
+    path, light, caustics = (
+        pictures(drawn, name, n, depth=8, runs=4).mean((0, 3))
+        for name, n in (("path", 16), ("light", 256), ("caustics", 32))
+    )
+    floor = (abs(pictures(drawn, "normal", 16, 1)[0] - [0.5, 1.0, 0.5]) < 1e-4).all(-1)
+    shadow = floor & (path < 0.1)  # of the ball, as a path sees it
+    assert light[shadow].mean() > 2 * path[shadow].mean(), "no caustic stands in the shadow"
+    assert caustics[shadow].mean() == pytest.approx(light[shadow].mean(), rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["light", "caustics"])
+def test_passes_states_and_threads_change_no_bit(name: str) -> None:
+    drawn = scene(LAMPS["ball, point and sky"], GLASS, mirror=MIRROR, size=16)
+    settings = Settings(name, 6, seed=5)
+
+    def render(*passes: int) -> np.ndarray:
+        found = Render(drawn, settings)
+        for count in passes:
+            found.advance(count)
+        return found.image()
+
+    whole = render(11)
+    assert np.array_equal(whole, render(3, 1, 7))
+    begun = Render(drawn, settings)
+    begun.advance(5)
+    state = {key: np.array(value) for key, value in begun.state().items()}
+    begun.advance(1)
+    other = Render(drawn, settings)
+    other.restore(5, state)
+    other.advance(6)
+    assert np.array_equal(whole, other.image())
+    before = dr.thread_count()
+    dr.set_thread_count(2 if before != 2 else 3)
+    try:
+        assert np.array_equal(whole, render(11))
+    finally:
+        dr.set_thread_count(before)
+    assert not np.array_equal(whole, pictures(drawn, name, 11, 1, 6)[0])
+
+
+def test_parts_of_a_picture_of_caustics_are_those_of_the_whole() -> None:
+    drawn = scene({"lamp": LAMP}, GLASS, size=16)
+    whole, part = Render(drawn, Settings("caustics", 6)), Render(drawn, Settings("caustics", 6))
+    part.select(slice(64, 128))
+    whole.advance(6)
+    part.advance(6)
+    assert np.array_equal(whole.state()["far0"][64:128], part.state()["far0"])
+
+
+def test_a_scene_without_light_or_without_mirrors_needs_no_map() -> None:
+    dark = scene({}, GLASS, size=8)
+    for name in ("light", "caustics", "path"):
+        assert not pictures(dark, name, 4, 1).any()
+    plain = scene({"lamp": LAMP}, GREY, size=8)
+    assert sigmas(pictures(plain, "caustics", 16), pictures(plain, "path", 16)) < 6
+
+
+def odd_sky(pixels: np.ndarray) -> dict:
+    return {"lamp": {"type": "envmap", "bitmap": mi.Bitmap(pixels.astype(np.float32))}}
+
+
+@pytest.mark.parametrize("name", ["path", "light", "caustics", "direct"])
+def test_odd_lamps_give_a_picture_without_a_hole(name: str) -> None:
+    sun = np.full((8, 16, 3), 0.1)
+    sun[2, 3] = 1e6
+    for lamp in (
+        odd_sky(np.zeros((4, 8, 3))),
+        odd_sky(np.full((2, 2, 3), 0.5)),
+        odd_sky(sun),
+        {"lamp": rectangle((0, 2, 0), 0.5, 90, emitter={"type": "area", "radiance": rgb(0.0)})},
+        {"lamp": rectangle((0, 2, 0), 1e-4, 90, emitter={"type": "area", "radiance": rgb(1e6)})},
+    ):
+        assert np.isfinite(pictures(scene(lamp, GLASS, size=8), name, 4, 1)).all()
+
+
+@pytest.mark.slow
+def test_a_camera_inside_of_glass_looks_out() -> None:
+    around = {"type": "sphere", "center": [0, 1.5, 4], "radius": 0.3, "bsdf": GLASS}
+    drawn = scene({"lamp": WIDE}, GREY, around=around)
+    path, caustics = pictures(drawn, "path", 256, depth=6), pictures(drawn, "caustics", 32, depth=6)
+    assert path.mean() > 0.01 and sigmas(path, caustics) < 6
+
+
+def test_what_particles_cannot_do_is_one_clear_error() -> None:
+    drawn = scene({"lamp": LAMP}, GREY, size=8)
+    with pytest.raises(InputError, match="no features for the denoiser"):
+        Render(drawn, Settings("light"), aovs=True)
+    with pytest.raises(InputError, match="light by wavelength"):
+        go.render(EXAMPLES / "ring-caustic", spp=1, size=(8, 8), integrator="caustics", spectral=True)
+
+
+def test_path_says_where_it_starves_and_what_does_not() -> None:
+    small = {"lamp": rectangle((1, 3, 1), 0.05, 90, emitter=AREA)}
+    assert "--integrator caustics" in Render(scene(small, GLASS, size=8), Settings("path")).advice
+    for lamp, ball, settings in (
+        (small, GREY, Settings("path")),
+        ({"lamp": WIDE}, GLASS, Settings("path")),
+        (small, GLASS, Settings("caustics")),
+        (small, GLASS, Settings("direct")),
+    ):
+        assert Render(scene(lamp, ball, size=8), settings).advice == ""
