@@ -39,16 +39,6 @@ def test_the_default_material_is_a_rough_white_metal(file: Path) -> None:
     assert read(file, "Plain") == {"type": "metal", "r0": [1.0, 1.0, 1.0], "alpha": 1.0}
 
 
-def test_a_dielectric_shows_its_base_colour_under_a_clear_layer(file: Path) -> None:
-    """Khronos2021, appendix B: F of the layer, and 1 - F times the diffuse colour, with no darkening."""
-    found = go.material(f"{file}:Red")
-    bare = go.Coat(go.Lambert(0.0), alpha=0.16, bounces="white")
-    one = {"mu": 0.6, "method": "sampling", "samples": 1 << 14}
-    layer = go.albedo(bare, **one).value
-    expected = layer + (1.0 - layer) * np.array([0.8, 0.1, 0.1])
-    assert go.albedo(found, **one).value == pytest.approx(expected, abs=0.015)
-
-
 def test_glass_has_its_index_absorption_and_abbe_number(file: Path) -> None:
     found = read(file, "Glass")
     assert found["type"] == "dielectric"
@@ -67,14 +57,20 @@ def test_layers_stand_in_the_order_of_the_specification(file: Path) -> None:
     assert (cloth["type"], cloth["a"]["type"]) == ("sum", "sheen-charlie")  # type: ignore[index]
 
 
-def test_every_material_can_be_asked_and_keeps_to_its_light(file: Path) -> None:
-    wo, u = np.array([[0.6, 0.0, 0.8]] * 64), np.random.default_rng(1).random((64, 3))
+def test_materials_keep_to_their_light_and_a_dielectric_shows_its_colour_under_a_clear_layer(file: Path) -> None:
+    """Khronos2021, appendix B: E of the layer, and 1 - E times the base colour, which no bounce darkens."""
+    wo, u = np.array([[0.6, 0.0, 0.8]] * 8192), np.random.default_rng(1).random((8192, 3))
+    albedo = {}
     for name in ALL:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = go.material(f"{file}:{name}")
-        sample = found.sample(wo, u)
-        assert np.isfinite(sample.weight).all() and np.mean(sample.weight[:, 0]) < 1.1, name
+            made = go.material(f"{file}:{name}")
+        if name not in ("Car", "Cloth", "Oil"):  # of more layers, whose kernels take seconds
+            weight = made.sample(wo, u).weight
+            albedo[name] = weight.mean(0)
+            assert np.isfinite(weight).all() and albedo[name].max() < 1.01, name
+    layer = go.Coat(go.Lambert(0.0), alpha=0.16, bounces="white").sample(wo, u).weight.mean(0)
+    assert albedo["Red"] == pytest.approx(layer + (1.0 - layer) * np.array([0.8, 0.1, 0.1]), abs=0.015)
 
 
 def test_what_is_not_carried_is_said(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
+from ..ops import Direction, Mode, Scalar, Spectrum, dot, function, maximum, minimum, safe_div, sqr, vec3, where
 from .calling import method
 from .material import BSDF, Breach, Delta
 from .mix import ALMOST_ONE
@@ -75,7 +75,8 @@ class NormalMap(BSDF):
     def _normal(self) -> Direction:
         x, y = self._leans()
         over = ops.rsqrt(1.0 + sqr(x) + sqr(y))
-        return vec3(x * over, y * over, over)
+        n_x, n_y = x * over, y * over
+        return vec3(n_x, n_y, over)
 
     def _frame(self, n: Direction) -> _Frame:
         """n's tangents, x' as near to x as it can be, from its slopes: 1 - n.x^2 would cancel where it lies low."""
@@ -84,21 +85,26 @@ class NormalMap(BSDF):
         x = x * ops.rsqrt((1.0 + sqr(b)) * (1.0 + sqr(a) + sqr(b)))
         return _Frame(x, vec3(n.y * x.z - n.z * x.y, n.z * x.x - n.x * x.z, n.x * x.y - n.y * x.x), n)
 
+    @function
     def _mirrored(self, w: Direction, n: Direction) -> Direction:
         """w' at the vertical facet, whose normal is against n's lean; w itself where nothing leans."""
         sin2 = sqr(n.x) + sqr(n.y)
-        along = 2.0 * (w.x * n.x + w.y * n.y) * where(sin2 > 1e-12, safe_div(1.0, sin2), 0.0)
+        level = w.x * n.x + w.y * n.y
+        along = 2.0 * level * where(sin2 > 1e-12, safe_div(1.0, sin2), 0.0)
         return vec3(w.x - along * n.x, w.y - along * n.y, w.z)
 
     def _areas(self, w: Direction, n: Direction) -> tuple[Scalar, Scalar]:
         """What w sees of base and mirror, over the surface's area; both over n'.n less."""
-        return maximum(dot(w, n), 0.0), maximum(-(w.x * n.x + w.y * n.y), 0.0)
+        level = w.x * n.x + w.y * n.y
+        return maximum(dot(w, n), 0.0), maximum(-level, 0.0)
 
+    @function
     def _base_share(self, w: Direction, n: Direction) -> Scalar:
         """p."""
         base, mirror = self._areas(w, n)
         return where(base > 0.0, safe_div(base, base + mirror), 0.0 * base)
 
+    @function
     def _unmasked(self, w: Direction, n: Direction) -> Scalar:
         """G; 0 below the surface."""
         base, mirror = self._areas(w, n)
@@ -116,10 +122,11 @@ class NormalMap(BSDF):
         n = self._normal()
         frame = self._frame(n)
         share, again = self._base_share(wo, n), self._mirrored(wi, n)
+        covered = 1.0 - self._unmasked(again, n)
 
         def seen(o: Direction) -> Spectrum:
             straight = self.base.eval(o, frame.local(wi), mode) * self._unmasked(wi, n)
-            masked = self.base.eval(o, frame.local(again), mode) * (1.0 - self._unmasked(again, n))
+            masked = self.base.eval(o, frame.local(again), mode) * covered
             return straight + masked + self.base.eval(o, frame.local(_turned(wi)), mode)
 
         value = seen(frame.local(wo)) * share + seen(frame.local(self._mirrored(wo, n))) * (1.0 - share)
@@ -135,10 +142,11 @@ class NormalMap(BSDF):
         n = self._normal()
         frame = self._frame(n)
         share, again = self._base_share(wo, n), self._mirrored(wi, n)
+        covered = 1.0 - self._unmasked(again, n)
 
         def seen(o: Direction) -> Scalar:
             straight = self.base.pdf(o, frame.local(wi)) * self._unmasked(wi, n)
-            masked = self.base.pdf(o, frame.local(again)) * (1.0 - self._unmasked(again, n))
+            masked = self.base.pdf(o, frame.local(again)) * covered
             return straight + masked + self.base.pdf(o, frame.local(_turned(wi)))
 
         density = share * seen(frame.local(wo)) + (1.0 - share) * seen(frame.local(self._mirrored(wo, n)))
@@ -160,15 +168,15 @@ class NormalMap(BSDF):
         rest = minimum(maximum(rest, 0.0), ALMOST_ONE)
         digits = rest * DIGITS
         digits = digits - ops.floor(digits)
-        from_ = where(straight, wo, self._mirrored(wo, n))
-        s = self.base.sample(frame.local(from_), vec3(rest, u.y, u.z), mode)
+        start = where(straight, wo, self._mirrored(wo, n))
+        s = self.base.sample(frame.local(start), vec3(rest, u.y, u.z), mode)
         sent = frame.back(s.wi)
-        open_ = self._unmasked(sent, n)
+        clear = self._unmasked(sent, n)
         below = sent.z < 0.0
-        masked = ~below & ~(digits < open_)
+        masked = ~below & ~(digits < clear)
         wi = where(below, _turned(sent), where(masked, self._mirrored(sent, n), sent))
         valid = (wo.z > 0.0) & (wi.z > 0.0) & (s.pdf > 0.0)
-        chance = where(straight, share, 1.0 - share) * where(below, 1.0, where(masked, 1.0 - open_, open_))
+        chance = where(straight, share, 1.0 - share) * where(below, 1.0, where(masked, 1.0 - clear, clear))
         density = self.pdf(wo, wi)
         pdf = where(valid, where(s.delta, chance * s.pdf, density), 0.0)
         smooth = self.eval(wo, wi, mode) * safe_div(1.0, density)
