@@ -275,10 +275,10 @@ class OpenPBR(BSDF):
 
     @function
     def _widths(self, roughness: Scalar, anisotropy: Scalar) -> Pair:
-        """alpha along x and y, whose squares add up to twice roughness^4."""
+        """alpha along x and y, whose squares add up to twice roughness^4, held at 1, where the tables end."""
         low = 1.0 - anisotropy
         along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
-        return vec2(maximum(along, SMALLEST), maximum(along * low, SMALLEST))
+        return vec2(clamp(along, SMALLEST, 1.0), clamp(along * low, SMALLEST, 1.0))
 
     @function
     def _roughened(self) -> Scalar:
@@ -874,7 +874,8 @@ class OpenPBR(BSDF):
         if self.geometry_thin_walled or not self.plain._has("transmission_weight"):
             return None
         if not self.is_bound:
-            return Interior(self.specular_ior, 0.0 * self.transmission_depth, 0.0)  # type: ignore[arg-type]
+            types = backend.types("float64")
+            return self.bind(types).interior
         some = self.transmission_depth > 0.0
         colour = maximum(self.transmission_color, 1e-6)
         loss = where(some, -log(colour) / where(some, self.transmission_depth, 1.0), 0.0)
