@@ -1,9 +1,10 @@
-"""Spectral rendering, held against closed forms, and its price: python benchmarks/spectral.py [prism window bow time]
+"""Light held against closed forms, and its price by wavelength: python benchmarks/spectral.py [prism bow cusp ...]
 
 prism    where lines of a slit's light are seen through the prism of examples/prism, and how far that turned them,
          against Snell's law with Sellmeier's index (SchottBK7)
 window   the bright disc in examples/snells-window against asin(1/n)
 bow      the bows of examples/rainbow against Descartes' angles
+cusp     where the caustic in examples/ring-caustic has its cusp, by --integrator caustics, against 1/a + 1/b = 2/R
 time     a spectral render against one in RGB, same scene and samples, alternating in two processes
 """
 
@@ -160,6 +161,40 @@ def bow(rays: int = 400_000) -> list[float]:
     return list(program.angles(rays))
 
 
+def cusp(spp: int = 128) -> float:
+    """Pixels by which the caustic is off next to its cusp, seen from above, from a lamp that is all but a point.
+
+    A ray that meets the wall under the angle i has its focus at the distance b: 1/a + 1/b = 2 / (R cos i).
+    """
+    size, fov, height = 400, 12.0, 6.0
+    camera = {"position": [0.47, height, 0], "lookAt": [0.47, 0, 0], "up": [0, 0, 1]}
+    scene = json.loads((EXAMPLES / "ring-caustic/scene.json").read_text())
+    scene["camera"] |= {"transform": camera, "verticalFov": fov, "film": {"size": [size, size]}}
+    scene["scene"]["lights"] = scene["scene"]["lights"][:1]
+    scene["scene"]["lights"][0]["shape"]["radius"] = 0.02
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.json"
+        path.write_text(json.dumps(scene))
+        picture = np.asarray(go.render(path, spp=spp, integrator="caustics"), float).mean(2)
+    pixel = 2.0 * height * np.tan(np.radians(fov / 2.0)) / size
+    right = -1.0  # forward x up is -x here
+    x = 0.47 + right * (np.arange(size) + 0.5 - size / 2.0) * pixel
+    angle = np.linspace(0.0, 0.6, 2001)
+    wall = np.stack([np.cos(angle), np.sin(angle)], 1)
+    ray = wall - [-8.0, 0.0]
+    a = np.linalg.norm(ray, axis=1)
+    cosine = np.sum(ray * wall, 1) / a
+    away = ray / a[:, None] - 2.0 * cosine[:, None] * wall
+    line = wall + away / (2.0 / cosine - 1.0 / a)[:, None]
+    columns = np.flatnonzero((x > line[0, 0] + pixel) & (x < line[0, 0] + 21.0 * pixel))
+    folded = picture[size // 2 :] + picture[: size // 2][::-1]  # both branches
+    found = np.argmax(folded[:60], axis=0)[columns] + 0.5
+    expected = np.interp(x[columns], line[:, 0], line[:, 1]) / pixel
+    apart = found - expected
+    print(f"caustic by its cusp at x = {line[0, 0]:.4f}: off by {np.mean(apart):+.2f} pixels on the mean of 20 columns")
+    return float(np.mean(np.abs(apart)))
+
+
 def time() -> None:
     """Medians of 7, the two taking turns: seconds on the wall, and of processors, which other work disturbs less."""
     for name in ("conductor-ggx", "rough-dielectric", "glass-caustic"):
@@ -189,5 +224,5 @@ def time() -> None:
 
 
 if __name__ == "__main__":
-    for one in sys.argv[1:] or ("prism", "window", "bow", "time"):
-        {"prism": prism, "window": window, "bow": bow, "time": time}[one]()
+    for one in sys.argv[1:] or ("prism", "window", "bow", "cusp", "time"):
+        {"prism": prism, "window": window, "bow": bow, "cusp": cusp, "time": time}[one]()

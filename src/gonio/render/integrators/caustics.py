@@ -53,6 +53,7 @@ class Caustics(Path):
     How likely: a path that leaves a surface with density p toward mirrors and meets the lamp behind them, and N
     particles that come from there the other way, are as dense as p / cos and g N pi r^2 over the same étendue, with
     the particles' density g at the lamp; what mirrors and lenses do to the width of the beam is the same for both.
+    Merging as one more way to sample a path is of Georgiev2012.
     """
 
     name = "caustics"
