@@ -311,3 +311,4 @@ def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None
 def test_comparisons_of_wgsl_have_parentheses_only_where_a_template_could_be_read() -> None:
     text = go.emit(GOLD, "wgsl")
     assert "let is_smooth = material.alpha.x < SMOOTH && material.alpha.y < SMOOTH;" in text
+    assert not re.search(r"!\w+ <", go.emit(EVERY["normal-map"], "wgsl"))  # what is denied keeps them

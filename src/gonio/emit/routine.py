@@ -261,7 +261,7 @@ class RoutineWriter:
         """The text of a statement's value."""
         text = self.expression(value, root=True)[0]
         if self.language.templates and value.op in ("lt", "le", "and", "or") and "," not in text:
-            text = re.sub(r"(?<!\w)\(([\w.]+ <=? [\w.]+)\)", r"\1", text)  # nothing here can be read as a template
+            text = re.sub(r"(?<![\w!])\(([\w.]+ <=? [\w.]+)\)", r"\1", text)  # nothing here can be read as a template
         return text
 
     def part(self, value: Value, level: int, strict: bool = False) -> str:
