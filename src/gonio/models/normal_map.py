@@ -8,16 +8,14 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from .. import ops
-from ..ops import Direction, Mode, Scalar, Spectrum, dot, function, maximum, minimum, safe_div, sqr, vec3, where
+from ..ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
 from .calling import method
 from .material import BSDF, Breach, Delta
-from .mix import ALMOST_ONE
 from .parameters import Number, bsdf, number
 from .sample import Sample
 
 STEEPEST = 20.0  # lean of a normal to which a map's are held, 87 degrees
-LEAST = 0.01  # cosine under which a leaning glass is not seen, unless the surface is
-DIGITS = 4096.0  # of the number that picks a lobe, the digits behind decide on masking
+LEAST = 0.01  # cosine under which a leaning surface is not seen, unless the level one is
 
 
 class _Frame(NamedTuple):
@@ -39,20 +37,16 @@ class _Frame(NamedTuple):
 class NormalMap(BSDF):
     """A base whose normal leans: n' = (lean_x, lean_y, 1), normalized. In scenes an image of normals, `"normalmap"`.
 
-    Over a base that reflects the surface is one of facets (Schuessler2017): with n' lies the base, and a vertical
-    mirror, turned away from it, closes the surface, so that its mean normal is the surface's. A view that meets the
-    mirror goes on to the base, light that leaves toward it is reflected there: nothing turns black where light grazes,
-    and no light is made. With areas a = (w.n') / n'.n and (w.t) sin / n'.n of the two as w sees them, 0 from behind,
+    f cos theta_i = b(o, i) + b(o, -i), b the base's value in the leaning frame, -i the direction below i
 
-    f cos theta_i = p(o) s(o, i) + (1 - p(o)) s(o', i)
-    s(o, i) = b(o, i) G(i) + b(o, i') (1 - G(i')) + b(o, -i)
-    p = a_base / (a_base + a_mirror),  G = min(1, cos theta / (a_base + a_mirror)),  w' mirrored at t
+    Two things make a leaning normal turn black where light grazes, and both are mended. A view that would see the
+    base from behind bends n' toward itself, as little as is needed (Keller2017 does so for the mirrored view). And
+    light that the base sends below the surface, half of 1 - n'.n of matt white, is sent up again, as neighbours
+    would: so a white base is white however it leans, and no light is made. A base that transmits keeps the bending;
+    what leaves it on the wrong side is lost. Not reciprocal, as the view bends the normal. Polarization is lost.
 
-    b is the base's value in the leaning frame, -i the direction below i. The paper lets go of what meets the mirror
-    twice and of what the base sends below the surface, half of 1 - n'.n of matt white; here neighbours send that up
-    again, so that a white base is white however it leans. A base that transmits is seen in the leaning frame itself,
-    which is bent toward the view where that would lie behind it; what leaves on the wrong side is lost. Not reciprocal.
-    Polarization is lost.
+    A surface of two facets (Schuessler2017) conserves light too, yet with a mirror as the second facet matt bumps
+    vanish: seen from above, they are n'.n cos theta_i bright whichever way they lean.
     """
 
     base: BSDF = bsdf("the material")
@@ -61,7 +55,7 @@ class NormalMap(BSDF):
 
     breaks: ClassVar[Mapping[str, Breach]] = {
         "reciprocity": Breach(
-            "what leaves toward the mirror is reflected whole, what comes from there in parts",
+            "the view bends the normal, and what is sent below the surface goes up again",
             lambda model: 2.0 if model.leans else 0.0,
             certain=False,
         ),
@@ -85,103 +79,46 @@ class NormalMap(BSDF):
         x = x * ops.rsqrt((1.0 + sqr(b)) * (1.0 + sqr(a) + sqr(b)))
         return _Frame(x, vec3(n.y * x.z - n.z * x.y, n.z * x.x - n.x * x.z, n.x * x.y - n.y * x.x), n)
 
-    @function
-    def _mirrored(self, w: Direction, n: Direction) -> Direction:
-        """w' at the vertical facet, whose normal is against n's lean; w itself where nothing leans."""
-        sin2 = sqr(n.x) + sqr(n.y)
-        level = w.x * n.x + w.y * n.y
-        along = 2.0 * level * where(sin2 > 1e-12, safe_div(1.0, sin2), 0.0)
-        return vec3(w.x - along * n.x, w.y - along * n.y, w.z)
-
-    def _areas(self, w: Direction, n: Direction) -> tuple[Scalar, Scalar]:
-        """What w sees of base and mirror, over the surface's area; both over n'.n less."""
-        level = w.x * n.x + w.y * n.y
-        return maximum(dot(w, n), 0.0), maximum(-level, 0.0)
-
-    @function
-    def _base_share(self, w: Direction, n: Direction) -> Scalar:
-        """p."""
-        base, mirror = self._areas(w, n)
-        return where(base > 0.0, safe_div(base, base + mirror), 0.0 * base)
-
-    @function
-    def _unmasked(self, w: Direction, n: Direction) -> Scalar:
-        """G; 0 below the surface."""
-        base, mirror = self._areas(w, n)
-        return minimum(safe_div(maximum(w.z, 0.0) * n.z, base + mirror), 1.0)
-
     # ------------------------------------------------------------------ formulas
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The three ways of the light, or the base in the bent frame."""
+        """The base in the bent frame, and what it sends below."""
+        frame, valid = self._bent(wo)
+        o, i = frame.local(wo), frame.local(wi)
+        value = self.base.eval(o, i, mode)
         if self.base.transmits:
-            frame, valid = self._bent(wo)
-            o, i = frame.local(wo), frame.local(wi)
-            return self.base.eval(o, i, mode) * where(valid & (i.z * wi.z > 0.0), 1.0, 0.0)
-        n = self._normal()
-        frame = self._frame(n)
-        share, again = self._base_share(wo, n), self._mirrored(wi, n)
-        covered = 1.0 - self._unmasked(again, n)
-
-        def seen(o: Direction) -> Spectrum:
-            straight = self.base.eval(o, frame.local(wi), mode) * self._unmasked(wi, n)
-            masked = self.base.eval(o, frame.local(again), mode) * covered
-            return straight + masked + self.base.eval(o, frame.local(_turned(wi)), mode)
-
-        value = seen(frame.local(wo)) * share + seen(frame.local(self._mirrored(wo, n))) * (1.0 - share)
+            return where(valid & (i.z * wi.z > 0.0), value, 0.0)
+        value = value + self.base.eval(o, frame.local(_turned(wi)), mode)
         return where((wo.z > 0.0) & (wi.z > 0.0), value, 0.0)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The same ways with the base's density."""
+        """The base's, likewise."""
+        frame, valid = self._bent(wo)
+        o, i = frame.local(wo), frame.local(wi)
+        density = self.base.pdf(o, i)
         if self.base.transmits:
-            frame, valid = self._bent(wo)
-            o, i = frame.local(wo), frame.local(wi)
-            return where(valid & (i.z * wi.z > 0.0), self.base.pdf(o, i), 0.0)
-        n = self._normal()
-        frame = self._frame(n)
-        share, again = self._base_share(wo, n), self._mirrored(wi, n)
-        covered = 1.0 - self._unmasked(again, n)
-
-        def seen(o: Direction) -> Scalar:
-            straight = self.base.pdf(o, frame.local(wi)) * self._unmasked(wi, n)
-            masked = self.base.pdf(o, frame.local(again)) * covered
-            return straight + masked + self.base.pdf(o, frame.local(_turned(wi)))
-
-        density = share * seen(frame.local(wo)) + (1.0 - share) * seen(frame.local(self._mirrored(wo, n)))
+            return where(valid & (i.z * wi.z > 0.0), density, 0.0)
+        density = density + self.base.pdf(o, frame.local(_turned(wi)))
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """u1 picks what wo sees, and its last digits whether what the base sends out is masked."""
+        """The base's sample, turned up where it points down."""
+        frame, valid = self._bent(wo)
+        s = self.base.sample(frame.local(wo), u, mode)
+        wi = frame.back(s.wi)
+        found = valid & (s.pdf > 0.0)
         if self.base.transmits:
-            frame, valid = self._bent(wo)
-            s = self.base.sample(frame.local(wo), u, mode)
-            wi = frame.back(s.wi)
-            valid = valid & (wi.z * s.wi.z > 0.0) & (s.pdf > 0.0)
-            return Sample(wi, where(valid, s.weight, 0.0), where(valid, s.pdf, 0.0), s.delta & valid, s.eta)
-        n = self._normal()
-        frame, share = self._frame(n), self._base_share(wo, n)
-        straight = u.x < share
-        rest = where(straight, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
-        rest = minimum(maximum(rest, 0.0), ALMOST_ONE)
-        digits = rest * DIGITS
-        digits = digits - ops.floor(digits)
-        start = where(straight, wo, self._mirrored(wo, n))
-        s = self.base.sample(frame.local(start), vec3(rest, u.y, u.z), mode)
-        sent = frame.back(s.wi)
-        clear = self._unmasked(sent, n)
-        below = sent.z < 0.0
-        masked = ~below & ~(digits < clear)
-        wi = where(below, _turned(sent), where(masked, self._mirrored(sent, n), sent))
-        valid = (wo.z > 0.0) & (wi.z > 0.0) & (s.pdf > 0.0)
-        chance = where(straight, share, 1.0 - share) * where(below, 1.0, where(masked, 1.0 - clear, clear))
+            found = found & (wi.z * s.wi.z > 0.0)
+            return Sample(wi, where(found, s.weight, 0.0), where(found, s.pdf, 0.0), s.delta & found, s.eta)
+        wi = where(wi.z < 0.0, _turned(wi), wi)
+        found = found & (wo.z > 0.0)
         density = self.pdf(wo, wi)
-        pdf = where(valid, where(s.delta, chance * s.pdf, density), 0.0)
         smooth = self.eval(wo, wi, mode) * safe_div(1.0, density)
-        weight = where(pdf > 0.0, where(s.delta, s.weight, smooth), 0.0)
-        return Sample(wi, weight, pdf, s.delta & (pdf > 0.0), s.eta)
+        weight = where(found, where(s.delta, s.weight, smooth), 0.0)
+        return Sample(wi, weight, where(found, where(s.delta, s.pdf, density), 0.0), s.delta & found, s.eta)
 
     def _bent(self, wo: Direction) -> tuple[_Frame, ops.Mask]:
         """The leaning frame, bent until wo lies on its own side; whether it does."""
@@ -196,9 +133,8 @@ class NormalMap(BSDF):
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base's, as wo sees it."""
-        n = self._normal()
-        seen = where(dot(wo, n) * wo.z > 0.0, wo, self._mirrored(wo, n))
-        return self.base.tint(self._frame(n).local(seen))
+        frame, _ = self._bent(wo)
+        return self.base.tint(frame.local(wo))
 
     @property
     def leans(self) -> bool:
