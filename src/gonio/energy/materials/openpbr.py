@@ -233,6 +233,9 @@ class OpenPBR(BSDF):
             lambda model: 4.0 if model._has("fuzz_weight") or model._by_albedo() else 0.0,
             certain=False,
         ),
+        "linearity": Breach(
+            "colours of layers multiply, and light that bounces takes them more than once", 10.0, certain=False
+        ),
     }
 
     def __post_init__(self) -> None:

@@ -131,4 +131,10 @@ def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> boo
     if not np.array_equal(first, second) or not np.any(first > 0.0):
         return False
     u = directions.numbers(np.random.default_rng(17), len(wo))  # it may belong to a delta lobe, which has no value
-    return bool(np.array_equal(low.sample(wo, u).weight, high.sample(wo, u).weight))
+    if not np.array_equal(low.sample(wo, u).weight, high.sample(wo, u).weight):
+        return False
+    # it may belong to a part of which there is none: then where there is half of everything
+    known = subject.parameters.items()
+    shares = {path: getattr(subject.model, path) for path, one in known if one.high == 1.0 and not one.inside}
+    some = {path: 0.5 for path, value in shares.items() if isinstance(value, int | float) and value == 0.0}
+    return not some or _is_dead(subject.replace(**some), name, wo, wi)
