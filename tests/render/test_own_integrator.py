@@ -95,7 +95,7 @@ def test_a_registered_integrator_renders_by_the_scenes_word_and_by_the_options(
 
 
 def test_an_integrator_that_is_not_there_is_one_clear_error(scene: Path) -> None:
-    with pytest.raises(InputError, match=r"(?s)unknown type 'occlusion'.*known: direct"):
+    with pytest.raises(InputError, match=r"(?s)unknown type 'occlusion'.*known: caustics, direct"):
         run.prepare(run.Request(scene))
     scene.write_text(json.dumps({**SCENE, "integrator": {"type": "normal"}}))
     with pytest.raises(InputError, match=r"(?s)--integrator: unknown integrator 'whited'.*did you mean 'whitted'"):
