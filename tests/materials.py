@@ -50,7 +50,6 @@ NESTED = {
     "mix-with-glass": go.mix(go.Dielectric(1.4, 0.3), go.Lambert(0.5), 0.4),
     "opacity": go.model("opacity")(go.Dielectric(1.5, 0.3), 0.7),
     "normal-map": go.model("normal-map")(go.Conductor.preset("Au", alpha=0.3), 0.4, -0.2),
-    "openpbr": go.OpenPBR(base_color=(0.8, 0.5, 0.2), base_metalness=0.3, specular_roughness=0.5, coat_weight=0.6),
     "two-sided": go.two_sided(go.Conductor.preset("Fe", alpha=(0.2, 0.5), rotation=0.4)),
 }
 
