@@ -73,12 +73,14 @@ class PhotonMap:
         found = []
         for photon, there in zip(photons, kept, strict=True):
             cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photon.position]
-            values = photon.packed()
+            # all as many as there are particles: what stands for all alike is one number, which would be joined as one
+            values = [value + dr.zeros(mi.Float, dr.width(photon.position)) for value in photon.packed()]
             there = there & dr.isfinite(sum(values[1:], values[0]))
             key = dr.select(there, self._row(cell[1], cell[2]) + self._along(cell[0]), self.keys)
             found.append([key, *values])
         dr.eval(found)
         keys, *values = [dr.concat(list(parts)) for parts in zip(*found, strict=True)]
+        assert {dr.width(one) for one in (keys, *values)} == {total}
         # The key above the number: their order is one of whole numbers, and the same whoever sorts.
         words = (np.array(keys, np.uint64) << np.uint64(32)) | np.arange(total, dtype=np.uint64)
         words = words[words < np.uint64(self.keys) << np.uint64(32)]

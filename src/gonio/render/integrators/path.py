@@ -8,8 +8,8 @@ from ..lights import is_sphere
 from .base import Settings
 from .transport import Transport
 
-# A lamp that mirrors and smooth glass see under less than so many steradians is seldom met by chance behind them: paths
-# of examples/glass-caustic (.008) have 100 times the error of particles, those of a lamp of .1 about the same.
+# A lamp that mirrors and smooth glass see under less than so many steradians is seldom met by chance behind them: in
+# examples/glass-caustic it is .008.
 SMALL = 0.03
 
 
