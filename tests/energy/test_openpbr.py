@@ -33,7 +33,13 @@ EVERYTHING = {
 
 @pytest.mark.parametrize(
     "name",
-    ["metal, coat", "rough diffuse, coat", "diffuse, rough coat", "a mix of all, fuzz", "thin wall, half a coat"],
+    [
+        "metal, coat",
+        pytest.param("rough diffuse, coat", marks=pytest.mark.slow),
+        pytest.param("diffuse, rough coat", marks=pytest.mark.slow),
+        pytest.param("a mix of all, fuzz", marks=pytest.mark.slow),
+        pytest.param("thin wall, half a coat", marks=pytest.mark.slow),
+    ],
 )
 def test_a_white_material_keeps_all_light(name: str) -> None:
     model = go.OpenPBR(base_color=1.0, specular_roughness=0.4, **benchmark.furnaces()[name])
@@ -53,6 +59,7 @@ def test_every_furnace_of_the_specification_keeps_all_light(name: str, roughness
     assert np.all((found.value > least - 4 * found.error) & (found.value < most + 4 * found.error)), found.value
 
 
+@pytest.mark.slow
 def test_all_layers_together_are_reciprocal() -> None:
     model = go.OpenPBR(**EVERYTHING)
     forth, back = model.f(WO, WI, precision="float64"), model.f(WI, WO, precision="float64")
@@ -70,6 +77,7 @@ def test_light_through_glass_is_reciprocal() -> None:
     np.testing.assert_allclose(forth[lit] / 1.5**2, back[lit], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_thin_wall_looks_alike_from_both_sides() -> None:
     model = go.OpenPBR(geometry_thin_walled=True, transmission_weight=0.5, subsurface_weight=0.5, fuzz_weight=0.3)
     np.testing.assert_array_equal(model.eval(WO, WI), model.eval(-WO, -WI))
@@ -127,6 +135,7 @@ def test_holes_let_light_go_straight_on() -> None:
     np.testing.assert_allclose(model.eval(WO, WI), 0.3 * go.OpenPBR().eval(WO, WI), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_film_colours_what_is_reflected_and_its_opposite_what_goes_through() -> None:
     model = go.OpenPBR(thin_film_weight=1.0, thin_film_ior=2.0, transmission_weight=1.0, specular_roughness=0.1)
     back = go.albedo(model, mu=[0.9], method="sampling", samples=1 << 14).value[0]
@@ -146,6 +155,7 @@ def test_a_coat_of_depth_tints_more_where_light_grazes() -> None:
     np.testing.assert_allclose(left, np.array([0.5, 0.7, 0.9]) ** (0.5 * ways), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_textures_of_any_parameter_give_what_each_value_gives_alone() -> None:
     rng, count = np.random.default_rng(3), 4
     values = {"coat_weight": rng.random(count), "specular_roughness": rng.uniform(0.2, 1.0, count)}
@@ -155,6 +165,7 @@ def test_textures_of_any_parameter_give_what_each_value_gives_alone() -> None:
         np.testing.assert_allclose(together[n : n + 1], one.eval(WO[n : n + 1], WI[n : n + 1], precision="float64"))
 
 
+@pytest.mark.slow
 def test_the_verifier_finds_its_samples_in_its_density() -> None:
     report = verify(go.OpenPBR(**EVERYTHING), quick=True, law=["pdf", "weight", "positivity"], seed=3)
     assert report.passed, str(report)

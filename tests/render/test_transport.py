@@ -90,12 +90,15 @@ def sigmas(a: np.ndarray, b: np.ndarray, side: int = 4) -> float:
     return float((abs(a.mean(0) - b.mean(0)) / error).max())
 
 
-@pytest.mark.parametrize("lamp", LAMPS)
+@pytest.mark.parametrize(
+    "lamp", [n if k == 0 else pytest.param(n, marks=pytest.mark.slow) for k, n in enumerate(LAMPS)]
+)
 def test_particles_make_the_picture_of_paths(lamp: str) -> None:
     drawn = scene(LAMPS[lamp], GREY)
     assert sigmas(pictures(drawn, "path", 64), pictures(drawn, "light", 256)) < 6
 
 
+@pytest.mark.slow
 def test_particles_see_bent_normals_and_rough_glass_as_paths_do() -> None:
     rough = {"type": "roughdielectric", "alpha": 0.5, "distribution": "ggx"}
     other = {"type": "sphere", "center": [0.9, 0, 0.3], "radius": 0.4, "bsdf": BUMPY}
@@ -135,7 +138,7 @@ def test_caustics_of_a_point_which_no_path_finds_are_those_of_particles() -> Non
     assert caustics[shadow].mean() == pytest.approx(light[shadow].mean(), rel=0.02)
 
 
-@pytest.mark.parametrize("name", ["light", "caustics"])
+@pytest.mark.parametrize("name", [pytest.param("light", marks=pytest.mark.slow), "caustics"])
 def test_passes_states_and_threads_change_no_bit(name: str) -> None:
     drawn = scene(LAMPS["ball, point and sky"], GLASS, mirror=MIRROR, size=16)
     settings = Settings(name, 6, seed=5)
@@ -165,6 +168,7 @@ def test_passes_states_and_threads_change_no_bit(name: str) -> None:
     assert not np.array_equal(whole, pictures(drawn, name, 11, 1, 6)[0])
 
 
+@pytest.mark.slow
 def test_parts_of_a_picture_of_caustics_are_those_of_the_whole() -> None:
     drawn = scene({"lamp": LAMP}, GLASS, size=16)
     whole, part = Render(drawn, Settings("caustics", 6)), Render(drawn, Settings("caustics", 6))
@@ -186,7 +190,10 @@ def odd_sky(pixels: np.ndarray) -> dict:
     return {"lamp": {"type": "envmap", "bitmap": mi.Bitmap(pixels.astype(np.float32))}}
 
 
-@pytest.mark.parametrize("name", ["path", "light", "caustics", "direct"])
+@pytest.mark.parametrize(
+    "name",
+    ["path", "light", pytest.param("caustics", marks=pytest.mark.slow), pytest.param("direct", marks=pytest.mark.slow)],
+)
 def test_odd_lamps_give_a_picture_without_a_hole(name: str) -> None:
     sun = np.full((8, 16, 3), 0.1)
     sun[2, 3] = 1e6
