@@ -311,4 +311,13 @@ def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None
 def test_comparisons_of_wgsl_have_parentheses_only_where_a_template_could_be_read() -> None:
     text = go.emit(GOLD, "wgsl")
     assert "let is_smooth = material.alpha.x < SMOOTH && material.alpha.y < SMOOTH;" in text
-    assert not re.search(r"!\w+ <", go.emit(EVERY["normal-map"], "wgsl"))  # what is denied keeps them
+
+    class Leaning(go.BSDF):
+        """A grey surface for light that is not above the view, both on the upper side."""
+
+        def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
+            """|cos theta_i| / pi."""
+            lit = (wo.z > 0.0) & ~(wo.z < wi.z)
+            return ops.where(lit, ops.abs(wi.z) * ops.inv_pi, 0.0)
+
+    assert "!(wo.z < wi.z)" in bundle(Leaning(), "wgsl", ("eval",)).text  # what is denied keeps them
