@@ -132,7 +132,7 @@ def float_of(value: object, kind: Types) -> Array:
     return kind.float(aligned(array, np.float64 if kind.float.__name__.endswith("64") else np.float32))
 
 
-def aligned(array: np.ndarray, dtype: type[np.floating]) -> np.ndarray:
+def aligned(array: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
     """A copy at an address that is a multiple of 64.
 
     Dr.Jit takes NumPy's memory as it lies and writes its alignment into the kernel: arrays that NumPy puts now here,

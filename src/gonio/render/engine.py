@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from .. import llvm
 from ..errors import InputError, MachineError
+from ..ops import backend
 from ..owner import COMPUTING, alone
 from .types import OfVariant
 
@@ -142,11 +144,13 @@ def file_threads() -> Iterator[None]:
 def own(kind: OfVariant, values: NDArray[Any]) -> OfVariant:
     """An array of Dr.Jit's with these values, in memory of its own.
 
-    It would take NumPy's as it is, and compile another kernel where that is not aligned. Times one, which keeps every
-    bit, also the sign of a zero.
+    It would take NumPy's as it is, and compile another kernel where that is not aligned (which chance decides). Times
+    one, which keeps every bit, also the sign of a zero.
     """
     import drjit as dr
 
+    if isinstance(values, np.ndarray):
+        values = backend.aligned(values, values.dtype.type)
     copied = kind(values) * dr.opaque(kind, 1)
     dr.eval(copied)
     dr.sync_thread()  # while NumPy's memory is there

@@ -59,8 +59,7 @@ class Render:
         self.done = 0
         self._lanes: UInt | None = None  # samples of each lane, where some are ahead of `done`
         self._order = _tiles(self.width, self.height)
-        self._pixel = mi.UInt32(self._order)
-        dr.make_opaque(self._pixel)
+        self._pixel = engine.own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
         self._sums = Sums.zeros(mi, NOTHING, 6 if aovs else self.features, self._splatted)
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
@@ -123,13 +122,11 @@ class Render:
         self._sums = Sums.of_arrays(self.mi, state, len(self._pixel), like=self._sums)
         self.done, self._lanes = done, None
         if LANES in state and np.any(state[LANES] != done):
-            self._lanes = self.mi.UInt32(np.array(state[LANES]))
-            dr.make_opaque(self._lanes)
+            self._lanes = engine.own(self.mi.UInt32, state[LANES])
 
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
-        self._pixel = self.mi.UInt32(np.array(self._order[lanes]))
-        dr.make_opaque(self._pixel)
+        self._pixel = engine.own(self.mi.UInt32, self._order[lanes])
         self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.near) - 3, self._splatted)
         self.done, self._lanes = 0, None
 
