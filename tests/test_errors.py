@@ -12,6 +12,11 @@ def test_message_has_place_then_fault_then_hint() -> None:
     assert str(error) == "scene.json /a/b: 3 given, 4 expected\n  hint: give 4"
 
 
+def test_a_number_that_fills_the_screen_is_cut() -> None:
+    told = str(go.InputError(f"spp is {10**400}, expected at most {2**31}", "--spp"))
+    assert told == "--spp: spp is 10000000000000000000... (401 digits), expected at most 2147483648"
+
+
 def test_message_without_place_or_hint_is_the_fault_alone() -> None:
     assert str(go.GonioError("disk full")) == "disk full"
     assert str(go.GonioError("disk full", hint="free some")) == "disk full\n  hint: free some"

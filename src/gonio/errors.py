@@ -6,10 +6,18 @@ exits with `code`, Python users catch one class.
 
 from __future__ import annotations
 
+import re
+
+_ENDLESS = re.compile(r"\d{50,}")  # far beyond the 17 that a double keeps
+
 
 def printable(text: str) -> str:
-    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes."""
-    return text.encode("utf-8", "backslashreplace").decode()
+    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes.
+
+    Of a number that fills the screen its beginning is left.
+    """
+    readable = text.encode("utf-8", "backslashreplace").decode()
+    return _ENDLESS.sub(lambda number: f"{number[0][:20]}... ({len(number[0])} digits)", readable)
 
 
 class GonioError(Exception):

@@ -16,7 +16,7 @@ from gonio.render import bench, engine
 def test_the_table_has_rays_a_material_and_integrators_beside_mitsubas(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name, value in (("LANES", 256), ("SIZE", 16), ("SPP", 1), ("ROUNDS", 1)):
+    for name, value in (("LANES", {"llvm": 256}), ("SIZE", {"llvm": 16}), ("SPP", 1), ("ROUNDS", 1)):
         monkeypatch.setattr(bench, name, value)
     with pytest.raises(SystemExit) as caught:
         cli.main(["doctor", "--bench", "--device", "cpu", "--json"])

@@ -12,7 +12,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import GonioWarning, InputError
-from gonio.render import checkpoints, images, passes, run
+from gonio.render import checkpoints, engine, images, passes, run
 from gonio.work import facts, kept
 
 
@@ -136,7 +136,8 @@ def test_what_has_changed_is_refused_by_name(scene: Path, tmp_path: Path, monkey
         other.setattr(facts, "__version__", "9.9")
         refused("version: the checkpoint was made with gonio .*, this is gonio 9.9")
     with monkeypatch.context() as other:
-        other.setattr(facts, "_vectors", lambda: "abacus")
+        other.setattr(facts, "_vectors", lambda: "abacus")  # what says which processor it is,
+        other.setattr(engine, "cuda_device", lambda: "abacus")  # or which GPU
         refused("device: .* abacus")
     with pytest.raises(InputError, match=r"settings: .*seed 0.*, this is .*seed 8"):
         go.render(scene, spp=4, seed=8, checkpoint=tmp_path / "c")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.render import engine, lights
-from gonio.render.integrators import Integrator, Render, Settings
+from gonio.render.integrators import Integrator, Render, Settings, progressive
 from gonio.render.integrators.base import SAMPLERS
 
 mi = engine.load()
@@ -314,6 +315,28 @@ def test_changed_values_recompile_nothing() -> None:
         last = images[0]
     assert launched(lambda: picture(scene, 3, seed=77)) == 0
     assert launched(lambda: picture(scene, 17, max_depth=7)) == 0
+
+
+def test_where_numpy_puts_an_array_recompiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def placed(offset: int) -> Callable[[int, int], np.ndarray]:
+        def tiles(width: int, height: int) -> np.ndarray:
+            count = width * height
+            raw = np.empty(4 * count + 128, np.uint8)
+            start = -raw.ctypes.data % 64 + offset
+            lanes = raw[start : start + 4 * count].view(np.uint32)
+            lanes[:] = np.arange(count)
+            return lanes
+
+        return tiles
+
+    scene = mi.load_dict(scene_dict())
+    monkeypatch.setattr(progressive, "_tiles", placed(0))
+    for _ in range(2):
+        aligned = picture(scene, 2)
+    monkeypatch.setattr(progressive, "_tiles", placed(4))
+    images: list[np.ndarray] = []
+    assert launched(lambda: images.append(picture(scene, 2))) == 0
+    assert np.array_equal(images[0], aligned)
 
 
 def test_the_recompilation_test_would_see_a_new_kernel() -> None:

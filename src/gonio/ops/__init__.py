@@ -26,7 +26,7 @@ from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Val
 __all__ = [
     "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum",
     "Table", "Vector", "Vector3", "abs", "atan2", "channels", "clamp", "copysign", "cos", "dot", "erf", "exp",
-    "fetch", "floor", "fma", "function", "get_precision", "inset", "is_short", "is_single", "isfinite", "log",
+    "fetch", "floor", "fma", "function", "get_precision", "inset", "inv_pi", "is_short", "is_single", "isfinite", "log",
     "lookup", "max_component", "maximum", "mean", "minimum", "norm", "normalize", "of_channels", "pi", "pow",
     "record", "rsqrt", "safe_div", "safe_sqrt", "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3",
     "where",

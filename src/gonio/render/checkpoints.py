@@ -24,6 +24,7 @@ from ..errors import GonioError, InputError
 from ..models import BSDF, notation
 from ..work import facts, garbage, kept
 from ..work.kept import Arrays, Facts
+from . import engine
 from .passes import Progress, Renders
 from .request import Request
 
@@ -74,7 +75,7 @@ def _hash(content: bytes) -> str:
 def _device(mi: ModuleType) -> str:
     """What computes: another compiler or another processor may round otherwise."""
     variant = str(mi.variant())
-    return f"{variant}, {facts.processor()}" if variant.startswith("llvm") else variant
+    return f"{variant}, {facts.processor() if variant.startswith('llvm') else engine.cuda_device()}"
 
 
 # ---------------------------------------------------------------------- a request as JSON

@@ -22,17 +22,27 @@ from .types import OfVariant
 DEVICES = ("auto", "cpu", "cuda")
 
 
-def cuda_available() -> bool:
-    """Whether an NVIDIA driver with at least one device answers (asked without starting Dr.Jit)."""
+def _driver() -> ctypes.CDLL | None:
+    """NVIDIA's, where it is installed and answers (asked without starting Dr.Jit)."""
     for name in ("libcuda.so.1", "nvcuda.dll"):
-        try:
+        with contextlib.suppress(OSError):
             driver = ctypes.CDLL(name)
-            count = ctypes.c_int(0)
-            if driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0:
-                return count.value > 0
-        except OSError:
-            continue
-    return False
+            return driver if driver.cuInit(0) == 0 else None
+    return None
+
+
+def cuda_available() -> bool:
+    """Whether an NVIDIA driver with at least one device answers."""
+    driver, count = _driver(), ctypes.c_int(0)
+    return driver is not None and driver.cuDeviceGetCount(ctypes.byref(count)) == 0 and count.value > 0
+
+
+def cuda_device() -> str:
+    """Name of the first device and the driver's CUDA, "none" where there is none."""
+    driver, name, version = _driver(), ctypes.create_string_buffer(256), ctypes.c_int(0)
+    if driver is None or driver.cuDeviceGetName(name, len(name), 0) or driver.cuDriverGetVersion(ctypes.byref(version)):
+        return "none"
+    return f"{name.value.decode(errors='replace')}, CUDA {version.value // 1000}.{version.value % 1000 // 10}"
 
 
 def variant_for(device: str = "cpu", spectral: bool = False) -> str:
