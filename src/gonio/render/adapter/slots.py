@@ -104,6 +104,11 @@ class Slot:
                 self.values[name] = colour
                 return np.broadcast_to(np.asarray(colour).ravel(), 3)
         self.textures[name] = texture
+        span = getattr(texture, "span", None)  # one of ours knows its own
+        if span is not None:
+            for plain in span:
+                self.parameter.check(plain if self.parameter.kind == "spectrum" else float(plain[0]), self.where)
+            return span if self.parameter.kind == "spectrum" else span[:, 0]
         span = np.array([max(self.parameter.low, 0.0), min(self.parameter.high, 1.0)])
         return np.tile(span[:, None], 3) if self.parameter.kind == "spectrum" else span
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,11 @@ from .materials import BY_TYPE, MaterialPart, Value, numbers_in
 from .text import pointer
 from .values import BumpMap, ImageTexture, NormalMap
 
+if TYPE_CHECKING:
+    from .by_shape import Group
+
+MANY = 64  # from so many materials of one structure on one stands for them
+
 # Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
 # format's +y, +z, +x: u about y from z toward x, v from +y.
 _SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -30,7 +36,7 @@ def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
 
     Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
     """
-    return built(description, mi).scene
+    return _Builder(description, mi, gathers=True).scene()
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,8 @@ def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:
 
 
 class _Builder:
-    def __init__(self, description: schema.SceneDescription, mi: ModuleType) -> None:
+    def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> None:
+        """`gathers`: where very many materials differ in numbers alone, one stands for them."""
         from .. import adapter, lights  # here, since they start Dr.Jit
 
         adapter.register(mi)
@@ -67,9 +74,13 @@ class _Builder:
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
+        self.gathers = gathers and mi.variant().endswith("rgb")  # spectra are upsampled one by one
+        self.gathered: dict[MaterialPart, tuple[MitsubaBSDF, Group, int]] = {}
 
     def scene(self) -> Scene:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
+        if self.gathers:
+            self.gather()
         shapes: PluginDict = {"type": "merge"}
         for index, shape in enumerate(self.description.shapes):
             part = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
@@ -83,7 +94,12 @@ class _Builder:
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
         for index, one in enumerate(sorted(merged if isinstance(merged, list) else [merged], key=_order)):
             scene[one.id() or f"merged{index}"] = one
-        return self.load(scene, "/scene", optimize=False)
+        found = self.load(scene, "/scene", optimize=False)
+        if self.gathered:
+            from . import by_shape
+
+            by_shape.bind(self.mi, found, {id(group): group for _, group, _ in self.gathered.values()}.values())
+        return found
 
     def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
         """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
@@ -151,15 +167,20 @@ class _Builder:
         self, shape: schema.Shape, where: str, name: str, emitter: PluginDict | None = None
     ) -> Plugin | PluginDict:
         matrix = shape.transform.matrix()
-        bsdf = self.bsdf(shape.material or BY_TYPE["matte"](type="matte"), f"{where}/material")
+        material = shape.material or BY_TYPE["matte"](type="matte")
         # An object, not a dict: Mitsuba merges equal dicts, and one emitter cannot belong to two shapes.
         source = None if emitter is None else self.load(emitter, where)
         native = self.native_shape(shape, matrix)
+        if native is not None and material in self.gathered:
+            native["bsdf"], group, row = self.gathered[material]
+            group.shapes[name] = row
+        elif native is not None:
+            native["bsdf"] = self.bsdf(material, f"{where}/material")
         if native is not None:
-            native["bsdf"] = bsdf
             if source is not None:
                 native["emitter"] = source
             return native
+        bsdf = self.bsdf(material, f"{where}/material")
         return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
 
     def native_shape(self, shape: schema.Shape, matrix: np.ndarray) -> PluginDict | None:
@@ -200,6 +221,38 @@ class _Builder:
             self.bsdfs[material] = self.load(self.plugin(material, where), where)
         return self.bsdfs[material]
 
+    def gather(self) -> None:
+        """Put one BSDF in the place of those of spheres and parallelograms that differ in numbers alone.
+
+        Not of meshes: Mitsuba makes one shape of those that share a BSDF.
+        """
+        places: dict[MaterialPart, str] = {}
+        for index, shape in enumerate(self.description.shapes):
+            if shape.material is not None and isinstance(shape, (schema.Sphere, schema.Parallelogram)):
+                places.setdefault(shape.material, pointer("scene", "shapes", index, "material"))
+        if len(places) < MANY:
+            return
+        from . import by_shape
+
+        groups: dict[Hashable, tuple[Group, list[MaterialPart]]] = {}
+        for material, where in places.items():
+            plugin = self.plugin(material, where)
+            kind = by_shape.structure(plugin)
+            if kind is not None:
+                group, members = groups.setdefault(kind, (by_shape.Group(plugin), []))
+                group.rows.append(dict(by_shape.properties(plugin)))
+                members.append(material)
+        for group, members in groups.values():
+            if len(members) < MANY:
+                continue
+            try:
+                bsdf = self.load(group.plugin(self.mi), places[members[0]])
+            except InputError:
+                continue  # it takes no textures, or one of them is wrong: said where it stands alone
+            if bsdf.placed.model.transmits and bsdf.placed.model.interior is not None:
+                continue  # light asks for its index and absorption elsewhere than on its shape
+            self.gathered |= {member: (bsdf, group, row) for row, member in enumerate(members)}
+
     def plugin(self, material: MaterialPart, where: str) -> PluginDict:
         """The material as a Mitsuba dict."""
         plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
@@ -236,7 +289,7 @@ class _Builder:
             if value.mean:
                 return {"type": "rgb", "value": [float(x) for x in np.broadcast_to(pixels.mean((0, 1)), 3)]}
             return textures.bitmap(self.mi, np.broadcast_to(pixels, (*pixels.shape[:2], 3)), value.filter, value.wrap)
-        numbers = list(numbers_in(value))
+        numbers = [*numbers_in(value)]
         return {"type": "rgb", "value": numbers if len(numbers) == 3 else numbers * 3}
 
     def scalar(self, value: Value, parameter: Parameter, where: str, squared: bool) -> float | PluginDict:
@@ -247,7 +300,7 @@ class _Builder:
             if value.mean:
                 return float(pixels.mean(dtype=np.float64))
             return textures.bitmap(self.mi, pixels, value.filter, value.wrap)
-        number = next(numbers_in(value))
+        (number,) = numbers_in(value)
         return number**2 if squared else number
 
     def normal_mapped(self, plugin: PluginDict, texture: NormalMap, where: str) -> PluginDict:

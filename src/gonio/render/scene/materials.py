@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import (
@@ -244,13 +244,13 @@ _KINDS: dict[str, Any] = {
 }
 
 
-def numbers_in(value: object) -> Iterator[float]:
+def numbers_in(value: object) -> tuple[float, ...]:
     """The plain numbers of a value: itself, a colour's channels, a pair's widths."""
     if isinstance(value, (list, tuple)):
-        for item in value:
-            yield from numbers_in(item)
-    elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        yield float(value)
+        return tuple(number for item in value for number in numbers_in(item))
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return (float(value),)
+    return ()
 
 
 def _items(value: Value) -> tuple[Value, ...]:

@@ -120,13 +120,18 @@ def parts(part: Part) -> Iterator[tuple[str, Part]]:
         yield steps, part
         below: list[tuple[str, Part]] = []
         for name, value in part.__dict__.items():
+            if type(value) in _LEAVES:
+                continue
             if isinstance(value, Part):
                 below.append((steps + _key(type(part), name), value))
             elif isinstance(value, (list, tuple)):
                 for index, item in enumerate(value):
-                    if isinstance(item, Part):
+                    if type(item) not in _LEAVES and isinstance(item, Part):
                         below.append((f"{steps}{_key(type(part), name)}/{index}", item))
         todo += reversed(below)
+
+
+_LEAVES = frozenset((float, int, str, bool, type(None)))  # most of a large scene
 
 
 @functools.cache
