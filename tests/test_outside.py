@@ -147,7 +147,7 @@ def scene(material: dict) -> dict:
         "explain ward.py:OwnWard",
         "render ward.py:OwnWard -p alpha=.1,.3 --spp 1 --size 16x16 -o w.exr",
         "render mix(a=ward.py:OwnWard,b=mirror) --spp 1 --size 16x16 -o m.exr",
-        "compensation ward.py:OwnWard --walks 1000",
+        pytest.param("compensation ward.py:OwnWard --walks 1000", marks=pytest.mark.slow),  # tabulates at 20 widths
         "view ward.py:OwnWard --export w.html",
         "view kulla-conty(base=conductor(ndf=facets.py:Flat)) --export k.html",
         "emit conductor(preset=Au,masking=facets.py:Open,fresnel=facets.py:Steep)",

@@ -159,7 +159,7 @@ def cause(material: go.BSDF, law: str) -> str:
         (AlphaSquaredAgain, "weight", "D(alpha) / D(alpha^2) of GGX"),
         (FresnelAtTheNormalInSample, "weight", "F(n.o) / F(o.m)"),
         (OtherPdf, "weight", "the pdf of samples to pdf(wo, wi) is 1 / (4 (o.m)), within"),
-        (BelowTheHorizon, "weight", "pdf(wo, wi) is 0 in transmission"),
+        pytest.param(BelowTheHorizon, "weight", "pdf(wo, wi) is 0 in transmission", marks=pytest.mark.slow),
         (CosineTwice, "reciprocity", "is cos_i / cos_o, within"),
         (FresnelAtTheNormal, "reciprocity", "F(n.o) / F(n.i)"),
         (OneSidedCoupling, "reciprocity", "g(wo) / g(wi)"),
