@@ -187,9 +187,10 @@ class _Builder:
         """Mitsuba's own exact shape, where it has one."""
         to_world = np.eye(4)
         if isinstance(shape, schema.Sphere):
-            rotation = shape.transform.rotate.matrix() if shape.transform.rotate else np.eye(3)
-            to_world[:3, :3] = shape.radius * rotation @ _SPHERE_AXES
-            to_world[:3, 3] = (matrix @ [*shape.center, 1.0])[:3]
+            turned = shape.transform.rotate
+            axes = _SPHERE_AXES if turned is None else turned.matrix() @ _SPHERE_AXES
+            to_world[:3, :3] = shape.radius * axes
+            to_world[:3, 3] = matrix[:3, :3] @ shape.center + matrix[:3, 3]
             return {"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world)}
         if isinstance(shape, schema.Parallelogram):
             edge0, edge1 = matrix[:3, :3] @ shape.edge0, matrix[:3, :3] @ shape.edge1

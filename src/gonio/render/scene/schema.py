@@ -234,7 +234,10 @@ class Transform(Part):
 
     def matrix(self) -> np.ndarray:
         matrix = np.eye(4)
-        matrix[:3, :3] = (self.rotate.matrix() if self.rotate else np.eye(3)) @ np.diag(self.scale)
+        if self.rotate is not None:
+            matrix[:3, :3] = self.rotate.matrix() @ np.diag(self.scale)
+        elif self.scale != (1.0, 1.0, 1.0):
+            np.fill_diagonal(matrix[:3, :3], self.scale)
         matrix[:3, 3] = self.translate
         return matrix
 
