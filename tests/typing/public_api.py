@@ -125,6 +125,7 @@ picture = go.render(
     spectral=True,
     threads=2,
     timeout=60.0,
+    until_error=0.01,
     denoise=True,
     exposure="auto",
     allow_outside=False,

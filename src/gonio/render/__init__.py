@@ -36,6 +36,7 @@ def render(
     allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
     checkpoint: str | Path | None = None,
+    until_error: float | None = None,
 ) -> RGB:
     """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
@@ -61,6 +62,8 @@ def render(
     overrides      values by their path in the scene, as `gonio study` varies them; materials too
     checkpoint     file for the sums so far, written every few seconds; where it is there, the render goes on from it,
                    to the same bits. None: beside the output, where the render takes over a minute
+    until_error    render until the picture's relMSE is estimated to be below this, within `spp` samples per pixel, or
+                   65,536; warns where that was too few
     Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
     """
     from ..models import BSDF
@@ -86,6 +89,7 @@ def render(
         overrides=overrides or {},
         material=scene if isinstance(scene, BSDF) else None,
         checkpoint=None if checkpoint is None else Path(checkpoint),
+        until_error=until_error,
     )
     return _picture(request, level=6)  # past the checks, the lock and the call of the module
 
@@ -137,8 +141,11 @@ def _picture(request: Request, level: int) -> RGB:
         beside = None if output is None else checkpoints.beside(output)
         stopped, keeper = run.work(prepared, temporary=beside, tell=notices.append)
         picture = run.finished(prepared.render, request.denoise)
+        error, unmet = run.estimated(prepared)
+        notices += filter(None, [unmet])
         if output is not None:
             settings = prepared.settings | {"spp": prepared.render.done}
+            settings |= {} if error is None else {"estimated_error": error}
             notices += filter(None, [images.show(output, picture, settings, exposure).notice])
     if not stopped:
         keeper.remove()
