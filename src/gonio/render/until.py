@@ -64,7 +64,7 @@ class Until:
         # of the first samples, and of those that are shared out
         self._seeds = [int(seed) for seed in np.random.SeedSequence(settings.seed).generate_state(4)]
         self._halves = self._pair(self._seeds[:2], None)
-        self._shares = not (settings.program.splats or settings.program.together)
+        self._shares = not (settings.program.splats or settings.program.blurs)
         self._goal = FIRST
         self._before = 0  # samples that have chosen the shares
         self._pilot: tuple[Picture, Picture] | None = None  # what they have shown
@@ -80,7 +80,7 @@ class Until:
     @property
     def done(self) -> int:
         """Samples per pixel so far, on the mean of the pixels."""
-        return self._before + self._halves[0].done + self._halves[1].done
+        return self._before + sum(self._counts)
 
     @property
     def goal(self) -> int:
@@ -94,27 +94,37 @@ class Until:
         return min(self._goal, self._most)
 
     def advance(self, count: int) -> None:
-        for half, wanted in zip(self._halves, _halved(self.done - self._before + count), strict=True):
-            if wanted > half.done:
-                half.advance(wanted - half.done)
+        """So many samples more, or those that one half still needs: the halves take turns."""
+        needed = [
+            most - n for most, n in zip(_halved(min(self._goal, self._most) - self._before), self._counts, strict=True)
+        ]
+        behind = 0 if needed[0] >= needed[1] else 1
+        self._halves[behind].advance(min(count, needed[behind]))
+
+    @property
+    def _counts(self) -> tuple[int, int]:
+        return self._halves[0].done, self._halves[1].done
 
     def image(self) -> Picture:
         a, b = self._pictures()
-        first, second = _halved(self.done)
-        return np.asarray((first * a + second * b) / max(first + second, 1), np.float32)
+        first, second = (half + 0.5 * self._before for half in self._counts)
+        return np.asarray((first * a + second * b) / max(first + second, 1.0), np.float32)
 
     def aov(self) -> dict[str, Picture]:
         a, b = (half.aov() for half in self._halves)
-        first, second = (half.done for half in self._halves)
+        first, second = self._counts
         return {name: np.asarray((first * a[name] + second * b[name]) / max(first + second, 1)) for name in a}
 
     @property
     def advice(self) -> str:
-        return self._halves[0].advice
+        found = self._halves[0].advice
+        if self._settings.program.blurs:
+            found = "; ".join(filter(None, [found, "the error is that of noise: the blur of caustics is not in it"]))
+        return found
 
     def estimate(self) -> float:
         """The relMSE of the picture so far; inf where there is too little to tell."""
-        if self.done < 2:
+        if min(self._counts) == 0 and self._pilot is None:
             return math.inf
         return float(np.mean(squares(*self._pictures())))
 
@@ -122,9 +132,9 @@ class Until:
         a, b = (half.image() for half in self._halves)
         if self._pilot is None:
             return a, b
-        old = self._gain * self._before
-        old /= old + self.done - self._before
-        return old * self._pilot[0] + (1.0 - old) * a, old * self._pilot[1] + (1.0 - old) * b
+        olds = [self._gain * 0.5 * self._before / (self._gain * 0.5 * self._before + n) for n in self._counts]
+        first, second = (old * x + (1.0 - old) * y for old, x, y in zip(olds, self._pilot, (a, b), strict=True))
+        return first, second
 
     # ------------------------------------------------------------------ how far
 
@@ -152,7 +162,7 @@ class Until:
     # ------------------------------------------------------------------ checkpoints
 
     def state(self) -> dict[str, NDArray[Any]]:
-        found: dict[str, NDArray[Any]] = {"goal": np.array([self._goal], np.int64)}
+        found: dict[str, NDArray[Any]] = {"goal": np.array([self._goal, *self._counts], np.int64)}
         if self._share is not None and self._pilot is not None:
             found |= {"share": self._share, "gain": np.array([self._gain])}
             found |= {f"pilot{i}": picture for i, picture in enumerate(self._pilot)}
@@ -168,8 +178,8 @@ class Until:
             if state["share"].shape != (shape[0] * shape[1],) or any(picture.shape != shape for picture in pilot):
                 raise ValueError("shares of another film")
             self._take(state["share"], float(state["gain"][0]), pilot)
-        self._goal = int(state["goal"][0])
-        for i, (half, count) in enumerate(zip(self._halves, _halved(done - self._before), strict=True)):
+        self._goal, *counts = map(int, state["goal"])
+        for i, (half, count) in enumerate(zip(self._halves, counts, strict=True)):
             head = f"half{i} "
             half.restore(count, {name.removeprefix(head): state[name] for name in state if name.startswith(head)})
 

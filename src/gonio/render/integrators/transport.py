@@ -34,6 +34,7 @@ from ..types import (
     SurfaceInteraction,
     Texture,
     UInt,
+    Vector,
 )
 from .base import FIRST_FREE, Integrator, Settings
 from .sums import Sums
@@ -368,7 +369,9 @@ class Transport(Integrator):
         lobe, pick = self.pair(key, index, dimension + CHOICE)
         u = mi.Point2f(*self.direction_pair(key, index, dimension + LOBE))
         if not self.samples_lights or lights.count == 0:
-            return mi.Spectrum(0), mi.Float(0), *bsdf.sample(context, si, lobe, u, active)
+            bs, weight = bsdf.sample(context, si, lobe, u, active)
+            _, weight = self.attached(si, bsdf, bs.wo, mi.Spectrum(0), bs, weight, active)
+            return mi.Spectrum(0), mi.Float(0), bs, weight
         pair = self.direction_pair if lights.has_environment else self.pair
         light = lights.sample(si, mi.Point2f(*pair(key, index, dimension + LIGHT)), pick, active)
         toward = si.to_local(light.ds.d)
@@ -377,6 +380,7 @@ class Transport(Integrator):
         else:
             value, pdf = bsdf.eval(context, si, toward, active), mi.Float(0)
             bs, weight = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
+        value, weight = self.attached(si, bsdf, toward, value, bs, weight, active)
         gathered = value * light.weight
         if self.samples_lobes:
             gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
@@ -386,6 +390,19 @@ class Transport(Integrator):
         visible = active & dr.any(gathered != 0)
         visible = self.unoccluded(si, light.ds.p, visible)
         return dr.select(visible, gathered, 0), light.solid_angle, bs, weight
+
+    def attached(
+        self,
+        si: SurfaceInteraction,
+        bsdf: MitsubaBSDF,
+        toward: Vector,
+        value: Radiance,
+        bs: BSDFSample,
+        weight: Radiance,
+        active: Mask,
+    ) -> tuple[Radiance, Radiance]:
+        """The BSDF's value toward a light and the weight of its sample, as they are; for who differentiates them."""
+        return value, weight
 
     def ambient_light(self, light: Texture, bsdf: MitsubaBSDF, si: SurfaceInteraction, active: Mask) -> Radiance:
         """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
@@ -402,7 +419,7 @@ class Transport(Integrator):
 
         Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
         """
-        survive = dr.clip(dr.max(throughput) * dr.square(eta), 1e-6, 0.95)
+        survive = dr.clip(dr.max(dr.detach(throughput)) * dr.square(eta), 1e-6, 0.95)
         u, _ = sampler.independent_pair(key, index, dimension + ROULETTE)
         plays = depth + 1 >= ROULETTE_DEPTH
         active = active & (~plays | (u < survive))
