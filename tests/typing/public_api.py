@@ -126,6 +126,7 @@ picture = go.render(
     threads=2,
     timeout=60.0,
     until_error=0.01,
+    gradient=["shapes.0.material.alpha"],
     denoise=True,
     exposure="auto",
     allow_outside=False,

@@ -21,13 +21,19 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
+from ..models import BSDF, tree
+from ..models.parameters import IndexParameter
 from .adapter.material import PlacedMaterial
 from .adapter.slots import Slot
 from .integrators import Integrator, Render, Settings, Transport
 from .integrators.sums import Sums
 from .integrators.transport import PathState
+from .scene.build import Built
+from .scene.schema import SceneDescription
 from .types import BSDFSample, Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt, Vector
+
+CHANNELS = ("r", "g", "b")
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,52 @@ class Along:
         return placed.slots[name]
 
 
+def place_of(path: str, where: str) -> tuple[str, str]:
+    """("shapes.0.material", "base.alpha") of "shapes.0.material.base.alpha"."""
+    steps = path.removeprefix("scene.").split(".")
+    if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdigit() or steps[2] != "material":
+        raise InputError(f"'{path}' names no material of a shape", where, 'such as "shapes.0.material.alpha"')
+    return ".".join(steps[:3]), ".".join(steps[3:])
+
+
+def material_at(description: SceneDescription, built: Built, place: str, where: str) -> MitsubaBSDF:
+    """The plugin that a material of the scene has become. Raises InputError where it is none of Gonio's."""
+    index = int(place.split(".")[1])
+    if index >= len(description.shapes):
+        raise InputError(f"no shape {index}", where, f"the scene has {len(description.shapes)}")
+    part = description.shapes[index].material
+    plugin = None if part is None else built.bsdfs.get(part)
+    if plugin is None or not hasattr(plugin, "placed"):
+        raise InputError("no material of Gonio's there, or a normal map over it", where, "name another")
+    return plugin
+
+
+def along(description: SceneDescription, built: Built, path: str) -> Along:
+    """What "shapes.0.material.alpha" names, or "shapes.0.material.albedo.r". Raises InputError for what has no
+    derivative."""
+    where = f"gradient: {path}"
+    place, parameter = place_of(path, where)
+    plugin = material_at(description, built, place, where)
+    model: BSDF = plugin.placed.model
+    known = {leaf.path: leaf.parameter for leaf in tree.leaves(model) if leaf.parameter.numeric}
+    head, _, last = parameter.rpartition(".")
+    channel = CHANNELS.index(last) if last in CHANNELS and parameter not in known else None
+    name = parameter if channel is None else head
+    if name not in known:
+        raise InputError(f"no parameter '{parameter}'", where, did_you_mean(parameter, [*known]))
+    found = Along(plugin, name, channel)
+    if channel is not None and known[name].kind != "spectrum":
+        raise InputError(f"'{name}' is no colour", where, "leave the channel out")
+    if found.slot.textures:
+        raise InputError("a texture gives this value", where, "give the material a plain number")
+    if known[name].kind == "angle" or name.rpartition(".")[2] in ("absorption", "priority"):
+        raise InputError(f"'{name}' has no derivative here", where, "name a width, a colour or an index")
+    if model.delta != "never" or model.stochastic:
+        what = "mirrors and smooth glass turn light by an index" if not model.stochastic else "its values are random"
+        raise InputError(f"{what}: no derivative", where, "name a material that is rough")
+    return found
+
+
 class Gradients(Render):
     """A render that carries derivatives along: `slopes` beside `image`.
 
@@ -69,8 +121,15 @@ class Gradients(Render):
         self.features = 3 * len(self.along)
         self._carrying = type("Carrying", (_Carrying, program), {"along": self.along})
         super().__init__(scene, settings, sensor)
-        if not (self.mi.is_rgb and not self.mi.is_polarized):
+        if not self.mi.is_rgb:
             raise InputError(f"variant {self.mi.variant()}, and derivatives are of RGB", where, "leave out spectral")
+        index = any(isinstance(one.slot.parameter, IndexParameter) for one in self.along)
+        assert isinstance(self._integrator, Transport)
+        if index and self._integrator.media.known:
+            what = "an index in a scene of nested or absorbing media, whose neighbours depend on it"
+            raise InputError(what, where, "leave priority and absorption out, or name another value")
+        if self._integrator.ambient is not None:
+            raise InputError("ambient light has no derivative", where, "leave ambient out")
 
     def _program(self) -> Integrator:
         return self._carrying(self.mi, self.scene, self.sensor, self.settings, aovs=False)
@@ -165,12 +224,13 @@ class _Carrying(Transport):
     ) -> tuple[Radiance, Radiance]:
         """The same value and weight, with derivatives where the material is one of those that move."""
         mi = self.mi
+        outer = 1.0 + si.duv_dx.x if self.media.known else None
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         density = dr.select(delta | (bs.pdf <= 0), 0, dr.rcp(bs.pdf))
         with self._moved():
             for plugin in self.plugins:
                 here = active & (bsdf == mi.BSDFPtr(plugin))
-                model = plugin.placed.at(si, here)
+                model = plugin.placed.at(si, here, outer=outer)
                 toward_light, sampled = (mi.Spectrum(model.eval(si.wi, w)) for w in (toward, bs.wo))
                 value = value + dr.select(here, toward_light - dr.detach(toward_light), 0)
                 weight = weight + dr.select(here, (sampled - dr.detach(sampled)) * density, 0)

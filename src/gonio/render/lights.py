@@ -349,8 +349,11 @@ class Lights:
             return dr.zeros(self.mi.Spectrum)
         return si.emitter(self.scene).eval(si, active)
 
-    def sample(self, si: SurfaceInteraction, u: Float, pick: Float, active: Mask) -> LightSample:
-        """A direction toward a light; `u` chooses the point on it, `pick` in [0, 1) the light."""
+    def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
+        """A direction toward a light: `u` in [0, 1)^2 chooses the light by its x, and by what is left a point on it.
+
+        Chosen by a number of its own, a light would get any of the points of all: as uneven as chance.
+        """
         mi = self.mi
         if self.rectangle is not None:
             seen = SphericalRectangle(self.rectangle, si.p)
@@ -362,7 +365,8 @@ class Lights:
         if self.count == 1:
             ds, weight = self.emitters[0].sample_direction(si, u, active)
             return LightSample(ds, weight, mi.Bool(ds.delta), mi.Float(0))
-        index, probability = self.choice.sample_pmf(pick, active)
+        index, left, probability = self.choice.sample_reuse_pmf(u.x, active)
+        u = mi.Point2f(left, u.y)
         place = dr.gather(mi.UInt32, self.place, index, active)
         emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), place, active)
         ds, weight = emitter.sample_direction(si, u, active)

@@ -48,6 +48,7 @@ class Request:
     material: BSDF | None = None  # to be shown on a ball, in place of a scene
     checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from
     until_error: float | None = None  # relMSE at which to stop; `spp` is then the most
+    gradient: tuple[str, ...] = ()  # paths of values in the scene, along which the picture is differentiated
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""
@@ -63,6 +64,13 @@ class Request:
             raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
         if self.until_error is not None:
             check_error(self.until_error, self.spp)
+        for option, given in (
+            ("denoise", self.denoise),
+            ("until_error", self.until_error),
+            ("spectral", self.spectral),
+        ):
+            if self.gradient and given:
+                raise InputError(f"{option} and derivatives do not go together", "gradient", f"leave {option} out")
         exposures.check(self.exposure)
         if self.size is not None:
             check_film(self.size, "--size")

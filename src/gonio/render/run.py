@@ -117,17 +117,22 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     spp, degrees, how = _most(request, description.spp), description.camera.polarizer, _own(settings)
     if degrees is not None:
         polarizer.check(settings, description.where("/camera/polarizer"))
-        if request.until_error is not None:
-            what = "a picture through a polarizer is by Mitsuba's path tracer, which tells no error"
-            raise InputError(what, "--until-error", "give --spp in its place, or leave the polarizer out")
+        if request.until_error is not None or request.gradient:
+            what = "a picture through a polarizer is by Mitsuba's path tracer, which tells no error and no derivative"
+            option = "gradient" if request.gradient else "--until-error"
+            raise InputError(what, option, "leave the polarizer out")
         mi.set_variant(engine.polarized(str(mi.variant())))
         how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
-    built = scene.build(description, mi)
+    built = scene.built(description, mi)
     render: Renders
-    if degrees is None:
-        render = _drawing(built, settings, request)
+    if request.gradient:
+        from .gradients import Gradients, along
+
+        render = Gradients(built.scene, settings, [along(description, built, path) for path in request.gradient])
+    elif degrees is None:
+        render = _drawing(built.scene, settings, request)
     else:
-        render = polarizer.PolarizedRender(mi, built, spp, settings, degrees)
+        render = polarizer.PolarizedRender(mi, built.scene, spp, settings, degrees)
     return Prepared(
         request,
         render,
@@ -180,6 +185,8 @@ def _how(settings: Settings | None, request: Request, **more: images.Value) -> s
     others: dict[str, images.Value] = {**more, "features": request.denoise}
     if request.until_error is not None:
         others["until_error"] = request.until_error
+    if request.gradient:
+        others["gradient"] = ", ".join(request.gradient)
     return ", ".join(f"{name} {value}" for name, value in {**ours, **others}.items())
 
 
@@ -247,6 +254,9 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
             if value is not None:
                 what = "a Mitsuba scene's own integrator does not take this option"
                 raise InputError(what, option, "add --integrator path (or direct), or change it in the .xml")
+    if request.gradient:
+        what = "a Mitsuba scene, and derivatives are along values of a scene of Gonio's format"
+        raise InputError(what, "gradient", "give a folder or a .json")
     adapter.register(mi)
     lights.register(mi)
     scene = mitsuba_scene.load(request, mi)
@@ -408,6 +418,11 @@ def render(
         keeper.path if keeper.written else None,
         error,
     )
+
+
+def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The picture, and its derivatives below it: (1 + paths, height, width, 3)."""
+    return np.stack([picture, *prepared.render.slopes()])  # type: ignore[attr-defined]  # of Gradients
 
 
 def finished(render: Renders, denoised: bool) -> NDArray[np.float32]:

@@ -366,14 +366,14 @@ class Transport(Integrator):
         Returns (light gathered from the lights, solid angle of the light, BSDF sample, its weight).
         """
         mi, lights, context = self.mi, self.lights, self.context
-        lobe, pick = self.pair(key, index, dimension + CHOICE)
+        lobe, _ = self.pair(key, index, dimension + CHOICE)
         u = mi.Point2f(*self.direction_pair(key, index, dimension + LOBE))
         if not self.samples_lights or lights.count == 0:
             bs, weight = bsdf.sample(context, si, lobe, u, active)
             _, weight = self.attached(si, bsdf, bs.wo, mi.Spectrum(0), bs, weight, active)
             return mi.Spectrum(0), mi.Float(0), bs, weight
         pair = self.direction_pair if lights.has_environment else self.pair
-        light = lights.sample(si, mi.Point2f(*pair(key, index, dimension + LIGHT)), pick, active)
+        light = lights.sample(si, mi.Point2f(*pair(key, index, dimension + LIGHT)), active)
         toward = si.to_local(light.ds.d)
         if self.samples_lobes or self.follows_delta or self.aovs:
             value, pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
