@@ -6,7 +6,7 @@
 
 The samples are those of the integrator itself: where a path goes, and with which density, stays as it is while a value
 moves (detached sampling), and what its materials send along it is differentiated (attached evaluation). That is without
-bias for whatever does not move the paths: Vicini2021 and Zeltner2021 have the theory. Derivatives go forward along the
+bias for whatever does not move the paths: Vicini2021 has the theory. Derivatives go forward along the
 path with its throughput, so that one walk gives the picture and all of them.
 """
 

@@ -124,7 +124,7 @@ class Transport(Integrator):
         self.Waiting = _waiting_type(mi.variant(), self.media.known, self.merges)
         self.context = mi.BSDFContext()
         self.context.type_mask = NESTS if self.media.known else SEPARATES
-        self.lights = Lights(mi, scene, self.surfaces)
+        self.lights = Lights(mi, scene, self.surfaces, beside_lobes=self.samples_lobes)
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
@@ -244,7 +244,7 @@ class Transport(Integrator):
         emitted = lights.emitted(si, active)
         if self.samples_lights and not first:
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)
-            weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
+            weight = lights.share(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
             if self.merges:
                 emitted = self.found(path, si, emitted, active & (path.pdf == 0))
@@ -293,7 +293,7 @@ class Transport(Integrator):
         end = active & last
 
         def weigh(light: Radiance, light_pdf: Float) -> Radiance:
-            return dr.select(pdf > 0, light * mis(pdf, light_pdf), light) if self.samples_lights else light
+            return dr.select(pdf > 0, light * lights.share(pdf, light_pdf), light) if self.samples_lights else light
 
         if not self.traces_last:
             radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
@@ -383,7 +383,7 @@ class Transport(Integrator):
         value, weight = self.attached(si, bsdf, toward, value, bs, weight, active)
         gathered = value * light.weight
         if self.samples_lobes:
-            gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
+            gathered *= dr.select(light.delta, 1, lights.share(light.ds.pdf, pdf))
         if crossing is not None:
             side = dr.select(si.wi.z * toward.z < 0.0, crossing.beyond, crossing.here)
             gathered *= self.media.transmitted(side, si, light.ds.dist) & crossing.surface
@@ -424,9 +424,3 @@ class Transport(Integrator):
         plays = depth + 1 >= ROULETTE_DEPTH
         active = active & (~plays | (u < survive))
         return dr.select(plays, throughput / survive, throughput), active
-
-
-def mis(pdf: Float, other: Float) -> Float:
-    """Power heuristic with exponent 2 for two strategies of one sample each (Veach 1995): p^2 / (p^2 + q^2)."""
-    ratio = other / pdf  # first the ratio: p^2 itself overflows for sharp lobes
-    return dr.select(pdf > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
