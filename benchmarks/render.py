@@ -232,7 +232,7 @@ class _Stage(Transport):
             shadowed = self.scene.ray_test(shadow, hit.is_valid())
             return path, [dr.select(shadowed, 0, mi.Float(1)), mi.Float(0), mi.Float(0)]
         si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
-        light = self.lights.sample(si, u, mi.Float(0), si.is_valid())
+        light = self.lights.sample(si, u, si.is_valid())
         lit = si.is_valid() & (mi.Frame3f.cos_theta(si.to_local(light.ds.d)) > 0)
         lit &= ~self.scene.ray_test(si.spawn_ray_to(light.ds.p), lit)
         return path, list(dr.select(lit, light.weight, 0))

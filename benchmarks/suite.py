@@ -4,6 +4,7 @@
     python benchmarks/suite.py sun-environment many         # some
     python benchmarks/suite.py --quick                      # a quarter of the samples, references of 4 s
     python benchmarks/suite.py --figure suite.png           # and a figure of the pictures and ratios
+    python benchmarks/suite.py --until-error .002           # is what `--until-error` promises true?
 
 Efficiency is 1 / (relMSE x time); relMSE = mean((x - r)^2 / (r^2 + floor)) with the floor at 1 % of the squared mean of
 the picture. Time is that of a whole new render of a loaded scene file, from its dictionary to the picture, kernels
@@ -24,18 +25,21 @@ import hashlib
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from gonio.render import engine
+from gonio.render import engine, passes
 from rich.console import Console
 from rich.table import Table
 from scipy import stats
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
+from gonio.render import until  # noqa: E402
 from gonio.render.integrators import Render, Settings, caustics  # noqa: E402
+from gonio.render.request import UNTIL_MOST  # noqa: E402
 
 from scenes import SCENES, Scene  # noqa: E402
 
@@ -99,7 +103,7 @@ def reference(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
     """A converged picture, and how far apart the two methods are that made it: worst block of 10 x 10, in sigma."""
     folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gonio"
     content = (Path(__file__).with_name("scenes") / "__init__.py").read_bytes()
-    facts = f"{scene.name} {seconds:g} {mi.__version__}".encode()
+    facts = f"{scene.name} {scene.size} {seconds:g} {mi.__version__}".encode()
     file = folder / f"suite-{scene.name}-{hashlib.sha256(content + facts).hexdigest()[:12]}.npz"
     if not file.exists():
         picture, apart = (of_caustics if scene.caustic else of_paths)(scene, seconds)
@@ -210,15 +214,68 @@ def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
     return field
 
 
+SMALLER = 4  # than the scene says, a side: pictures of `promises`
+RUNS, MORE, LONGEST = 4, 24, 60
+
+
+def promises(names: list[str], error: float) -> None:
+    """Renders until an error, and what the error then is, against pictures of MORE times as many samples."""
+    titles = ("scene", "samples", "error over promised", "over estimated", "without shares, of as many samples")
+    table = Table(*titles, title=f"relMSE after --until-error {error:g}: of {RUNS} seeds, the median (lowest, highest)")
+    judged = kept = 0
+    for name in names:
+        scene, stopped = SCENES[name], ""
+        scene = replace(scene, size=(max(scene.size[0] // SMALLER, 48), max(scene.size[1] // SMALLER, 48)))
+        loaded = scene.load(mi)
+
+        def settings(seed: int, scene: Scene = scene) -> Settings:
+            return Settings("caustics" if scene.caustic else "path", scene.depth, seed=seed)
+
+        def picture(seed: int, spp: int, loaded: Any = loaded, settings: Callable[[int], Settings] = settings) -> Any:
+            render = Render(loaded, settings(seed))
+            render.advance(spp)
+            return render.image()
+
+        runs = [until.Until(loaded, settings(seed), error, UNTIL_MOST) for seed in range(RUNS)]
+        for run in runs:
+            stopped = passes.run(run, lambda run=run: run.goal, scene.size[0] * scene.size[1], timeout=LONGEST)
+            if stopped:
+                break
+        if stopped:
+            console.print(f"{name} | left out: not reached in {LONGEST} s")
+            continue
+        judged += 1
+        samples = [run.done for run in runs]
+        before = caustics.FOOTPRINT
+        caustics.FOOTPRINT = 0.5 * before
+        truth = picture(1000, MORE * max(samples))
+        caustics.FOOTPRINT = before
+        true = [relmse(run.image(), truth) / error for run in runs]
+        over = [x * error / run.estimate() for x, run in zip(true, runs, strict=True)]
+        same = [relmse(picture(100 + i, n), truth) / error for i, n in enumerate(samples)]
+        middle = float(np.median(true))
+        kept += 1 / 1.3 <= middle <= 1.3
+        row = [name + (" (c)" if scene.caustic else ""), f"{np.median(samples):.0f}"]
+        row += [f"{middle:.2f} ({min(true):.2f}, {max(true):.2f})", f"{np.median(over):.2f}", f"{np.median(same):.2f}"]
+        table.add_row(*row)
+        console.print(" | ".join(row))
+    console.print(table)
+    console.print(f"within a factor 1.3 of what was promised: {kept} of {judged}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", help=", ".join(SCENES))
     parser.add_argument("--seconds", type=float, default=20, help="for each reference, three times that for caustics")
     parser.add_argument("--quick", action="store_true", help="a quarter of the samples, references of 4 seconds")
     parser.add_argument("--figure", type=Path, help="where to draw pictures and ratios")
+    parser.add_argument("--until-error", type=float, metavar="E", help="judge renders until that error, small ones")
     given = parser.parse_args()
     if unknown := set(given.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
+    if given.until_error:
+        promises(given.scenes or list(SCENES), given.until_error)
+        return
     table = Table(title="Gonio (path; c: caustics), and Mitsuba's path tracer with the sampler that is best")
     titles = ("scene", "best peer", "first [s]", "peer", "M samples/s", "peer", "relMSE x spp", "peer", "efficiency")
     for title in titles:

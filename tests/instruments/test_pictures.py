@@ -58,7 +58,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_width_and_colour_are_found_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["fit", "--from", folder / "true.npz", "--scene", folder / "scene.json", "--spp", 32, "--json"]
+    words = ["fit", "--from", folder / "true.npz", "--scene", folder / "scene.json", "--spp", 64, "--json"]
     words += ["-o", folder / "found.json", *(word for path in FREE for word in ("--free", path))]
     with pytest.raises(SystemExit) as ended:
         cli.main([str(word) for word in words])

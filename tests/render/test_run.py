@@ -147,6 +147,8 @@ def test_a_size_is_width_times_height() -> None:
         ({"seed": -1}, "--seed"),
         ({"threads": 0}, "--threads"),
         ({"timeout": 0.0}, "--timeout"),
+        ({"until_error": 0.0}, "--until-error"),
+        ({"until_error": float("nan")}, "--until-error"),
         ({"timeout": float("nan")}, "--timeout"),
         ({"exposure": float("nan")}, "--exposure"),
     ],

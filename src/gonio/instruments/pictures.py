@@ -1,7 +1,7 @@
-"""Parameters of a scene's materials fitted to a picture of it, by Mitsuba's differentiable path tracer (`prb`).
+"""Parameters of a scene's materials fitted to a picture of it, by Gonio's path tracer and its derivatives.
 
-Each step renders the picture and its derivative along every number, in forward mode (Vicini2021), and solves for all of
-them at once, as the fit to tables does; so a fit takes some ten steps, and standard errors come with it.
+Each step renders the picture together with its derivative along every number (`render.gradients`), and solves for all
+of them at once, as the fit to tables does; so a fit takes some ten steps, and standard errors come with it.
 """
 
 from __future__ import annotations
@@ -25,15 +25,18 @@ from ..measure.fitting.solver import Linearized, columns_of, solve
 from ..models import BSDF, notation, tree
 from ..owner import public
 from ..render import engine, images, scene
+from ..render.gradients import Along, Gradients, material_at, place_of
+from ..render.integrators import Render, Settings
 from ..render.scene.build import Built
 from ..render.scene.schema import SceneDescription
-from ..render.types import Float, MitsubaBSDF
+from ..render.types import MitsubaBSDF
 from ..work import garbage
 
 Floats = NDArray[np.float64]
 SPP, STEPS = 64, 20
 DARK = 0.05  # of the median brightness: below it differences are differences, above it ratios
 TILE = 8  # pixels: errors within a tile are alike
+OTHER = 0x9E3779B9  # what the seed of derivatives differs by
 DEEPEST = 8  # segments of paths, where the scene says nothing
 
 
@@ -135,7 +138,7 @@ def fit_picture(
         )
     overrides = dict(fixed or {})
     if model is not None:
-        overrides[_place(free[0])[0]] = moving_of(model)[0]
+        overrides[place_of(free[0], "free")[0]] = moving_of(model)[0]
     description = scene.read(scene_file, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides)
     width, height = description.camera.film.size
     if wanted.shape[:2] != (height, width):
@@ -158,14 +161,6 @@ def fit_picture(
         return _result(problem, numbers, losses, time.perf_counter() - started)
 
 
-def _place(path: str) -> tuple[str, str]:
-    """("shapes.0.material", "base.alpha") of "shapes.0.material.base.alpha"."""
-    steps = path.removeprefix("scene.").split(".")
-    if len(steps) < 3 or steps[0] != "shapes" or not steps[1].isdigit() or steps[2] != "material":
-        raise InputError(f"'{path}' names no material of a shape", "free", 'such as "shapes.0.material.alpha"')
-    return ".".join(steps[:3]), ".".join(steps[3:])
-
-
 def _depth(description: SceneDescription) -> int:
     deep = description.integrator.max_depth
     return int(deep) if deep is not None else DEEPEST if description.integrator.type == "path" else 2
@@ -184,17 +179,11 @@ class Target:
 def _targets(description: SceneDescription, built: Built, free: Sequence[str]) -> list[Target]:
     chosen: dict[str, list[str]] = {}
     for path in free:
-        place, parameter = _place(path)
+        place, parameter = place_of(path, "free")
         chosen.setdefault(place, []).append(parameter)
     found: list[Target] = []
     for place, parameters in chosen.items():
-        index = int(place.split(".")[1])
-        if index >= len(description.shapes):
-            raise InputError(f"no shape {index}", f"free: {place}", f"the scene has {len(description.shapes)}")
-        part = description.shapes[index].material
-        plugin = None if part is None else built.bsdfs.get(part)
-        if plugin is None or not hasattr(plugin, "placed"):
-            raise InputError("no material of Gonio's there, or a normal map over it", f"free: {place}", "name another")
+        plugin = material_at(description, built, place, f"free: {place}")
         if any(plugin is other.plugin for other in found):
             raise InputError("two shapes share this material", f"free: {place}", "name one of them")
         material = plugin.placed.model
@@ -212,7 +201,7 @@ def _targets(description: SceneDescription, built: Built, free: Sequence[str]) -
 
 
 class Problem:
-    """Residuals of a picture: (rendered - wanted) / (wanted + c), with their derivatives by `prb`."""
+    """Residuals of a picture: (rendered - wanted) / (wanted + c), with their derivatives."""
 
     def __init__(
         self,
@@ -227,21 +216,23 @@ class Problem:
         from scipy import ndimage
 
         self.mi, self.scene, self.targets, self.spp, self.seed = mi, built.scene, targets, spp, seed
-        self.integrator = mi.load_dict({"type": "prb", "max_depth": depth, "rr_depth": 1000})
+        self.depth = depth
         self.wanted = wanted.astype(np.float64)
         # a mean of neighbours: a pixel's own noise must not weigh it
         level = ndimage.uniform_filter(np.abs(self.wanted), (3, 3, 1))
         lit = level[level > 0.0]
         self.weight = 1.0 / (level + DARK * float(np.median(lit)))
         self.free = [replace(one, path=f"{target.path}.{one.path}") for target in targets for one in target.moving]
-        # numbers that one derivative is taken along, and whose they are
+        # numbers that one derivative is taken along
         self.columns: list[list[int]] = []
-        self.owners: list[int] = []
-        for owner, target in enumerate(targets):
+        self.along: list[Along] = []
+        for target in targets:
             before = sum(map(len, self.columns))
-            groups = columns_of(target.material, target.moving)
-            self.columns += [[before + n for n in group] for group in groups]
-            self.owners += [owner] * len(groups)
+            numbers = [(one.path, c if one.count > 1 else None) for one in target.moving for c in range(one.count)]
+            for group in columns_of(target.material, target.moving):
+                self.columns.append([before + n for n in group])
+                path, channel = numbers[group[0]]
+                self.along.append(Along(target.plugin, path, None if len(group) > 1 else channel))
 
     @property
     def count(self) -> int:
@@ -250,68 +241,45 @@ class Problem:
     def start(self) -> Floats:
         return np.concatenate([start_of(target.material, target.moving) for target in self.targets])
 
-    def put(self, numbers: Floats) -> list[Float]:
-        """Set the numbers in the plugins: Dr.Jit's values of each, of which derivatives can be taken."""
+    def put(self, numbers: Floats) -> None:
+        """Set the numbers in the plugins."""
         import drjit as dr
 
-        variables, at = [], 0
-        for target in self.targets:
-            for one in target.moving:
-                part = [dr.opaque(self.mi.Float, float(x)) for x in numbers[at : at + one.count]]
-                at += one.count
-                variables += part
-        self._place_in(variables)
-        return variables
-
-    def _place_in(self, variables: list[Float]) -> None:
         at = 0
         for target in self.targets:
             for one in target.moving:
-                *inner, name = one.path.split(".")
-                placed = target.plugin.placed
-                for step in inner:
-                    placed = placed.inner[step][1]
-                slot = placed.slots[name]
-                part = variables[at : at + one.count]
+                slot = Along(target.plugin, one.path).slot
+                part = [float(x) for x in numbers[at : at + one.count]]
                 at += one.count
                 for key in slot.values:
-                    slot.values[key] = self.mi.Color3f(*part) if one.count > 1 else part[0]
+                    slot.values[key] = self.mi.Color3f(*part) if one.count > 1 else self.mi.Float(part[0])
+                dr.make_opaque(*slot.values.values())
             target.plugin.placed.derive()
+
+    def _settings(self, seed: int) -> Settings:
+        return Settings("path", max_depth=self.depth, seed=seed)
 
     def render(self, numbers: Floats, spp: int | None = None, seed: int | None = None) -> Floats:
         """The picture with these numbers."""
         self.put(numbers)
-        tensor = self.mi.render(
-            self.scene, integrator=self.integrator, spp=spp or self.spp, seed=self.seed if seed is None else seed
-        )
-        return np.asarray(np.array(tensor)[..., :CHANNELS], np.float64)
+        render = Render(self.scene, self._settings(self.seed if seed is None else seed))
+        render.advance(spp or self.spp)
+        return render.image().astype(np.float64)
 
     def loss(self, numbers: Floats) -> float:
         return float(np.mean(((self.render(numbers) - self.wanted) * self.weight) ** 2))
 
     def linearized(self, numbers: Floats) -> list[Linearized]:
         """By channel."""
-        import drjit as dr
-
-        slopes = []
-        shown = np.zeros(self.wanted.shape)
-        for columns, owner in zip(self.columns, self.owners, strict=True):
-            variables = self.put(numbers)
-            for column in columns:
-                dr.enable_grad(variables[column])
-            self._place_in(variables)
-            held = self.mi.traverse(self.targets[owner].plugin)  # the render looks in here for what is differentiated
-            tensor = self.mi.render(self.scene, held, integrator=self.integrator, spp=self.spp, seed=self.seed)
-            for column in columns:
-                dr.set_grad(variables[column], 1.0)
-            slope = dr.forward_to(tensor)
-            shown = np.asarray(np.array(dr.detach(tensor))[..., :CHANNELS], np.float64)
-            slopes.append(np.asarray(np.array(slope)[..., :CHANNELS], np.float64))
-        residual = (shown - self.wanted) * self.weight
+        residual = (self.render(numbers) - self.wanted) * self.weight
+        # by other samples: noise that derivatives and differences have in common would count as slope
+        render = Gradients(self.scene, self._settings(self.seed ^ OTHER), self.along)
+        render.advance(self.spp)
+        slopes = [slope.astype(np.float64) * self.weight for slope in render.slopes()]
         found: list[Linearized] = []
         for channel in range(CHANNELS):
             which = [columns[channel] if len(columns) > 1 else columns[0] for columns in self.columns]
-            jacobian = np.stack([(s[..., channel] * self.weight[..., channel]).ravel() for s in slopes], -1)
+            jacobian = np.stack([slope[..., channel].ravel() for slope in slopes], -1)
             found.append((residual[..., channel].ravel(), jacobian, which))
         return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,10 +36,13 @@ def render(
     allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
     checkpoint: str | Path | None = None,
+    until_error: float | None = None,
+    gradient: Sequence[str] = (),
 ) -> RGB:
     """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
         picture = go.render("examples/phong", spp=64, overrides={"shapes.1.material.p": 16})
+        picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
     scene          the lab's folder or .json, a Mitsuba .xml, or a material, which is shown on a ball; what is None
                    below is as the scene says
@@ -61,6 +64,11 @@ def render(
     overrides      values by their path in the scene, as `gonio study` varies them; materials too
     checkpoint     file for the sums so far, written every few seconds; where it is there, the render goes on from it,
                    to the same bits. None: beside the output, where the render takes over a minute
+    until_error    render until the picture's relMSE is estimated to be below this, within `spp` samples per pixel, or
+                   65,536; warns where that was too few
+    gradient       paths of numbers and colours of materials: what is returned is then (1 + paths, height, width, 3):
+                   the picture, and its derivative along each; of a colour along all three channels together, as
+                   "....albedo.r" along one. Materials that are equal are one, and move together
     Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
     """
     from ..models import BSDF
@@ -86,6 +94,8 @@ def render(
         overrides=overrides or {},
         material=scene if isinstance(scene, BSDF) else None,
         checkpoint=None if checkpoint is None else Path(checkpoint),
+        until_error=until_error,
+        gradient=tuple(gradient),
     )
     return _picture(request, level=6)  # past the checks, the lock and the call of the module
 
@@ -137,8 +147,11 @@ def _picture(request: Request, level: int) -> RGB:
         beside = None if output is None else checkpoints.beside(output)
         stopped, keeper = run.work(prepared, temporary=beside, tell=notices.append)
         picture = run.finished(prepared.render, request.denoise)
+        error, unmet = run.estimated(prepared)
+        notices += filter(None, [unmet])
         if output is not None:
             settings = prepared.settings | {"spp": prepared.render.done}
+            settings |= {} if error is None else {"estimated_error": error}
             notices += filter(None, [images.show(output, picture, settings, exposure).notice])
     if not stopped:
         keeper.remove()
@@ -146,7 +159,7 @@ def _picture(request: Request, level: int) -> RGB:
         notices.append(f"no checkpoint was written: {keeper.error.what}")
     for notice in notices:
         warnings.warn(notice, GonioWarning, stacklevel=level)
-    return picture
+    return picture if not request.gradient else run.with_slopes(prepared, picture)
 
 
 make_callable(__name__, render)

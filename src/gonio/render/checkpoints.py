@@ -117,6 +117,7 @@ def request_of(found: Facts, where: str, allow_code: bool) -> Request:
         for name in ("scene", "output"):
             values[name] = None if values[name] is None else Path(values[name])
         values["size"] = None if values["size"] is None else tuple(values["size"])
+        values["gradient"] = tuple(values["gradient"])
         return Request(**values)
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, GonioError):

@@ -17,6 +17,7 @@ from types import ModuleType
 import drjit as dr
 
 from ..errors import InputError
+from .sky import Sky
 from .surfaces import Surfaces
 from .types import (
     DirectionSample,
@@ -283,7 +284,7 @@ class Lights:
     several is chosen with a probability half uniform, half proportional to the light it sends into the scene.
     """
 
-    def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None):
+    def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None, beside_lobes: bool = False):
         self.mi, self.scene = mi, scene
         self.surfaces = Surfaces(mi, scene) if surfaces is None else surfaces
         found = scene.emitters()
@@ -297,11 +298,22 @@ class Lights:
         if self.count == 1 and self._is_rectangle_light(self.emitters[0]):
             self.rectangle = Rectangle.of(mi, self.emitters[0].get_shape())
             dr.make_opaque(self.rectangle)
-        elif self.count > 1:
+        self.sky, self.sky_place = self._sky(beside_lobes)
+        if self.count > 1:
             self.probability = self._probabilities()
             self.choice = mi.DiscreteDistribution(self.probability)
             self.place = mi.UInt32(order)  # of each of `emitters` among the scene's
             self.by_pointer = self._by_pointer()
+
+    def _sky(self, beside_lobes: bool) -> tuple[Sky | None, int]:
+        """The environment's density, where it is one that varies, and its place among the emitters."""
+        for place, emitter in enumerate(self.emitters):
+            if "data" in dict(self.mi.traverse(emitter)) and self.mi.has_flag(
+                emitter.flags(), self.mi.EmitterFlags.Infinite
+            ):
+                sky = Sky(self.mi, self.scene, emitter, beside_lobes)
+                return (sky, place) if sky.known else (None, -1)
+        return None, -1
 
     def _is_rectangle_light(self, emitter: Emitter) -> bool:
         known = getattr(emitter, "two_sided", False) or emitter.class_name() == "AreaLight"
@@ -349,8 +361,11 @@ class Lights:
             return dr.zeros(self.mi.Spectrum)
         return si.emitter(self.scene).eval(si, active)
 
-    def sample(self, si: SurfaceInteraction, u: Float, pick: Float, active: Mask) -> LightSample:
-        """A direction toward a light; `u` chooses the point on it, `pick` in [0, 1) the light."""
+    def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
+        """A direction toward a light: `u` in [0, 1)^2 chooses the light by its x, and by what is left a point on it.
+
+        Chosen by a number of its own, a light would get any of the points of all: as uneven as chance.
+        """
         mi = self.mi
         if self.rectangle is not None:
             seen = SphericalRectangle(self.rectangle, si.p)
@@ -360,14 +375,29 @@ class Lights:
             weight = dr.select(ds.pdf > 0, self.emitters[0].eval(at_light, active) / ds.pdf, 0)
             return LightSample(ds, weight, mi.Bool(False), dr.select(seen.uniform, seen.solid_angle, 0))
         if self.count == 1:
+            if self.sky is not None:
+                return self._toward_sky(self.sky, si, u, active)
             ds, weight = self.emitters[0].sample_direction(si, u, active)
             return LightSample(ds, weight, mi.Bool(ds.delta), mi.Float(0))
-        index, probability = self.choice.sample_pmf(pick, active)
+        index, left, probability = self.choice.sample_reuse_pmf(u.x, active)
+        u = mi.Point2f(left, u.y)
         place = dr.gather(mi.UInt32, self.place, index, active)
         emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), place, active)
-        ds, weight = emitter.sample_direction(si, u, active)
+        if self.sky is None:
+            ds, weight = emitter.sample_direction(si, u, active)
+        else:
+            above, lamp = self._toward_sky(self.sky, si, u, active), index != self.sky_place
+            ds, weight = emitter.sample_direction(si, u, active & lamp)
+            ds, weight = dr.select(lamp, ds, above.ds), dr.select(lamp, weight, above.weight)
         ds.pdf *= probability
         return LightSample(ds, weight / probability, mi.Bool(ds.delta), mi.Float(0))
+
+    def _toward_sky(self, sky: Sky, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
+        mi = self.mi
+        ds = dr.zeros(mi.DirectionSample3f, dr.width(si.p))
+        ds.d, ds.p, ds.pdf, radiance = sky.sample(si, u, active)
+        ds.dist, ds.n, ds.time, ds.delta = dr.norm(ds.p - si.p), mi.Normal3f(-ds.d), si.time, mi.Bool(False)
+        return LightSample(ds, dr.select(ds.pdf > 0, radiance / ds.pdf, 0), mi.Bool(False), mi.Float(0))
 
     def pdf(self, origin: Point, solid_angle: Float, si: SurfaceInteraction, active: Mask) -> Float:
         """Density with which `sample`, asked at `origin`, would have chosen the direction in which light `si` was met.
@@ -385,9 +415,26 @@ class Lights:
         it.p = origin
         ds = mi.DirectionSample3f(self.scene, si, it)
         if self.count == 1:
+            if self.sky is not None:
+                return self.sky.pdf(ds.d)
             return self.emitters[0].pdf_direction(it, ds, active)
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
-        return ds.emitter.pdf_direction(it, ds, active) * dr.gather(mi.Float, self.by_pointer, number, active)
+        if self.sky is None:
+            density = ds.emitter.pdf_direction(it, ds, active)
+        else:
+            lamp = active & si.is_valid()  # the sky is what no surface is before
+            density = dr.select(lamp, ds.emitter.pdf_direction(it, ds, lamp), self.sky.pdf(ds.d))
+        return density * dr.gather(mi.Float, self.by_pointer, number, active)
+
+    def share(self, pdf: Float, other: Float) -> Float:
+        """What one of two strategies of a sample each is weighed by, of densities `pdf` and `other`, lights and lobes.
+
+        The power heuristic, p^2 / (p^2 + q^2) (Veach 1995), where a density follows its light; p / (p + q) beside a sky
+        that has been left what lobes find, for which that is the better one (Karlik2019), by 5 to 10 %.
+        """
+        ratio = other / pdf  # first the ratio: p^2 itself overflows for sharp lobes
+        both = dr.fma(ratio, ratio, 1) if self.sky is None else ratio + 1
+        return dr.select(pdf > 0, dr.rcp(both), 0)
 
     def last_hit(
         self, ray: Ray, solid_angle: Float, active: Mask, weigh: Callable[[Radiance, Float], Radiance]

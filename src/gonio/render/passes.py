@@ -58,7 +58,7 @@ class Progress:
 
 def run(
     render: Renders,
-    spp: int,
+    spp: int | Callable[[], int],
     pixels: int,
     *,
     timeout: float | None = None,
@@ -72,25 +72,29 @@ def run(
     At least one pass is made where samples are missing, so that there is always a picture. Both wishes to stop are
     looked at between passes; near the time limit the passes shrink to what still fits.
 
+    spp    asked after each pass where it is a function: no pass goes beyond what it has said
     first  samples per pixel of the first pass, where the rate is known; 0 begins with a short one
     """
     begin = clock()
     fixed = getattr(render, "pass_size", None)  # a Mitsuba scene's passes are of one size
     count = first or power_of_two(FIRST_PASS / pixels)
     compiled, counted_samples, counted_seconds = False, 0, 0.0
-    while render.done < spp:
+    goal = spp if callable(spp) else lambda: spp
+    wanted = goal()
+    while render.done < wanted:
         if fixed:
             count = fixed
         before, started = render.done, clock()
-        render.advance(min(count, spp - render.done))
+        render.advance(min(count, wanted - render.done))
+        wanted = goal()
         elapsed, samples = max(clock() - started, 1e-9), (render.done - before) * pixels
         # The first pass also compiles; it says nothing about the rate unless it stays the only one.
-        if compiled or render.done >= spp:
+        if compiled or render.done >= wanted:
             counted_samples, counted_seconds = counted_samples + samples, counted_seconds + elapsed
         rate = counted_samples / counted_seconds if counted_seconds else samples / elapsed
-        remaining = max(spp - render.done, 0) * pixels / rate
-        report(Progress(render.done, spp, rate, remaining))
-        if render.done >= spp:
+        remaining = max(wanted - render.done, 0) * pixels / rate
+        report(Progress(render.done, wanted, rate, remaining))
+        if render.done >= wanted:
             return ""
         if interrupted():
             return "interrupt"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from . import denoise, exposures, images
 BYTES_PER_PIXEL = 250
 
 MOST = 1 << 30  # samples a pixel, and segments: kernels count them in 32 bits
+UNTIL_MOST = 1 << 16  # samples per pixel until an error is reached, where nobody says how many at most
 MOST_THREADS = 1024
 LONGEST_SIDE = 1 << 16  # of a film, pixels
 
@@ -45,6 +47,8 @@ class Request:
     overrides: Mapping[str, object] = field(default_factory=dict)
     material: BSDF | None = None  # to be shown on a ball, in place of a scene
     checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from
+    until_error: float | None = None  # relMSE at which to stop; `spp` is then the most
+    gradient: tuple[str, ...] = ()  # paths of values in the scene, along which the picture is differentiated
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""
@@ -58,6 +62,15 @@ class Request:
             raise InputError(f"{self.threads} threads asked for", "--threads", f"give 1 to {MOST_THREADS}")
         if self.timeout is not None and not self.timeout > 0:
             raise InputError(f"a time limit of {self.timeout:g} seconds", "--timeout", "give more than 0")
+        if self.until_error is not None:
+            check_error(self.until_error, self.spp)
+        for option, given in (
+            ("denoise", self.denoise),
+            ("until_error", self.until_error),
+            ("spectral", self.spectral),
+        ):
+            if self.gradient and given:
+                raise InputError(f"{option} and derivatives do not go together", "gradient", f"leave {option} out")
         exposures.check(self.exposure)
         if self.size is not None:
             check_film(self.size, "--size")
@@ -67,6 +80,14 @@ class Request:
             images.check_writable(self.output)
         if self.checkpoint is not None:
             files.check_file(self.checkpoint)
+
+
+def check_error(error: float, spp: int | None) -> None:
+    """Raise InputError for an error that no picture has, or samples that tell none."""
+    if not (math.isfinite(error) and error > 0.0):
+        raise InputError(f"a relMSE of {error:g}", "--until-error", "give more than 0, such as 0.01")
+    if spp == 1:
+        raise InputError("one sample per pixel tells no error", "--until-error", "give --spp 2 or more")
 
 
 def parse_size(text: str) -> tuple[int, int]:

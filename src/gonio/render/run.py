@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -20,10 +21,12 @@ from ..work import crew, facts, garbage
 from . import checkpoints, denoise, engine, images, mitsuba_scene
 from .checkpoints import Keeper, Sources
 from .passes import Interrupts, Progress, Renders, run
-from .request import Request, check_film, parse_size
+from .request import UNTIL_MOST, Request, check_film, parse_size
 
 if TYPE_CHECKING:
+    from . import integrators, until
     from .integrators import Settings
+    from .types import Scene
 
 __all__ = ["Prepared", "Request", "Result", "finished", "parse_size", "prepare", "render", "run"]
 
@@ -46,6 +49,7 @@ class Prepared:
 class Result:
     """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's.
 
+    error       relMSE of the picture as it is estimated, where it was rendered until an error
     signal      the number of the signal that interrupted it, 0 where none did
     checkpoint  file from which it goes on, None where there is none
     """
@@ -61,6 +65,7 @@ class Result:
     exposure: float | None = None
     signal: int = 0
     checkpoint: Path | None = None
+    error: float | None = None
 
     def as_dict(self) -> dict[str, object]:
         checkpoint = None if self.checkpoint is None else str(self.checkpoint)
@@ -109,17 +114,25 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     settings = _settings(of_scene, request)
     output = request.output or Path(description.output.filename)
     images.check_writable(output)
-    spp, degrees, how = request.spp or description.spp, description.camera.polarizer, _own(settings)
+    spp, degrees, how = _most(request, description.spp), description.camera.polarizer, _own(settings)
     if degrees is not None:
         polarizer.check(settings, description.where("/camera/polarizer"))
+        if request.until_error is not None or request.gradient:
+            what = "a picture through a polarizer is by Mitsuba's path tracer, which tells no error and no derivative"
+            option = "gradient" if request.gradient else "--until-error"
+            raise InputError(what, option, "leave the polarizer out")
         mi.set_variant(engine.polarized(str(mi.variant())))
         how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
-    built = scene.build(description, mi)
+    built = scene.built(description, mi)
     render: Renders
-    if degrees is None:
-        render = integrators.Render(built, settings, aovs=request.denoise)
+    if request.gradient:
+        from .gradients import Gradients, along
+
+        render = Gradients(built.scene, settings, [along(description, built, path) for path in request.gradient])
+    elif degrees is None:
+        render = _drawing(built.scene, settings, request)
     else:
-        render = polarizer.PolarizedRender(mi, built, spp, settings, degrees)
+        render = polarizer.PolarizedRender(mi, built.scene, spp, settings, degrees)
     return Prepared(
         request,
         render,
@@ -132,17 +145,49 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     )
 
 
+def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.Render | until.Until:
+    """A render by one of Gonio's own integrators."""
+    from . import integrators, until
+
+    if request.until_error is None:
+        return integrators.Render(built, settings, aovs=request.denoise)
+    return until.Until(built, settings, request.until_error, _most(request, 0), aovs=request.denoise)
+
+
+def _most(request: Request, spp: int) -> int:
+    """Samples per pixel: those asked for, those of the scene, or a bound where the error says how many."""
+    return request.spp or (spp if request.until_error is None else UNTIL_MOST)
+
+
+def estimated(prepared: Prepared) -> tuple[float | None, str]:
+    """The relMSE of the picture so far, where it is rendered until an error, and what is to be known of it."""
+    wanted = prepared.request.until_error
+    if wanted is None:
+        return None, ""
+    error = prepared.render.estimate()  # type: ignore[attr-defined]  # of an Until
+    if error <= wanted:
+        return error, ""
+    if not math.isfinite(error):
+        return None, "too few samples to tell the relMSE"
+    done = f"{prepared.render.done} samples per pixel"
+    return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was asked for"
+
+
 def _advice(render: Renders) -> list[str]:
     """What to tell of the integrator that was chosen."""
-    from . import integrators
-
-    return [render.advice] if isinstance(render, integrators.Render) and render.advice else []
+    text = getattr(render, "advice", "")
+    return [text] if text else []
 
 
 def _how(settings: Settings | None, request: Request, **more: images.Value) -> str:
     """The settings that a picture depends on, in words."""
     ours = {} if settings is None else {**asdict(settings), "program": _code_of(settings.program)}
-    return ", ".join(f"{name} {value}" for name, value in {**ours, **more, "features": request.denoise}.items())
+    others: dict[str, images.Value] = {**more, "features": request.denoise}
+    if request.until_error is not None:
+        others["until_error"] = request.until_error
+    if request.gradient:
+        others["gradient"] = ", ".join(request.gradient)
+    return ", ".join(f"{name} {value}" for name, value in {**ours, **others}.items())
 
 
 def _code_of(program: type) -> str:
@@ -193,6 +238,8 @@ def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str
         "version": f"gonio {__version__}, mitsuba {mi.__version__}",
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+    if request.until_error is not None:
+        found["until_error"] = request.until_error
     if request.denoise:
         found["denoised"] = f"OIDN, pyoidn {denoise.available()}"
     return found
@@ -202,10 +249,14 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
     from . import adapter, integrators, lights
 
     if request.integrator is None:
-        for option, value in (("--max-depth", request.max_depth), ("--sampler", request.sampler)):
+        options = {"--max-depth": request.max_depth, "--sampler": request.sampler}
+        for option, value in {**options, "--until-error": request.until_error}.items():
             if value is not None:
                 what = "a Mitsuba scene's own integrator does not take this option"
                 raise InputError(what, option, "add --integrator path (or direct), or change it in the .xml")
+    if request.gradient:
+        what = "a Mitsuba scene, and derivatives are along values of a scene of Gonio's format"
+        raise InputError(what, "gradient", "give a folder or a .json")
     adapter.register(mi)
     lights.register(mi)
     scene = mitsuba_scene.load(request, mi)
@@ -213,12 +264,12 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
     images.check_writable(output)
     sensor = scene.sensors()[0]
     files = mitsuba_scene.sources(request.scene, request.overrides)
-    spp = request.spp or int(sensor.sampler().sample_count())
+    spp = _most(request, int(sensor.sampler().sample_count()))
     width, height = (int(n) for n in sensor.film().crop_size())
     check_film((width, height), str(request.scene))
     if request.integrator is not None:
         settings = _settings(integrators.Settings(), request)
-        render: Renders = integrators.Render(scene, settings, aovs=request.denoise)
+        render: Renders = _drawing(scene, settings, request)
         how, all_ = _own(settings), _how(settings, request)
     else:
         seed = request.seed or 0
@@ -251,7 +302,7 @@ def work(
     long       seconds that such a job must take; a minute where None
     tell       called at the start with what was found
     """
-    from . import integrators, tiles
+    from . import integrators, tiles, until
 
     request, (width, height) = prepared.request, prepared.size
     path = request.checkpoint or temporary
@@ -261,7 +312,14 @@ def work(
         if found:
             tell(found)
     gathered = None
-    if crew.current().size > 1 and prepared.render.done < prepared.spp:
+    goal: int | Callable[[], int] = prepared.spp
+    if isinstance(prepared.render, until.Until):
+        drawing = prepared.render
+        goal = lambda: drawing.goal  # noqa: E731
+        if crew.current().size > 1:
+            what = "workers render parts of a picture, and its error is that of the whole"
+            raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
+    elif crew.current().size > 1 and prepared.render.done < prepared.spp:
         tiles.travelling(prepared)  # what cannot travel is said before anything is written
         assert isinstance(prepared.render, integrators.Render)
         gathered = tiles.Gathered(prepared.render, prepared.spp)
@@ -280,7 +338,7 @@ def work(
         else:
             stopped = run(
                 prepared.render,
-                prepared.spp,
+                goal,
                 width * height,
                 timeout=request.timeout,
                 report=after,
@@ -336,6 +394,9 @@ def render(
         )
         picture = finished(prepared.render, request.denoise)
         settings = prepared.settings | {"spp": prepared.render.done}
+        error, unmet = estimated(prepared)
+        if error is not None:
+            settings |= {"estimated_error": round(error, 12)}
         if stopped:
             settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
         seconds = time.perf_counter() - started
@@ -351,11 +412,17 @@ def render(
         seconds,
         stopped,
         settings,
-        (*prepared.warnings, *filter(None, [shown.notice, failed])),
+        (*prepared.warnings, *filter(None, [unmet, shown.notice, failed])),
         shown.exposure,
         interrupts.asked if stopped == "interrupt" else 0,
         keeper.path if keeper.written else None,
+        error,
     )
+
+
+def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The picture, and its derivatives below it: (1 + paths, height, width, 3)."""
+    return np.stack([picture, *prepared.render.slopes()])  # type: ignore[attr-defined]  # of Gradients
 
 
 def finished(render: Renders, denoised: bool) -> NDArray[np.float32]:

@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,6 +32,10 @@ def render(
     timeout: Annotated[
         float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")
     ] = None,
+    until_error: Annotated[
+        float | None,
+        Option(metavar="E", help="Stop when relMSE is estimated to be below E; --spp is then the most, else 65536."),
+    ] = None,
     checkpoint: Checkpoint = None,
     crew: Crew,
     as_json: Json = False,
@@ -48,10 +53,12 @@ def render(
       gonio render examples/phong -o phong.exr --spp 256 --size 640x480
       gonio render examples/phong -o phong.png --exposure auto
       gonio render ward.py:Ward -p alpha=.1,.4 -o ward.png
+      gonio render examples/phong --until-error .001 -o quiet.exr
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
 
     request = how.request(scene, output, timeout, made.instead_of(scene), checkpoint)
+    request = replace(request, until_error=until_error)
     carry_out(request, scene.name, as_json, crew)
 
 
@@ -80,6 +87,8 @@ def _print(result: Result, exposure: Exposure) -> None:
     text = f"{result.output}  {width}x{height}, {result.spp} spp, {result.seconds:.1f} s"
     if exposure == "auto" and result.exposure is not None:
         text += f", exposure {result.exposure:+g} EV"
+    if result.error is not None:
+        text += f", relMSE estimated at {result.error:.3g}"
     print_warnings(result.warnings)
     if result.stopped:
         why = f"stopped by {words(result.signal)}" if result.stopped == "interrupt" else "stopped at the time limit"

@@ -87,12 +87,14 @@ class Integrator:
     name         as `--integrator` and a scene's "integrator" have it
     takes_depth  whether `Settings.max_depth` means something: then a scene must give maxDepth
     splats       whether a sample adds to other pixels than its own, in whole numbers of `unit` (`Sums.splats`)
+    blurs        whether its bias goes away with the number of samples, of which all pixels then need as many
     """
 
     family: ClassVar[Family[type[Integrator]]]
     name: ClassVar[str] = ""
     takes_depth: ClassVar[bool] = False
     splats: ClassVar[bool] = False
+    blurs: ClassVar[bool] = False
     unit: float = 1.0  # what one of its splats counts
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):

@@ -58,6 +58,7 @@ class Caustics(Path):
 
     name = "caustics"
     merges: ClassVar[bool] = True
+    blurs: ClassVar[bool] = True
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         super().__init__(mi, scene, sensor, settings, aovs)

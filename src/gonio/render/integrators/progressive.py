@@ -30,6 +30,8 @@ TILE = 4
 
 LANES = "lanes"  # in a state: samples of each lane
 
+SHARE = 16  # a lane's share of samples counts in sixteenths
+
 # Before the first pass all lanes read one zero. To write a zero for each would take a large film as long as its first
 # sample. More than one are kept, since Dr.Jit makes another kernel of what reads an array of one.
 NOTHING = 16
@@ -41,11 +43,19 @@ class Render:
     scene     a loaded Mitsuba scene; its parameters may change between renders, not between passes
     sensor    the camera; None takes the scene's first. Its film gives the size; the pixel filter is a box
     aovs      also average albedo and normal of the first hit, for the denoiser
+    share     samples that each lane gets where a picture has SHARE of them on the mean; None: as many for all
     """
 
     features = 0  # values that a subclass adds up beside the radiance
 
-    def __init__(self, scene: Scene, settings: Settings, sensor: Sensor | None = None, aovs: bool = False):
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        sensor: Sensor | None = None,
+        aovs: bool = False,
+        share: NDArray[np.uint32] | None = None,
+    ):
         self.mi = mi = engine.load()
         if mi.is_polarized:
             raise InputError(
@@ -58,7 +68,8 @@ class Render:
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0
         self._lanes: UInt | None = None  # samples of each lane, where some are ahead of `done`
-        self._order = _tiles(self.width, self.height)
+        self._share = None if share is None else engine.own(mi.UInt32, share)
+        self._order = tiles(self.width, self.height)
         self._pixel = engine.own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
         self._sums = Sums.zeros(mi, NOTHING, 6 if aovs else self.features, self._splatted)
@@ -90,20 +101,29 @@ class Render:
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
-            if self._lanes is not None:
-                highest = max(highest, int(dr.max(self._lanes)[0]))
+            lanes, until = self._lanes, dr.opaque(mi.UInt32, highest)
+            if self._share is not None:
+                lanes, until = self._shared(lowest) if lanes is None else lanes, self._shared(highest)
+            if lanes is not None:  # some lanes are ahead, and go on or wait
+                until = dr.maximum(lanes, until)
+                dr.eval(lanes, until)
+                lowest, highest = int(dr.min(lanes)[0]), int(dr.max(until)[0])
             for start, end in self._integrator.stages(lowest, highest):
                 first, last = dr.opaque(mi.UInt32, start), dr.opaque(mi.UInt32, end)
-                if self._lanes is not None:  # some lanes are ahead, and go on or wait
-                    until = dr.maximum(self._lanes, dr.opaque(mi.UInt32, self.done + count))
-                    first, last = dr.clip(self._lanes, first, last), dr.minimum(until, last)
+                if lanes is not None:
+                    first, last = dr.clip(lanes, first, last), dr.minimum(until, last)
                 lane = dr.arange(mi.UInt32, len(self._pixel)) * dr.opaque(mi.UInt32, begun)
                 sums, begun = self._integrator.accumulate(self._pixel, key, first, last, sums.at(lane)), True
                 dr.eval(sums)
             dr.sync_thread()
         self._sums = sums
         self.done += count
-        self._lanes = None
+        self._lanes = None if self._share is None else until
+
+    def _shared(self, done: int) -> UInt:
+        """Samples of each lane where the picture has so many on the mean."""
+        mi = self.mi
+        return mi.UInt32(mi.UInt64(self._share) * dr.opaque(mi.UInt64, done) // SHARE)
 
     @property
     def _begun(self) -> bool:
@@ -169,7 +189,7 @@ class Render:
         return np.array(pixels, np.float32).reshape(shape)
 
 
-def _tiles(width: int, height: int) -> NDArray[np.uint32]:
+def tiles(width: int, height: int) -> NDArray[np.uint32]:
     """The pixel (row * width + column) of each lane: tiles of TILE x TILE, row by row, without padding."""
     pixels = np.arange(height * width, dtype=np.uint32).reshape(height, width)
     edge = width - width % TILE  # behind it tiles are narrower

@@ -34,6 +34,7 @@ from ..types import (
     SurfaceInteraction,
     Texture,
     UInt,
+    Vector,
 )
 from .base import FIRST_FREE, Integrator, Settings
 from .sums import Sums
@@ -123,7 +124,7 @@ class Transport(Integrator):
         self.Waiting = _waiting_type(mi.variant(), self.media.known, self.merges)
         self.context = mi.BSDFContext()
         self.context.type_mask = NESTS if self.media.known else SEPARATES
-        self.lights = Lights(mi, scene, self.surfaces)
+        self.lights = Lights(mi, scene, self.surfaces, beside_lobes=self.samples_lobes)
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
@@ -243,7 +244,7 @@ class Transport(Integrator):
         emitted = lights.emitted(si, active)
         if self.samples_lights and not first:
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)
-            weight = mis(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
+            weight = lights.share(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
             if self.merges:
                 emitted = self.found(path, si, emitted, active & (path.pdf == 0))
@@ -292,7 +293,7 @@ class Transport(Integrator):
         end = active & last
 
         def weigh(light: Radiance, light_pdf: Float) -> Radiance:
-            return dr.select(pdf > 0, light * mis(pdf, light_pdf), light) if self.samples_lights else light
+            return dr.select(pdf > 0, light * lights.share(pdf, light_pdf), light) if self.samples_lights else light
 
         if not self.traces_last:
             radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
@@ -365,27 +366,43 @@ class Transport(Integrator):
         Returns (light gathered from the lights, solid angle of the light, BSDF sample, its weight).
         """
         mi, lights, context = self.mi, self.lights, self.context
-        lobe, pick = self.pair(key, index, dimension + CHOICE)
+        lobe, _ = self.pair(key, index, dimension + CHOICE)
         u = mi.Point2f(*self.direction_pair(key, index, dimension + LOBE))
         if not self.samples_lights or lights.count == 0:
-            return mi.Spectrum(0), mi.Float(0), *bsdf.sample(context, si, lobe, u, active)
+            bs, weight = bsdf.sample(context, si, lobe, u, active)
+            _, weight = self.attached(si, bsdf, bs.wo, mi.Spectrum(0), bs, weight, active)
+            return mi.Spectrum(0), mi.Float(0), bs, weight
         pair = self.direction_pair if lights.has_environment else self.pair
-        light = lights.sample(si, mi.Point2f(*pair(key, index, dimension + LIGHT)), pick, active)
+        light = lights.sample(si, mi.Point2f(*pair(key, index, dimension + LIGHT)), active)
         toward = si.to_local(light.ds.d)
         if self.samples_lobes or self.follows_delta or self.aovs:
             value, pdf, bs, weight = bsdf.eval_pdf_sample(context, si, toward, lobe, u, active)
         else:
             value, pdf = bsdf.eval(context, si, toward, active), mi.Float(0)
             bs, weight = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0)
+        value, weight = self.attached(si, bsdf, toward, value, bs, weight, active)
         gathered = value * light.weight
         if self.samples_lobes:
-            gathered *= dr.select(light.delta, 1, mis(light.ds.pdf, pdf))
+            gathered *= dr.select(light.delta, 1, lights.share(light.ds.pdf, pdf))
         if crossing is not None:
             side = dr.select(si.wi.z * toward.z < 0.0, crossing.beyond, crossing.here)
             gathered *= self.media.transmitted(side, si, light.ds.dist) & crossing.surface
         visible = active & dr.any(gathered != 0)
         visible = self.unoccluded(si, light.ds.p, visible)
         return dr.select(visible, gathered, 0), light.solid_angle, bs, weight
+
+    def attached(
+        self,
+        si: SurfaceInteraction,
+        bsdf: MitsubaBSDF,
+        toward: Vector,
+        value: Radiance,
+        bs: BSDFSample,
+        weight: Radiance,
+        active: Mask,
+    ) -> tuple[Radiance, Radiance]:
+        """The BSDF's value toward a light and the weight of its sample, as they are; for who differentiates them."""
+        return value, weight
 
     def ambient_light(self, light: Texture, bsdf: MitsubaBSDF, si: SurfaceInteraction, active: Mask) -> Radiance:
         """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
@@ -402,14 +419,8 @@ class Transport(Integrator):
 
         Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
         """
-        survive = dr.clip(dr.max(throughput) * dr.square(eta), 1e-6, 0.95)
+        survive = dr.clip(dr.max(dr.detach(throughput)) * dr.square(eta), 1e-6, 0.95)
         u, _ = sampler.independent_pair(key, index, dimension + ROULETTE)
         plays = depth + 1 >= ROULETTE_DEPTH
         active = active & (~plays | (u < survive))
         return dr.select(plays, throughput / survive, throughput), active
-
-
-def mis(pdf: Float, other: Float) -> Float:
-    """Power heuristic with exponent 2 for two strategies of one sample each (Veach 1995): p^2 / (p^2 + q^2)."""
-    ratio = other / pdf  # first the ratio: p^2 itself overflows for sharp lobes
-    return dr.select(pdf > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)

@@ -1,0 +1,115 @@
+"""Directions toward an environment, by how bright it is.
+
+A grid of cells, even in longitude and in colatitude, holds the mean luminance of each; within a cell directions are
+uniform. Where lobes are sampled beside it (multiple importance sampling), the grid holds what exceeds the mean of the
+whole: lobes see to the even part, and the directions here go where they would be missed (Karlik2019).
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from . import engine
+from .types import Emitter, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt, Vector
+
+HEIGHT, WIDTH = 1 << 9, 1 << 10  # cells: .35 degrees, finer than most maps
+LEAST = 0.05  # of its luminance that each cell keeps: lobes that are badly sampled have to be found here
+MOST_POINTS = 1 << 23  # of a map, to be looked at
+
+
+class Sky:
+    """An environment as a density of directions.
+
+    compensated  whether lobes are sampled beside it
+    """
+
+    def __init__(self, mi: ModuleType, scene: Scene, emitter: Emitter, compensated: bool) -> None:
+        self.mi, self.emitter = mi, emitter
+        pixels = dict(mi.traverse(emitter)).get("data")
+        across = 1 if pixels is None else int(dr.ceil(pixels.shape[1] / WIDTH))
+        across = max(1, min(across, int((MOST_POINTS / (HEIGHT * WIDTH)) ** 0.5)))
+        luminance = self._seen(across)
+        edges = np.cos(np.pi * np.arange(HEIGHT + 1) / HEIGHT)
+        angle = (edges[:-1] - edges[1:])[:, None] * (2.0 * np.pi / WIDTH)  # steradian of a cell
+        if compensated:
+            mean = float(np.sum(luminance * angle) / (4.0 * np.pi))
+            luminance = np.maximum(luminance - mean, LEAST * luminance)
+        total = float(np.sum(luminance * angle))
+        self.known = 0.0 < total < np.inf
+        if not self.known:
+            return
+        rows = np.cumsum(np.sum(luminance * angle, axis=1) / total)
+        columns = np.cumsum(luminance, axis=1)
+        columns /= np.maximum(columns[:, -1:], 1e-300)
+        self._density = self._held(luminance / total)  # 1/sr
+        self._rows, self._columns = self._held(rows / rows[-1]), self._held(columns)
+        box = scene.bbox()
+        reach = 1.0 if not box.valid() else float(dr.norm(mi.ScalarVector3f(box.extents())))
+        self._far = dr.opaque(mi.Float, max(4.0 * reach, 1e-3))
+
+    def _held(self, values: NDArray[np.float64]) -> Float:
+        return engine.own(self.mi.Float, np.ascontiguousarray(values.ravel(), np.float32))
+
+    def _seen(self, across: int) -> NDArray[np.float64]:
+        """Mean luminance of each cell, from so many points a side."""
+        mi = self.mi
+        index = dr.arange(mi.UInt32, HEIGHT * WIDTH)
+        row = index // WIDTH
+        x, y = mi.Float(index - row * WIDTH), mi.Float(row)
+        total = dr.zeros(mi.Float, HEIGHT * WIDTH)
+        for k in range(across * across):
+            du, dv = (((k % across) + 0.5) / across, ((k // across) + 0.5) / across)
+            direction = self._toward((x + du) * (1.0 / WIDTH), dr.cos((y + dv) * (dr.pi / HEIGHT)))
+            si = dr.zeros(mi.SurfaceInteraction3f, HEIGHT * WIDTH)
+            si.wi = -direction
+            if mi.is_spectral:
+                si.wavelengths = type(si.wavelengths)(*np.linspace(450.0, 620.0, len(si.wavelengths)).tolist())
+            seen = self.emitter.eval(si)
+            total += mi.luminance(seen) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(seen))
+            dr.eval(total)
+        found = np.array(total, np.float64).reshape(HEIGHT, WIDTH) / across**2
+        return np.where(np.isfinite(found), np.maximum(found, 0.0), 0.0)
+
+    def _toward(self, longitude: Float, cosine: Float) -> Vector:
+        """A direction: longitude in turns, cosine of the angle with the grid's axis, y."""
+        sine = dr.sqrt(dr.maximum(0.0, dr.fma(-cosine, cosine, 1.0)))
+        sin, cos = dr.sincos(longitude * (2.0 * dr.pi))
+        return self.mi.Vector3f(sine * cos, cosine, sine * sin)
+
+    def pdf(self, direction: Vector) -> Float:
+        """Density of `sample`, 1/sr."""
+        mi = self.mi
+        turns = dr.atan2(direction.z, direction.x) * (0.5 * dr.inv_pi)
+        turns -= dr.floor(turns)
+        down = dr.acos(dr.clip(direction.y, -1.0, 1.0)) * dr.inv_pi
+        column = dr.minimum(mi.UInt32(turns * WIDTH), WIDTH - 1)
+        row = dr.minimum(mi.UInt32(down * HEIGHT), HEIGHT - 1)
+        return dr.gather(mi.Float, self._density, row * WIDTH + column)
+
+    def sample(self, it: Interaction, u: Point, active: Mask) -> tuple[Vector, Point, Float, Radiance]:
+        """(direction, a point far away in it, density in 1/sr, radiance from there)."""
+        mi = self.mi
+        row, down = self._found(self._rows, mi.UInt32(0), HEIGHT, u.y)
+        column, along = self._found(self._columns, row * WIDTH, WIDTH, u.x)
+        y, step = mi.Float(row), dr.pi / HEIGHT
+        cosine = dr.lerp(dr.cos(y * step), dr.cos((y + 1.0) * step), down)
+        direction = self._toward((mi.Float(column) + along) * (1.0 / WIDTH), cosine)
+        density = dr.gather(mi.Float, self._density, row * WIDTH + column)
+        si: SurfaceInteraction = dr.zeros(mi.SurfaceInteraction3f)
+        si.wi, si.wavelengths, si.time = -direction, it.wavelengths, it.time
+        return direction, dr.fma(direction, self._far, it.p), density, self.emitter.eval(si, active)
+
+    def _found(self, sums: Float, begin: UInt, count: int, u: Float) -> tuple[UInt, Float]:
+        """Where u falls among `count` running sums, a power of two of them, and how far into that step."""
+        mi = self.mi
+        at, half = mi.UInt32(0), count // 2
+        while half:
+            at = dr.select(dr.gather(mi.Float, sums, begin + at + (half - 1)) <= u, at + half, at)
+            half //= 2
+        low = dr.select(at > 0, dr.gather(mi.Float, sums, begin + dr.maximum(at, 1) - 1), 0.0)
+        high = dr.gather(mi.Float, sums, begin + at)
+        return at, dr.clip((u - low) / dr.maximum(high - low, 1e-30), 0.0, 1.0)

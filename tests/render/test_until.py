@@ -1,0 +1,160 @@
+"""Rendering until an error: the estimate is honest, the picture unbiased, and its bits do not depend on passes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gonio as go
+import numpy as np
+import pytest
+from gonio.errors import GonioWarning, InputError
+from gonio.render import images, run, until
+from gonio.render.integrators.progressive import SHARE, tiles
+from gonio.work import crew, kept
+
+OPTIONS = {"size": (48, 32), "seed": 5}
+
+
+def relmse(x: np.ndarray, r: np.ndarray) -> float:
+    return float(np.mean((x - r) ** 2 / (r**2 + 0.01 * np.mean(r) ** 2)))
+
+
+@pytest.fixture
+def shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shares are worth it whatever they save."""
+    monkeypatch.setattr(until, "PAYS_SAMPLES", 0)
+    monkeypatch.setattr(until, "PAYS", 2.0)
+
+
+def drawing(scene: Path, error: float, tmp_path: Path, **options: object) -> until.Until:
+    request = run.Request(scene, tmp_path / "a.exr", until_error=error, **OPTIONS | options)  # type: ignore[arg-type]
+    found = run.prepare(request).render
+    assert isinstance(found, until.Until)
+    return found
+
+
+def finish(render: until.Until, size: int = 7) -> np.ndarray:
+    """Advance it to its end, by passes of a size."""
+    while (goal := render.goal) > render.done:
+        render.advance(min(size, goal - render.done))
+    return render.image()
+
+
+@pytest.mark.parametrize("adapts", [False, True])
+def test_the_error_is_what_was_promised(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, adapts: bool
+) -> None:
+    monkeypatch.setattr(until, "PAYS_SAMPLES", 0 if adapts else 10**12)
+    truth = go.render(scene, spp=16384, size=(48, 32), seed=99)
+    true, told = [], []
+    for seed in range(6):
+        render = drawing(scene, 2e-4, tmp_path, seed=seed)
+        true.append(relmse(finish(render, 64), truth))
+        told.append(render.estimate())
+        assert told[-1] <= 2e-4
+        assert ("share" in render.state()) == adapts
+    assert np.mean(true) < 2e-4 * 1.3
+    assert 1 / 1.3 < np.mean(true) / np.mean(told) < 1.3
+
+
+def test_noise_is_told_from_two_pictures_though_single_samples_are_bright() -> None:
+    rng = np.random.default_rng(2)
+    truth = np.repeat(rng.uniform(0.2, 2.0, (10, 10)), 10, 0).repeat(10, 1)[..., None] * np.ones(3)
+
+    def picture() -> np.ndarray:
+        bright = rng.random((100, 100, 1)) < 0.003
+        return (truth * (rng.gamma(100.0, 0.01, truth.shape) + 20.0 * (bright - 0.003))).astype(np.float32)
+
+    pairs = [(picture(), picture()) for _ in range(8)]
+    true = np.mean([relmse(0.5 * (a + b), truth) for a, b in pairs])
+    assert true == pytest.approx(float(np.mean([until.squares(a, b) for a, b in pairs])), rel=0.15)
+
+
+def test_passes_of_any_size_add_up_to_the_same_bits(scene: Path, tmp_path: Path, shared_out: None) -> None:
+    one, other = drawing(scene, 3e-4, tmp_path), drawing(scene, 3e-4, tmp_path)
+    a, b = finish(one, 1000), finish(other, 3)
+    assert one.state()["share"].min() < SHARE < one.state()["share"].max()
+    assert np.array_equal(a, b) and one.done == other.done > 2 * until.FIRST
+
+
+@pytest.mark.parametrize("at", [5, 16, 27])
+def test_one_that_was_stopped_goes_on_to_the_same_bits(scene: Path, tmp_path: Path, shared_out: None, at: int) -> None:
+    whole = finish(drawing(scene, 3e-4, tmp_path))
+    stopped, again = drawing(scene, 3e-4, tmp_path), drawing(scene, 3e-4, tmp_path)
+    while stopped.done < at:
+        stopped.advance(min(3, stopped.goal - stopped.done, at - stopped.done))
+    kept.write(tmp_path / "c", {}, stopped.state())
+    again.restore(stopped.done, kept.read(tmp_path / "c").arrays)
+    assert np.array_equal(again.image(), stopped.image())
+    assert np.array_equal(finish(again), whole)
+    with pytest.raises((ValueError, KeyError)):
+        drawing(scene, 3e-4, tmp_path, size=(16, 16)).restore(at, stopped.state())
+
+
+def test_a_checkpoint_keeps_the_error_that_was_asked_for(scene: Path, tmp_path: Path) -> None:
+    whole = go.render(scene, until_error=3e-4, checkpoint=tmp_path / "c", **OPTIONS)  # type: ignore[arg-type]
+    with pytest.warns(GonioWarning, match="goes on from"):
+        assert np.array_equal(go.resume(tmp_path / "c"), whole)
+    with pytest.raises(InputError, match=r"settings: .*until_error 0.0003"):
+        go.render(scene, until_error=1e-4, checkpoint=tmp_path / "c", **OPTIONS)  # type: ignore[arg-type]
+
+
+def test_a_pixels_samples_do_not_follow_its_own_values(scene: Path, tmp_path: Path, shared_out: None) -> None:
+    """The mean of many pictures is the picture: shares that are chosen by samples which count too have no bias."""
+    truth = go.render(scene, spp=16384, size=(16, 12), integrator="direct", seed=99)
+    found = np.array([
+        finish(drawing(scene, 4e-3, tmp_path, size=(16, 12), seed=seed, integrator="direct"), 64) for seed in range(24)
+    ])  # fmt: skip
+    error = np.sqrt(found.mean((2, 3)).var(0, ddof=1).mean() / len(found) + 1e-12)
+    z = (found.mean(0) - truth).mean((1, 2)) / error
+    assert np.abs(z).max() < 4.5
+
+
+def test_shares_follow_the_noise_and_cost_nothing() -> None:
+    noise = np.ones((40, 46))
+    noise[:20] = 16.0
+    share, gain = until.shares(noise)
+    assert share.shape == (40 * 46,) and share.mean() / SHARE == pytest.approx(1.0, abs=0.01)
+    lanes = share.astype(float)[np.argsort(tiles(46, 40))].reshape(40, 46)
+    assert lanes[:12].mean() / lanes[-12:].mean() == pytest.approx(4.0, rel=0.1)  # by the root of the noise
+    assert gain == pytest.approx(2.5**2 / 8.5, rel=0.1)
+    assert until.shares(np.zeros((8, 8)))[1] == 1.0
+
+
+def test_a_bound_that_is_reached_first_is_told(scene: Path, tmp_path: Path) -> None:
+    result = run.render(run.Request(scene, tmp_path / "a.exr", spp=20, until_error=1e-7))
+    assert result.spp == 20 and result.stopped == "" and result.error is not None
+    assert result.warnings == (
+        f"relMSE is estimated to be {result.error:.3g} after 20 samples per pixel, 1e-07 was asked for",
+    )
+    about = images.read(tmp_path / "a.exr").metadata
+    assert about["until_error"] == 1e-7 and about["estimated_error"] == pytest.approx(result.error)
+    with pytest.warns(GonioWarning, match="was asked for"):
+        go.render(scene, spp=4, until_error=1e-7)
+
+
+@pytest.mark.parametrize("integrator", ["caustics", "light", "normal"])
+def test_every_integrator_of_gonios_goes_on_until_an_error(scene: Path, tmp_path: Path, integrator: str) -> None:
+    render = drawing(scene, 0.02, tmp_path, integrator=integrator, denoise=False, max_depth=None)
+    assert np.isfinite(finish(render)).all() and render.estimate() <= 0.02
+
+
+@pytest.mark.parametrize("error", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_error_that_no_picture_has_is_refused(scene: Path, error: float) -> None:
+    with pytest.raises(InputError) as caught:
+        go.render(scene, until_error=error)
+    assert "--until-error" in str(caught.value) or "until_error" in str(caught.value)
+
+
+def test_who_cannot_tell_the_error_says_so(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match="tells no error"):
+        go.render(scene, until_error=0.1, spp=1)
+    with monkeypatch.context() as other:
+        other.setattr(crew, "current", lambda: type("Crew", (), {"size": 4})())
+        with pytest.raises(InputError, match="workers render parts"):
+            go.render(scene, until_error=0.1)
+
+
+def test_the_seed_decides(scene: Path, tmp_path: Path) -> None:
+    a, b, c = (finish(drawing(scene, 1e-3, tmp_path, seed=seed)) for seed in (1, 1, 2))
+    assert np.array_equal(a, b) and not np.array_equal(a, c)
