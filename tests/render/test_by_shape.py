@@ -109,3 +109,12 @@ def test_a_wrong_number_is_said_with_its_place(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(build, "MANY", 4)
     with pytest.raises(go.InputError, match=r"shapes/8/material"):
         go.render(folder, spp=1)
+
+
+def test_derivatives_are_along_one_materials_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(7)
+    folder = written(tmp_path, [paint(rng) for _ in range(9)])
+    monkeypatch.setattr(build, "MANY", 4)
+    picture, slope = go.render(folder, spp=4, max_depth=2, gradient=["shapes.4.material.albedo"])
+    moved = np.abs(slope).sum(axis=2) > 0
+    assert 0 < moved.mean() < 0.1, "of a ball in the middle, lit directly"

@@ -123,7 +123,7 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
             raise InputError(what, option, "leave the polarizer out")
         mi.set_variant(engine.polarized(str(mi.variant())))
         how |= {"integrator": "mitsuba:stokes", "sampler": "mitsuba:independent", "polarizer": degrees}
-    built = scene.built(description, mi)
+    built = scene.built(description, mi, gathers=not request.gradient)
     render: Renders
     if request.gradient:
         from .gradients import Gradients, along

@@ -36,7 +36,7 @@ def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
 
     Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
     """
-    return _Builder(description, mi, gathers=True).scene()
+    return built(description, mi, gathers=True).scene
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,12 @@ class Built:
     bsdfs: Mapping[MaterialPart, MitsubaBSDF]
 
 
-def built(description: schema.SceneDescription, mi: ModuleType) -> Built:
-    """As `build`, with the materials, for who changes them."""
-    builder = _Builder(description, mi)
+def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> Built:
+    """As `build`, with the materials, for who changes them.
+
+    gathers  let one BSDF, which is in no list, stand for very many materials that differ in numbers alone
+    """
+    builder = _Builder(description, mi, gathers)
     return Built(builder.scene(), builder.bsdfs)
 
 
@@ -64,8 +67,7 @@ def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:
 
 
 class _Builder:
-    def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> None:
-        """`gathers`: where very many materials differ in numbers alone, one stands for them."""
+    def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool) -> None:
         from .. import adapter, lights  # here, since they start Dr.Jit
 
         adapter.register(mi)
