@@ -1,0 +1,202 @@
+"""What OpenPBR knows of rough surfaces as tables: how much facets of any reflectance send back, and where to."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ... import ops
+from ...models.conductor import Conductor
+from ...ops import Direction, Pair, Scalar, Table, clamp, function, inset, lookup, maximum, sqrt
+from ...ops.backend import Array
+from ...optics import frame, fresnel
+from ...optics import masking as terms
+from ...optics.ndf import NDF
+from ...optics.special import gauss
+from .. import cache
+from ..albedo import quadrature
+from .kulla_conty import KullaConty
+
+SMALLEST = 1e-4  # width: the tables' first row is a mirror's
+LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
+INDICES, ROUGHNESSES, COSINES = 25, 17, 49
+HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
+
+
+@function
+def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
+    """E of GGX facets of a dielectric of an index of 1 to 5, what they reflect at once."""
+    table = _albedos(masking)
+    f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
+    at = [inset(x, count) for x, count in zip((f0, roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    return clamp(lookup(table, *at)[0], 0.0, 1.0)
+
+
+@lru_cache
+def _albedos(masking: str) -> Table:
+    """E over (root of F0, roughness, root of the cosine)."""
+
+    def build() -> np.ndarray:
+        root = np.linspace(0.0, LARGEST, INDICES)[:, None, None]
+        alpha = np.maximum(np.linspace(0.0, 1.0, ROUGHNESSES) ** 2, SMALLEST)[None, :, None]
+        mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
+        eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
+        return quadrature.glass("ggx", masking, "exact", mu, alpha, eta).reflected
+
+    values = cache.remember(("openpbr", masking, INDICES, ROUGHNESSES, COSINES), build)
+    return Table("openpbr_reflected", values[..., None])
+
+
+def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
+    """Shares of light that white facets, all bounces together, send to the neighbourhoods of `HATS` cosines."""
+    table = _scattering(masking)
+    at = [inset(x, count) for x, count in zip((roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    return lookup(table, *at)
+
+
+@lru_cache
+def _scattering(masking: str) -> Table:
+    """Those shares over (roughness, root of the cosine)."""
+
+    def build() -> np.ndarray:
+        x, w = gauss(64)
+        sin, turns = np.sqrt(1.0 - x**4), (np.arange(96) + 0.5) / 96 * np.pi
+        wi = np.stack(
+            np.broadcast_arrays(sin[:, None] * np.cos(turns), sin[:, None] * np.sin(turns), x[:, None] ** 2), -1
+        )
+        hats = _hats(x) * (4.0 * np.pi * w * x**3)[:, None]
+        places = np.linspace(0.0, 1.0, COSINES)
+        cos = np.maximum(places**2, 1e-3)
+        wo = np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1)
+        found = np.tile(_hats(places), (ROUGHNESSES, 1, 1))
+        for row, roughness in enumerate(np.linspace(0.0, 1.0, ROUGHNESSES)):
+            if roughness < 0.12:  # narrower than the nodes: a mirror's
+                continue
+            white = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking))
+            pairs = np.repeat(wo, wi[..., 0].size, 0), np.tile(wi.reshape(-1, 3), (COSINES, 1))
+            value = white.f(*pairs, precision="float64")[:, 0].reshape(COSINES, len(x), -1).mean(2)
+            shares = value @ hats
+            missed = np.maximum(1.0 - shares.sum(1, keepdims=True), 0.0)  # a peak between the integral's nodes
+            found[row] = (shares + missed * found[row]) / (shares.sum(1, keepdims=True) + missed)
+        return found
+
+    values = cache.remember(("openpbr-scattered", masking, ROUGHNESSES, COSINES, HATS), build)
+    return Table("openpbr_scattered", values)
+
+
+def _hats(x: np.ndarray) -> np.ndarray:
+    """Shares of places among the nodes on both sides of them, (N, HATS)."""
+    shares: np.ndarray = np.maximum(1.0 - np.abs(x[:, None] * (HATS - 1) - np.arange(HATS)), 0.0)
+    return shares
+
+
+# --------------------------------------------------------------------------- any reflectance
+
+# Cosines of facets at which a reflectance is asked for, by Gauss; between them it is a polynomial
+PLACES = [float(x) for x in gauss(8)[0]]
+FEW_PLACES = [float(x) for x in gauss(4)[0]]  # for what is small anyway
+LOSS_INDICES, LOSS_ROUGHNESSES, LOSS_COSINES = 13, 13, 25
+
+
+def prepare(masking: str) -> None:
+    """Find all tables."""
+    for find in (_albedos, _scattering, _faced, _spared):
+        find(masking)
+
+
+def shares_of(x: Array, places: list[float]) -> list[Array]:
+    """Lagrange's polynomials: by how much the value at each place counts at x."""
+    found = []
+    for n, here in enumerate(places):
+        others = [one for m, one in enumerate(places) if m != n]
+        value: Array = 1.0
+        for one in others:
+            value = value * ((x - one) * (1.0 / (here - one)))
+        found.append(value)
+    return found
+
+
+FROM_PLACES: list[list[float]] = np.array(
+    shares_of(np.array(FEW_PLACES), PLACES)
+).T.tolist()  # a reflectance at the few places, from all
+
+
+def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
+    """By how much the reflectance at each of `PLACES` counts in the albedo of facets seen under a cosine."""
+    table = _faced(masking)
+    at = [inset(x, count) for x, count in zip((roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    return lookup(table, *at)
+
+
+@lru_cache
+def _faced(masking: str) -> Table:
+    """That over (roughness, root of the cosine)."""
+    rows, columns = ROUGHNESSES, 65
+
+    def one(ndf: NDF, wo: Direction, m: Direction, o_m: Scalar, alpha: Pair, _: Scalar) -> tuple[Scalar, ...]:
+        g = terms.masking_shadowing(masking, ndf, wo, frame.reflect(wo, m), m, alpha)
+        return tuple(g * share for share in shares_of(o_m, PLACES))
+
+    def build() -> np.ndarray:
+        alpha = np.maximum(np.linspace(0.0, 1.0, rows) ** 2, SMALLEST)[:, None]
+        mu = np.linspace(0.0, 1.0, columns)[None, :] ** 2
+        return np.stack(quadrature.over_normals("ggx", one, len(PLACES), mu, alpha, None, 0.0), -1)
+
+    return Table("openpbr_faced", cache.remember(("openpbr-faced", masking, rows, columns, len(PLACES)), build))
+
+
+def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
+    """How much more of what facets of glass refract gets through than of what they mirror, by how much the reflectance
+    at each of `FEW_PLACES`, of cosines outside, counts: seen from outside, then from inside."""
+    table = _spared(masking)[0]
+    at = [
+        inset(x, count)
+        for x, count in zip((_root_of(eta), roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)
+    ]
+    return lookup(table, *at)
+
+
+def spared_on_average(roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
+    """The mean of `spared` with the cosine."""
+    table = _spared(masking)[1]
+    return lookup(table, *[inset(x, n) for x, n in zip((_root_of(eta), roughness), table.shape, strict=True)])
+
+
+def _root_of(eta: Scalar) -> Scalar:
+    """Where an index stands in the tables of `spared`, whose nodes get closer toward 1."""
+    return sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * LARGEST))
+
+
+@lru_cache
+def _spared(masking: str) -> tuple[Table, Table]:
+    """Those over (root of sqrt(F0), roughness, root of the cosine)."""
+
+    def one(ndf: NDF, wo: Direction, m: Direction, o_m: Scalar, alpha: Pair, eta: Scalar) -> tuple[Scalar, ...]:
+        cos_t = fresnel.cos_transmitted(o_m, eta)
+        mirrored, through = frame.reflect(wo, m), frame.refract(wo, m, cos_t, eta)
+        back = terms.masking_shadowing(masking, ndf, wo, mirrored, m, alpha)
+        on = terms.masking_shadowing(masking, ndf, wo, through, m, alpha, transmits=True)
+        more = ops.where((cos_t > 0.0) & (through.z < 0.0), on, 0.0) - ops.where(mirrored.z > 0.0, back, 0.0)
+        more = ops.where(cos_t > 0.0, more, 0.0)  # what is reflected totally is so whatever covers the surface
+        return tuple(more * share for share in shares_of(ops.where(eta > 1.0, o_m, cos_t), FEW_PLACES))
+
+    def build() -> np.ndarray:
+        root = np.linspace(0.0, 1.0, LOSS_INDICES)[:, None, None] ** 2 * LARGEST
+        eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-4)
+        alpha = np.maximum(np.linspace(0.0, 1.0, LOSS_ROUGHNESSES)[None, :, None] ** 2, SMALLEST)
+        x, w = gauss(16)
+        places = np.concatenate([np.linspace(0.0, 1.0, LOSS_COSINES), x])[None, None, :]
+        sides = [
+            quadrature.over_normals(
+                "ggx", one, len(FEW_PLACES), places**2, alpha, None, 0.0, ratio, quadrature.GLASS_NODES
+            )
+            for ratio in (eta, 1.0 / eta)
+        ]
+        values = np.stack([part for side in sides for part in side], -1)
+        average = np.einsum("erxc,x->erc", values[:, :, LOSS_COSINES:], 4.0 * w * x**3)
+        return np.concatenate([values[:, :, :LOSS_COSINES], average[:, :, None]], 2)
+
+    key = ("openpbr-spared", masking, LOSS_INDICES, LOSS_ROUGHNESSES, LOSS_COSINES, len(FEW_PLACES))
+    values = cache.remember(key, build)
+    return Table("openpbr_spared", values[:, :, :-1]), Table("openpbr_spared_on_average", values[:, :, -1])
