@@ -59,10 +59,9 @@ from ..compensation.glass import Glass
 from ..compensation.lobe import NOTHING, MissingEnergy
 from ..compensation.missing import missing_energy
 from . import _openpbr_tables as tables
-from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, LARGEST, PLACES
+from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, LARGEST, NODES, PLACES
 
 NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
-NODES = 6  # over the root of the cosine, of means of what two layers let through: 1e-3 at F0 = .05
 MOST_RAYS = 1 << 18  # for which what is derived is kept, a hundred numbers each: it halves what is compiled
 STEPS = 4  # of the iteration in `_balanced`
 WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of means with the cosine
@@ -362,11 +361,10 @@ class OpenPBR(BSDF):
         values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
         metal = missing_energy(binding.bound_copy(kind, values))
         bare, filmed, extra = self._at_places(ratio, eta, medium)
-        under, over, weights = [], [], []
-        for x, w in zip(*(part.tolist() for part in gauss(NODES)), strict=True):
-            weights.append(4.0 * w * x**3)
-            under.append(self._kept_below(x * x + 0.0 * rough, rough, ratio, filmed))
-            over.append(self._coat_kept(x * x + 0.0 * rough))
+        weights = [4.0 * w * x**3 for x, w in zip(NODES, gauss(len(NODES))[1].tolist(), strict=True)]
+        under = self._kept_at_nodes(rough, ratio, filmed)
+        over = [1.0 - E for E in tables.reflected_at_nodes(self.coat_roughness, self.coat_ior, self._masking)]
+        over_hats, over = over[:HATS], over[HATS:]
         total = sum(weights)
         sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
         both = [one * other for one, other in zip(under, over, strict=True)]
@@ -407,7 +405,7 @@ class OpenPBR(BSDF):
             bent=bent,  # type: ignore[arg-type]
             filmed=filmed,
             extra=extra,
-            facets=self._balanced(rough) if self._has("coat_weight") else (),
+            facets=self._balanced(rough, over_hats) if self._has("coat_weight") else (),
             metal=metal,
             metal_again=_again(f_metal, metal.average),
             sheet_again=sheet,
@@ -461,20 +459,29 @@ class OpenPBR(BSDF):
         """Find the tables, before a loop is recorded."""
         tables.prepare(self._masking)
 
-    def _balanced(self, rough: Scalar) -> tuple[Scalar, ...]:
+    def _kept_at_nodes(self, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
+        """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
+        found = []
+        E_of = tables.reflected_at_nodes(rough, ratio, self._masking)[HATS:]
+        faced = tables.faced_at_nodes(rough, self._masking) if filmed else [()] * len(E_of)
+        for E, shares in zip(E_of, faced, strict=True):
+            found.append(1.0 - _covered(E + 0.0 * self.base_color, filmed, shares))
+        return found
+
+    def _balanced(self, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar, ...]:
         """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
 
         A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
         light all over and the rest on, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
+
+        kept  1 - E_coat at the nodes
         """
-        rows, kept, w = [], [], []
-        q = sqrt(self._coat_kept(0.45 + 0.0 * rough))
-        for n in range(HATS):
-            cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
-            rows.append(tables.scattered(cos, rough, self._masking))
-            kept.append(self._coat_kept(cos))
+        rows, w = tables.scattered_at_nodes(rough, self._masking), []
+        q = sqrt(kept[round(0.67 * (HATS - 1))])  # where most light is
+        for n, one in enumerate(kept):
+            cos = (n / (HATS - 1.0)) ** 2
             b = sqr(rough) / (sqr(rough) + cos + 1e-3)
-            w.append(2.0 * kept[-1] / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * kept[-1] + 1e-12)))
+            w.append(2.0 * one / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * one + 1e-12)))
         for _ in range(STEPS):
             met = [_sum([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
             w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
@@ -546,10 +553,7 @@ class OpenPBR(BSDF):
     def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
         """The same by what follows from the parameters."""
         E = tables.reflected(cos, rough, ratio, self._masking) + 0.0 * self.base_color
-        if filmed:
-            shares = tables.faced(cos, rough, self._masking)
-            E = clamp(E + _sum([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
-        return 1.0 - E
+        return 1.0 - _covered(E, filmed, tables.faced(cos, rough, self._masking) if filmed else ())
 
     def _even(self, w: Direction, coated: bool) -> Scalar:
         """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
@@ -560,7 +564,7 @@ class OpenPBR(BSDF):
         rough = self.base_diffuse_roughness
         lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": 1.0 + 0.0 * self.base_color, "roughness": rough})
         sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), 0.0 * w.z
-        nodes = [x * x for x in gauss(NODES)[0].tolist()]
+        nodes = [x * x for x in NODES]
         for node, off in zip(nodes, self.derived.bent[coated], strict=True):
             slant = sin * (math.sqrt(1.0 - node * node) * inv_pi) * (1.0 / maximum(w.z, node) - 1.0)
             twice = lost * (lobe._lost(_at(node + 0.0 * w.z)) / (GRAZING_LOSS - MEAN_LOSS))
@@ -1052,6 +1056,13 @@ def _sum(terms: list[Array]) -> Array:
     for term in terms[1:]:
         total = total + term
     return total
+
+
+def _covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
+    """The albedo of facets under a film: what it changes at `PLACES`, by how much these count."""
+    if not filmed:
+        return E
+    return clamp(E + _sum([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
 
 
 def _averaged(values: list[Array]) -> Array:
