@@ -22,7 +22,8 @@ from .kulla_conty import KullaConty
 
 SMALLEST = 1e-4  # width: the tables' first row is a mirror's
 LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
-INDICES, ROUGHNESSES, COSINES = 25, 17, 49
+INDICES, ROUGHNESSES, COSINES = 25, 33, 49
+DRAWS = 1 << 12  # of each direction
 HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
 NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means of what two layers let through: 1e-3 at F0 = .05
 
@@ -108,26 +109,20 @@ def _scattering(masking: str) -> Table:
     """Those shares over (roughness, root of the cosine)."""
 
     def build() -> np.ndarray:
-        x, w = gauss(64)
-        sin, turns = np.sqrt(1.0 - x**4), (np.arange(96) + 0.5) / 96 * np.pi
-        wi = np.stack(
-            np.broadcast_arrays(sin[:, None] * np.cos(turns), sin[:, None] * np.sin(turns), x[:, None] ** 2), -1
-        )
-        hats = _hats(x) * (4.0 * np.pi * w * x**3)[:, None]
-        places = np.linspace(0.0, 1.0, COSINES)
-        cos = np.maximum(places**2, 1e-3)
-        wo = np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1)
-        found = np.tile(_hats(places), (ROUGHNESSES, 1, 1))
-        for row, roughness in enumerate(np.linspace(0.0, 1.0, ROUGHNESSES)):
-            if roughness < 0.12:  # narrower than the nodes: a mirror's
-                continue
-            white = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking))
-            pairs = np.repeat(wo, wi[..., 0].size, 0), np.tile(wi.reshape(-1, 3), (COSINES, 1))
-            value = white.f(*pairs, precision="float64")[:, 0].reshape(COSINES, len(x), -1).mean(2)
-            shares = value @ hats
-            missed = np.maximum(1.0 - shares.sum(1, keepdims=True), 0.0)  # a peak between the integral's nodes
-            found[row] = (shares + missed * found[row]) / (shares.sum(1, keepdims=True) + missed)
-        return found
+        cos = np.maximum(np.linspace(0.0, 1.0, COSINES) ** 2, 1e-4)
+        wo = np.repeat(np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1), DRAWS, 0)
+        # R3, powers of x^4 = x + 1
+        u = np.tile(np.arange(1, DRAWS + 1)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0) % 1.0, (COSINES, 1))
+        found = []
+        for roughness in np.linspace(0.0, 1.0, ROUGHNESSES):
+            alpha = max(roughness**2, SMALLEST)
+            drawn = KullaConty(Conductor(alpha=alpha, fresnel="one", masking=masking)).sample(wo, u)
+            weight = np.where(drawn.pdf > 0.0, drawn.weight[:, 0], 0.0)
+            hats = _hats(np.sqrt(np.clip(drawn.wi[:, 2], 0.0, 1.0))) * weight[:, None]
+            found.append(hats.reshape(COSINES, DRAWS, HATS).mean(1))
+        shares = np.array(found)
+        whole: np.ndarray = shares / shares.sum(-1, keepdims=True)
+        return whole
 
     values = cache.remember(("openpbr-scattered", masking, ROUGHNESSES, COSINES, HATS), build)
     return Table("openpbr_scattered", values)
