@@ -135,13 +135,22 @@ class Faces(NamedTuple):
     """
 
     top: tuple[Scalar, Scalar]
-    base: tuple[Amplitude, Amplitude]
-    bare: tuple[Amplitude, Amplitude]
+    base: tuple[Complex, Complex]
+    bare: tuple[Complex, Complex]
+    way: Scalar
+
+
+class ClearFaces(NamedTuple):
+    """The same of a base that is clear."""
+
+    top: tuple[Scalar, Scalar]
+    base: tuple[Real, Real]
+    bare: tuple[Real, Real]
     way: Scalar
 
 
 @function
-def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces:
+def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces | ClearFaces:
     """Of a film of real index film_eta >= 1 on a base of index eta + i k; k None: one that is clear, see `Film`."""
     sin2 = 1.0 - sqr(cos_i)
     inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
@@ -153,7 +162,7 @@ def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickn
         below = sqrt(maximum(sqr(eta) - sin2, 1e-12))
         base = _clear_face(inside, below, under, sin2)
         bare = _clear_face(cos_i, below, outside, sin2)
-        return Faces((top_s, top_p), base, bare, thickness * inside)
+        return ClearFaces((top_s, top_p), base, bare, thickness * inside)
     w = _root(sqr(eta) - sqr(k) - sin2, eta * k)
     loss = 2.0 * eta * k
     return Faces(
@@ -198,7 +207,7 @@ class Amplitudes(NamedTuple):
 
 
 @function
-def airy(film: Faces, wavelength: Scalar | float) -> Amplitudes:
+def airy(film: Faces | ClearFaces, wavelength: Scalar | float) -> Amplitudes:
     """The sum of all waves at a wavelength, in the unit of the thickness.
 
     Above the line stands r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), with r13 of the bare surface: it cancels only
@@ -209,7 +218,8 @@ def airy(film: Faces, wavelength: Scalar | float) -> Amplitudes:
     sin, cos = sincos(half_angle)
     less = Complex(-2.0 * sqr(sin), 2.0 * sin * cos)  # E - 1
     over, under = [], []
-    for top, base, bare in zip(film.top, film.base, film.bare, strict=True):
+    for number, top in enumerate(film.top):
+        base, bare = film.base[number], film.bare[number]
         inner = less.times(base)
         share = base.scaled(top)
         once = share._replace(re=1.0 + share.re)
@@ -402,7 +412,8 @@ def _band(
     mean, wave = 0.0 * cos_i, 0.0 * cos_i
     trips: list[Amplitude] = []  # once through the film and back, without the way
     sizes: list[Scalar] = []
-    for top, base in zip(film.top, film.base, strict=True):
+    for number, top in enumerate(film.top):
+        base = film.base[number]
         outer, inner = sqr(top), base.square
         passed = 1.0 - outer
         bounced = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
