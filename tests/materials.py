@@ -128,6 +128,8 @@ COMPOSED = {
     "openpbr": go.OpenPBR(**EVERY_SLAB),
     "openpbr-thin": go.OpenPBR(**EVERY_SLAB, geometry_thin_walled=True),
     "openpbr-by-albedo": go.OpenPBR(**EVERY_SLAB, layering="albedo"),
+    "disney2015": go.model("disney2015")(0.5, 0.3, 0.0, 0.4, 0.2, spec_trans=0.4, sheen=0.5, clearcoat=0.6),
+    "disney2015-thin": go.model("disney2015")(0.5, 0.3, 0.0, spec_trans=0.4, sheen=0.5, clearcoat=0.6, thin=True),
 }
 SMALL = {
     **DIFFUSE,

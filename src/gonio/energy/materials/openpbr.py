@@ -822,7 +822,9 @@ class OpenPBR(BSDF):
         inner = where(cos_t > 0.0, f, white)
         inner = 1.0 - (1.0 - inner) * self._past_layers(maximum(cos_t, 1e-4))
         twice = _lobe(self._twice(wo, wi, mode), None, ideal)
-        mirrored = where(above, f * self.specular_color, _mix(f, inner, T))
+        # what is no glass looks from below as from above
+        opaque = self._glossy(cos, b.ratio, b.eta, b.medium)
+        mirrored = where(above, f * self.specular_color, _mix(opaque, inner, T))
         tint = where(above, self.specular_color, white)
         reflected = mirrored * facets + tint * (twice * T)
         spread = _lobe(where(at.reflects, 0.0, glass._value(at)), smooth, ideal, 1.0 / sqr(eta))
@@ -1001,14 +1003,15 @@ class OpenPBR(BSDF):
 
     @property
     def delta(self) -> Delta:
-        plain = self.plain
-        mirror = plain._may_be_smooth("specular_roughness")
-        mirror = mirror or (plain._has("coat_weight") and plain._may_be_smooth("coat_roughness"))
-        return "maybe" if mirror or plain._has_holes() else "never"
+        mirror = self._may_be_smooth("specular_roughness")
+        mirror = mirror or (self._has("coat_weight") and self._may_be_smooth("coat_roughness"))
+        return "maybe" if mirror or self._has_holes() else "never"
 
     @property
     def isotropic(self) -> bool:
         plain = self.plain
+        if isinstance(self.specular_roughness_anisotropy, Node):  # a recording's may take any value
+            return False
         widths = plain.specular_roughness_anisotropy, plain.coat_roughness_anisotropy
         return all(isinstance(one, int | float) and one == 0 for one in widths)
 
