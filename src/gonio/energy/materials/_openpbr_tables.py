@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ... import ops
 from ...models.conductor import Conductor
+from ...models.microfacet import SMOOTH
 from ...ops import Direction, Pair, Scalar, Table, clamp, function, inset, lookup, maximum, sqrt
 from ...ops.backend import Array
 from ...ops.table import read_in_numpy
@@ -20,7 +22,7 @@ from .. import cache
 from ..albedo import quadrature
 from .kulla_conty import KullaConty
 
-SMALLEST = 1e-4  # width: the tables' first row is a mirror's
+SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror, whatever it is
 LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
 INDICES, ROUGHNESSES, COSINES = 25, 33, 49
 DRAWS = 1 << 12  # of each direction
@@ -28,12 +30,22 @@ HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to 
 NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means of what two layers let through: 1e-3 at F0 = .05
 
 
+def _row(roughness: Scalar) -> Scalar:
+    """Where a roughness stands on the tables' axes."""
+    return maximum(roughness - SHARP, 0.0) * (1.0 / (1.0 - SHARP))
+
+
+def _rows(count: int) -> np.ndarray:
+    """The roughness of so many rows."""
+    return SHARP + (1.0 - SHARP) * np.linspace(0.0, 1.0, count)
+
+
 @function
 def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
     """E of GGX facets of a dielectric of an index of 1 to 5, what they reflect at once."""
     table = _albedos(masking)
     f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
-    at = [inset(x, count) for x, count in zip((f0, roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    at = [inset(x, count) for x, count in zip((f0, _row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return clamp(lookup(table, *at)[0], 0.0, 1.0)
 
 
@@ -43,7 +55,7 @@ def _albedos(masking: str) -> Table:
 
     def build() -> np.ndarray:
         root = np.linspace(0.0, LARGEST, INDICES)[:, None, None]
-        alpha = np.maximum(np.linspace(0.0, 1.0, ROUGHNESSES) ** 2, SMALLEST)[None, :, None]
+        alpha = _rows(ROUGHNESSES)[None, :, None] ** 2
         mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
         eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
         return quadrature.glass("ggx", masking, "exact", mu, alpha, eta).reflected
@@ -56,20 +68,20 @@ def reflected_at_nodes(roughness: Scalar, index: Scalar, masking: str) -> tuple[
     """`reflected` at the cosines of `HATS`, then at those of `NODES`: one look at a table instead of eighteen."""
     table = _at_nodes(masking).reflected
     f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
-    return lookup(table, *[inset(x, n) for x, n in zip((f0, roughness), table.shape, strict=True)])
+    return lookup(table, *[inset(x, n) for x, n in zip((f0, _row(roughness)), table.shape, strict=True)])
 
 
 def scattered_at_nodes(roughness: Scalar, masking: str) -> list[tuple[Scalar, ...]]:
     """`scattered` at the cosines of `HATS`."""
     table = _at_nodes(masking).scattered
-    found = lookup(table, inset(roughness, *table.shape))
+    found = lookup(table, inset(_row(roughness), *table.shape))
     return [found[n : n + HATS] for n in range(0, HATS * HATS, HATS)]
 
 
 def faced_at_nodes(roughness: Scalar, masking: str) -> list[tuple[Scalar, ...]]:
     """`faced` at the cosines of `NODES`."""
     table = _at_nodes(masking).faced
-    found, count = lookup(table, inset(roughness, *table.shape)), len(PLACES)
+    found, count = lookup(table, inset(_row(roughness), *table.shape)), len(PLACES)
     return [found[n : n + count] for n in range(0, count * len(NODES), count)]
 
 
@@ -100,7 +112,7 @@ def _at_nodes(masking: str) -> _AtNodes:
 def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
     """Shares of light that white facets, all bounces together, send to the neighbourhoods of `HATS` cosines."""
     table = _scattering(masking)
-    at = [inset(x, count) for x, count in zip((roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
 
 
@@ -114,9 +126,8 @@ def _scattering(masking: str) -> Table:
         # R3, powers of x^4 = x + 1
         u = np.tile(np.arange(1, DRAWS + 1)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0) % 1.0, (COSINES, 1))
         found = []
-        for roughness in np.linspace(0.0, 1.0, ROUGHNESSES):
-            alpha = max(roughness**2, SMALLEST)
-            drawn = KullaConty(Conductor(alpha=alpha, fresnel="one", masking=masking)).sample(wo, u)
+        for roughness in _rows(ROUGHNESSES):
+            drawn = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking)).sample(wo, u)
             weight = np.where(drawn.pdf > 0.0, drawn.weight[:, 0], 0.0)
             hats = _hats(np.sqrt(np.clip(drawn.wi[:, 2], 0.0, 1.0))) * weight[:, None]
             found.append(hats.reshape(COSINES, DRAWS, HATS).mean(1))
@@ -168,7 +179,7 @@ FROM_PLACES: list[list[float]] = np.array(
 def faced(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
     """By how much the reflectance at each of `PLACES` counts in the albedo of facets seen under a cosine."""
     table = _faced(masking)
-    at = [inset(x, count) for x, count in zip((roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    at = [inset(x, count) for x, count in zip((_row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
     return lookup(table, *at)
 
 
@@ -182,7 +193,7 @@ def _faced(masking: str) -> Table:
         return tuple(g * share for share in shares_of(o_m, PLACES))
 
     def build() -> np.ndarray:
-        alpha = np.maximum(np.linspace(0.0, 1.0, rows) ** 2, SMALLEST)[:, None]
+        alpha = _rows(rows)[:, None] ** 2
         mu = np.linspace(0.0, 1.0, columns)[None, :] ** 2
         return np.stack(quadrature.over_normals("ggx", one, len(PLACES), mu, alpha, None, 0.0), -1)
 
@@ -195,7 +206,7 @@ def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[S
     table = _spared(masking)[0]
     at = [
         inset(x, count)
-        for x, count in zip((_root_of(eta), roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)
+        for x, count in zip((_root_of(eta), _row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)
     ]
     return lookup(table, *at)
 
@@ -203,7 +214,7 @@ def spared(cos: Scalar, roughness: Scalar, eta: Scalar, masking: str) -> tuple[S
 def spared_on_average(roughness: Scalar, eta: Scalar, masking: str) -> tuple[Scalar, ...]:
     """The mean of `spared` with the cosine."""
     table = _spared(masking)[1]
-    return lookup(table, *[inset(x, n) for x, n in zip((_root_of(eta), roughness), table.shape, strict=True)])
+    return lookup(table, *[inset(x, n) for x, n in zip((_root_of(eta), _row(roughness)), table.shape, strict=True)])
 
 
 def _root_of(eta: Scalar) -> Scalar:
@@ -227,7 +238,7 @@ def _spared(masking: str) -> tuple[Table, Table]:
     def build() -> np.ndarray:
         root = np.linspace(0.0, 1.0, LOSS_INDICES)[:, None, None] ** 2 * LARGEST
         eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-4)
-        alpha = np.maximum(np.linspace(0.0, 1.0, LOSS_ROUGHNESSES)[None, :, None] ** 2, SMALLEST)
+        alpha = _rows(LOSS_ROUGHNESSES)[None, :, None] ** 2
         x, w = gauss(16)
         places = np.concatenate([np.linspace(0.0, 1.0, LOSS_COSINES), x])[None, None, :]
         sides = [

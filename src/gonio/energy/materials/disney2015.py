@@ -82,6 +82,7 @@ class Disney2015(BSDF):
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
+        "energy": OpenPBR.breaks["energy"],
         "linearity": Breach("tints are ratios of the base colour, and glass takes its root", 10.0, certain=False),
     }
 

@@ -250,6 +250,11 @@ class OpenPBR(BSDF):
             lambda model: 4.0 if model._has("fuzz_weight") or model._by_albedo() else 0.0,
             certain=False,
         ),
+        "energy": Breach(
+            "tables of what layers let through are interpolated, which gains some thousandths where light grazes",
+            0.01,
+            certain=False,
+        ),
         "linearity": Breach(
             "colours of layers multiply, and light that bounces takes them more than once", 10.0, certain=False
         ),
