@@ -165,7 +165,7 @@ class OpenPBR(BSDF):
     direction that keeps all light of a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz `sheen`, metals are
     F82 with what they scatter twice, glass refracts as `dielectric` and keeps what it scatters twice.
 
-    The parameters are the specification's. A width is held above .001: no lobe is a mirror's. Indices run from 1 to 5.
+    The parameters are the specification's. Below a roughness of .01 base and coat are mirrors. Indices run from 1 to 5.
     Subsurface scattering is local: with `geometry_thin_walled` as specified, else a diffuse lobe of its colour, the
     limit of radius 0, with a warning. Scattering inside, dispersion and emission are errors, as they are no matter of
     a surface. transmission_depth > 0 gives absorption inside, which Gonio's integrators follow.
