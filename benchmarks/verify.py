@@ -64,6 +64,7 @@ def correct() -> dict[str, go.BSDF]:
     found["bump"] = go.model("bump")(go.Lambert((0.8, 0.5, 0.2)), 0.5, 0.3)
     found["coat"] = go.model("coat")(go.Lambert((0.8, 0.5, 0.2)), absorption=(0.1, 0.3, 0.5))
     found["openpbr"] = go.OpenPBR(base_color=(0.7, 0.4, 0.2), coat_weight=0.5, fuzz_weight=0.2, specular_roughness=0.4)
+    found["disney2015"] = go.model("disney2015")((0.7, 0.4, 0.2), roughness=0.4, clearcoat=0.5, sheen=0.3)
     if "kulla-conty" in go.models():
         found["kulla-conty"] = go.model("kulla-conty")(go.Conductor.preset("Au", alpha=0.6))
     return found

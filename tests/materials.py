@@ -2,7 +2,8 @@
 
 `SMALL` has each kind once, of the historic models some, `ALL` every distribution with every masking, both Fresnel
 forms, every way of sampling, widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED`
-has every way to give lost light back that can be recorded: energy's own tests judge them, recording looks at them too.
+has every way to give lost light back that can be recorded, and `COMPOSED` models of many layers with all of them on:
+energy's own tests judge them, recording and shaders look at them too.
 """
 
 from __future__ import annotations
@@ -108,6 +109,27 @@ COMPENSATED = {
     "turquin-turned": go.Turquin(go.Conductor.preset("Au", alpha=(0.7, 0.2))),
     "fdez-aguera": go.FdezAguera(go.Conductor.preset("Cu", alpha=0.5)),
     "fdez-aguera-coat": go.FdezAguera(go.Dielectric(1.5, 0.4, transmission=False)),
+}
+EVERY_SLAB = {
+    "base_diffuse_roughness": 0.5,
+    "base_metalness": 0.3,
+    "specular_roughness": 0.0,
+    "specular_roughness_anisotropy": 0.3,
+    "transmission_weight": 0.4,
+    "subsurface_weight": 0.4,
+    "subsurface_radius": 0.0,
+    "coat_weight": 0.7,
+    "coat_roughness": 0.0,  # here and below, as what might be a mirror has code of its own
+    "fuzz_weight": 0.5,
+    "thin_film_weight": 0.6,
+    "geometry_opacity": 0.8,
+}
+COMPOSED = {
+    "openpbr": go.OpenPBR(**EVERY_SLAB),
+    "openpbr-thin": go.OpenPBR(**EVERY_SLAB, geometry_thin_walled=True),
+    "openpbr-by-albedo": go.OpenPBR(**EVERY_SLAB, layering="albedo"),
+    "disney2015": go.model("disney2015")(0.5, 0.3, 0.0, 0.4, 0.2, spec_trans=0.4, sheen=0.5, clearcoat=0.6),
+    "disney2015-thin": go.model("disney2015")(0.5, 0.3, 0.0, spec_trans=0.4, sheen=0.5, clearcoat=0.6, thin=True),
 }
 SMALL = {
     **DIFFUSE,

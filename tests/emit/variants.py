@@ -34,7 +34,7 @@ NESTED = {
     "mix-of-mixes": go.mix(go.mix(go.Lambert(), go.Mirror(), 0.3), go.OrenNayar(), 0.2),
 }
 
-EVERY = {**materials.ALL, **COMPENSATED, **COATED, **NESTED}
+EVERY = {**materials.ALL, **COMPENSATED, **COATED, **NESTED, **materials.COMPOSED}
 # each model once, and what shapes its code most
 FEW = {
     **materials.SMALL,

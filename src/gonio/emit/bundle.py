@@ -16,7 +16,7 @@ import numpy as np
 from .. import files
 from .._version import __version__
 from ..errors import InputError
-from ..models import BSDF, notation, tree
+from ..models import BSDF, notation, recording, tree
 from ..ops import graph
 from ..ops.types import Value
 from ..owner import alone
@@ -230,6 +230,7 @@ def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str
     ]
     terms = made.entries.get("terms")
     derived = made.derived
+    facts = recording.symbols(model)  # of the code, whose parameters may take other values than the material has
     return {
         "version": 1,
         "lang": language.name,
@@ -263,10 +264,10 @@ def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str
             }
             for place, table in enumerate(made.tables)
         ],
-        "transmits": bool(model.transmits),
-        "delta": model.delta,
+        "transmits": bool(facts.transmits),
+        "delta": facts.delta,
         "stochastic": False,
-        "isotropic": bool(model.isotropic),
+        "isotropic": bool(facts.isotropic),
     }
 
 

@@ -61,13 +61,16 @@ def with_derived(material: M, derived: object) -> M:
     return bound_copy(material, {}, derived)
 
 
-def settled(material: Material) -> object:
-    """What a bound copy derives, evaluated now: where no parameter varies from ray to ray and none is being
-    differentiated, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
+def settled(material: Material, rays: int = 1) -> object:
+    """What a bound copy derives, evaluated now: where no parameter is being differentiated, or varies over more than
+    `rays` rays, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
     if not material.derives:
         return None
     dr = backend.drjit()
-    if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) != 1 or dr.grad_enabled(v) for v in values(material)):
+    given = list(values(material))
+    if any(not backend.is_drjit(value) for value in given):  # symbols
+        return None
+    if dr.flag(dr.JitFlag.SymbolicScope) or any(dr.width(v) > rays or dr.grad_enabled(v) for v in given):
         return None
     derived = material.derive()
     dr.make_opaque(*_arrays(derived))  # one by one: given a tuple with names in it, Dr.Jit evaluates nothing

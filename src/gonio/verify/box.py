@@ -238,7 +238,7 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
         first = 1.0 / SCAN if axis.ratio and axis.low <= 0.0 else 0.0
         values = np.asarray(axis.at(np.linspace(first, 1.0, SCAN)), float)
         try:
-            curves = _curves(subject, axis.path, values, seed)
+            curves = _curves(subject, axis.path, values, [one.path for one in along], seed)
         except (Fault, InputError):
             continue
         for curve in curves:
@@ -277,8 +277,12 @@ def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
     return [(size, min(at, SCAN - 1)) for size, at in found]
 
 
-def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[np.ndarray]:
-    """eval, pdf (SCAN, N) and weights (SCAN, N) at the same directions and numbers for every value."""
+def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], seed: int) -> list[np.ndarray]:
+    """eval, pdf (SCAN, N) and weights (SCAN, N) at the same directions and numbers for every value.
+
+    along  the paths of all parameters that are moved, one after the other: each is given as an array, so that one
+           kernel serves them all
+    """
     rng = np.random.default_rng([seed, 72])
     sides = np.array(subject.sides or (1,))
     wo = directions.uniform(rng, RAYS)
@@ -292,7 +296,9 @@ def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[
     wo, wi, u = (directions.single(wo), directions.single(wi), directions.numbers(rng, RAYS))
     count = len(values)
     many = [np.tile(part, (count, 1)) for part in (wo, wi, u)]
-    together = per_ray(subject, {path: np.repeat(values, RAYS)})
+    others = {one: _repeated(subject, one, len(many[0])) for one in along if one not in subject.model.fixed}
+    moved = {path: np.repeat(values, RAYS)}
+    together = per_ray(subject, {**others, **moved}) or per_ray(subject, moved)
     shape = (count, RAYS)
     if together is not None:
         value = together.eval(many[0], many[1], precision="float32")
@@ -308,13 +314,24 @@ def _curves(subject: Subject, path: str, values: np.ndarray, seed: int) -> list[
     return [*(channels[:1] if same else channels), density.reshape(shape), weight.mean(1).reshape(shape)]
 
 
+def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:
+    """The value of a parameter as `per_ray` takes it."""
+    value = np.asarray(tree.value_at(subject.model, path), float)
+    return np.full(count, float(value)) if value.ndim == 0 else np.tile(value, (count, 1))
+
+
 def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
-    """The subject with one value a ray of some parameters, by path; None where it takes no arrays."""
+    """The subject with one value a ray of some parameters, by path, a colour's (N,) or (N, 3), a pair of widths' (N,)
+    or (N, 2); None where it takes no arrays."""
     kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
     arrays: dict[str, Any] = {}
     for path, column in values.items():
-        many = np.repeat(column[:, None], 3, axis=1) if kinds[path] == "spectrum" else column
-        arrays[path] = (many, many) if kinds[path] == "alpha" else many
+        if kinds[path] == "alpha":
+            arrays[path] = (column, column) if column.ndim == 1 else tuple(column.T)
+        else:
+            arrays[path] = (
+                np.repeat(column[:, None], 3, 1) if kinds[path] == "spectrum" and column.ndim == 1 else column
+            )
     try:
         together = subject.replace(**arrays)
         probe = directions.at(np.full(len(column), 30.0), 10.0)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from ...models.eon import GRAZING as GRAZING_LOSS
 from ...models.eon import Eon
 from ...models.glossy import facet
 from ...models.material import Delta, Interior
-from ...models.microfacet import upper
+from ...models.microfacet import SMOOTH, upper
 from ...models.mix import ALMOST_ONE
 from ...models.sheen import Sheen
 from ...ops import (
@@ -31,15 +30,12 @@ from ...ops import (
     Pair,
     Scalar,
     Spectrum,
-    Table,
     abs,
     backend,
     clamp,
     function,
-    inset,
     inv_pi,
     log,
-    lookup,
     maximum,
     mean,
     minimum,
@@ -59,21 +55,36 @@ from ...optics.fresnel.schlick import schlick
 from ...optics.ndf import distribution
 from ...optics.special import gauss
 from ...optics.warp import square_to_cosine_hemisphere
-from .. import cache
-from ..albedo import quadrature
-from ..compensation.lobe import MissingEnergy
+from ..compensation.glass import Glass
+from ..compensation.lobe import NOTHING, MissingEnergy
 from ..compensation.missing import missing_energy
-from .kulla_conty import KullaConty
+from . import _openpbr_tables as tables
+from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, LARGEST, NODES, PLACES
 
-SMALLEST = 1e-3  # width: no lobe is a mirror's, and any two that fall on each other are weighed against each other
 NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
-LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
-NODES = 6  # over the cosine, of means of what two layers let through: 1e-3 at F0 = .05
-FEW = [(0.5, 0.0, 1 / 3), (0.5, 1 / 3, 2 / 3)]  # one ring, where means are taken: films take long to compile
+MOST_RAYS = 1 << 18  # for which what is derived is kept, a hundred numbers each: it halves what is compiled
+STEPS = 4  # of the iteration in `_balanced`
+WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of means with the cosine
 LAYERINGS = {
     "reciprocal": "a layer dims what lies under it at both ends, so that light may be turned round",
     "albedo": "by one minus its albedo seen from wo, as the specification's reduction to lobes",
 }
+
+
+class Other(NamedTuple):
+    """What facets of glass miss that reflects otherwise than bare glass: under a film, or under a coat, by whose index
+    it reflects, while light is bent as by both. Missing are M + sum of less D (`spared`), M that of bare glass.
+
+    less         by how much F differs at `FEW_PLACES`
+    thin, dense  the mean of what is missing, from outside and from inside
+    into, out    the share of it that passes to the other side (`compensation.glass`)
+    """
+
+    less: tuple[Spectrum, ...]
+    thin: Spectrum
+    dense: Spectrum
+    into: Spectrum
+    out: Spectrum
 
 
 class Between(NamedTuple):
@@ -88,11 +99,14 @@ class Between(NamedTuple):
     sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
     joint        the same seen through the coat's
     bent         by nodes of the cosine, how far that is off its mean; both of them
+    filmed       by how much the film changes F at `PLACES`; empty without one
+    extra        the mean of that
     facets       factor of facets under the coat, by nodes of the cosine; empty without one
     metal        what single scattering misses at F = 1
     metal_again  colour of what a metal gives back
     sheet_again  colours of what a thin sheet gives back, reflected and transmitted
-    glass        what it misses of glass; None where nothing is transmitted
+    glass        what it misses of bare glass; None where nothing is transmitted
+    other        what it misses more or less, as glass reflects otherwise there; None where it is bare
     """
 
     alpha: Pair
@@ -104,22 +118,14 @@ class Between(NamedTuple):
     sheer: Spectrum
     joint: Spectrum
     bent: tuple[tuple[Scalar, ...], tuple[Scalar, ...]]
+    filmed: tuple[Spectrum, ...]
+    extra: Scalar
     facets: tuple[Scalar, ...]
     metal: MissingEnergy
     metal_again: Spectrum
     sheet_again: tuple[Spectrum, Spectrum] | None
-    glass: MissingEnergy | None
-
-
-class Shares(NamedTuple):
-    """Probabilities of the lobes: fuzz, coat, facets that mirror and that refract, cosines on both sides."""
-
-    fuzz: Scalar
-    coat: Scalar
-    mirrored: Scalar
-    refracted: Scalar
-    near: Scalar
-    far: Scalar
+    glass: Glass | None
+    other: Other | None
 
 
 class _Pair(NamedTuple):
@@ -136,6 +142,17 @@ class _Pair(NamedTuple):
     above: Mask
 
 
+class Shares(NamedTuple):
+    """Probabilities of the lobes: fuzz, coat, facets that mirror and that refract, cosines on both sides."""
+
+    fuzz: Scalar
+    coat: Scalar
+    mirrored: Scalar
+    refracted: Scalar
+    near: Scalar
+    far: Scalar
+
+
 class OpenPBR(BSDF):
     """OpenPBR 1.1 (OpenPBR2025): a base of metal, glass or a glossy diffuse body under a thin film, a coat and fuzz.
 
@@ -148,7 +165,7 @@ class OpenPBR(BSDF):
     direction that keeps all light of a white base (docs/openpbr.md). f_diffuse is `eon`, f_fuzz `sheen`, metals are
     F82 with what they scatter twice, glass refracts as `dielectric` and keeps what it scatters twice.
 
-    The parameters are the specification's. A width is held above .001: no lobe is a mirror's. Indices run from 1 to 5.
+    The parameters are the specification's. Below a roughness of .01 base and coat are mirrors. Indices run from 1 to 5.
     Subsurface scattering is local: with `geometry_thin_walled` as specified, else a diffuse lobe of its colour, the
     limit of radius 0, with a warning. Scattering inside, dispersion and emission are errors, as they are no matter of
     a surface. transmission_depth > 0 gives absorption inside, which Gonio's integrators follow.
@@ -233,6 +250,11 @@ class OpenPBR(BSDF):
             lambda model: 4.0 if model._has("fuzz_weight") or model._by_albedo() else 0.0,
             certain=False,
         ),
+        "energy": Breach(
+            "tables of what layers let through are interpolated, which gains some thousandths where light grazes",
+            0.01,
+            certain=False,
+        ),
         "linearity": Breach(
             "colours of layers multiply, and light that bounces takes them more than once", 10.0, certain=False
         ),
@@ -274,6 +296,29 @@ class OpenPBR(BSDF):
         value = self.plain.specular_roughness_anisotropy
         return backend.is_drjit(value) or bool(np.any(np.asarray(value, float) != 0.0))
 
+    def _has_holes(self) -> bool:
+        value = self.plain.geometry_opacity
+        if isinstance(self.geometry_opacity, Node) or backend.is_drjit(value):
+            return True
+        return bool(np.any(np.asarray(value, float) != 1.0))
+
+    def _may_be_smooth(self, name: str) -> bool:
+        """Whether a roughness may be so small that its lobe is a mirror's."""
+        value = getattr(self.plain, name)
+        if isinstance(getattr(self, name), Node) or backend.is_drjit(value):
+            return True
+        return bool(np.any(np.asarray(value, float) ** 2 < SMOOTH))
+
+    @property
+    def _refracts(self) -> bool:
+        """Whether light goes on into a body."""
+        return not self.geometry_thin_walled and self._has("transmission_weight")
+
+    @property
+    def _two_faced(self) -> bool:
+        """Whether there is anything to see from below."""
+        return self.geometry_thin_walled or self._refracts
+
     # ------------------------------------------------------------------ what follows from the parameters
 
     @function
@@ -281,7 +326,11 @@ class OpenPBR(BSDF):
         """alpha along x and y, whose squares add up to twice roughness^4, held at 1, where the tables end."""
         low = 1.0 - anisotropy
         along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
-        return vec2(clamp(along, SMALLEST, 1.0), clamp(along * low, SMALLEST, 1.0))
+        return vec2(clamp(along, SMOOTH, 1.0), clamp(along * low, SMOOTH, 1.0))
+
+    def _smooth(self, alpha: Pair, name: str) -> Mask | None:
+        """Where facets of these widths are a mirror; None where they are nowhere."""
+        return (alpha.x <= SMOOTH) & (alpha.y <= SMOOTH) if self._may_be_smooth(name) else None
 
     @function
     def _roughened(self) -> Scalar:
@@ -316,11 +365,11 @@ class OpenPBR(BSDF):
         kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=self._masking)
         values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
         metal = missing_energy(binding.bound_copy(kind, values))
-        under, over, weights = [], [], []
-        for x, w in zip(*(part.tolist() for part in gauss(NODES)), strict=True):
-            weights.append(4.0 * w * x**3)
-            under.append(self._kept_below(x * x + 0.0 * rough, rough, ratio, eta, medium, FEW))
-            over.append(self._coat_kept(x * x + 0.0 * rough))
+        bare, filmed, extra = self._at_places(ratio, eta, medium)
+        weights = [4.0 * w * x**3 for x, w in zip(NODES, gauss(len(NODES))[1].tolist(), strict=True)]
+        under = self._kept_at_nodes(rough, ratio, filmed)
+        over = [1.0 - E for E in tables.reflected_at_nodes(self.coat_roughness, self.coat_ior, self._masking)]
+        over_hats, over = over[:HATS], over[HATS:]
         total = sum(weights)
         sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
         both = [one * other for one, other in zip(under, over, strict=True)]
@@ -331,17 +380,24 @@ class OpenPBR(BSDF):
         )
         f_metal = white
         if self._has("base_metalness"):
-            f_metal = _mean_of(lambda mu: self._metal(mu, eta, medium), rough)
+            places = FEW_PLACES if filmed else PLACES
+            f_metal = _averaged([self._metal(x + 0.0 * rough, eta, medium) for x in places])
         sheet = None
         if self.geometry_thin_walled:
-            back = _mean_of(lambda mu: self._sheet(mu, ratio, eta, medium)[0], rough)
-            through = _mean_of(lambda mu: self._sheet(mu, ratio, eta, medium)[1], rough)
-            sheet = back, through
-        glass = None
+            f = [white * one for one in bare]
+            if filmed:
+                f = [one + more for one, more in zip(f, filmed, strict=True)]
+            both_ways = [self._sheet(x + 0.0 * rough, one, eta) for x, one in zip(PLACES, f, strict=True)]
+            sheet = _averaged([back for back, _ in both_ways]), _averaged([on for _, on in both_ways])
+        glass, other = None, None
         if self._refracts:
             kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=self._masking)
             clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
-            glass = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
+            found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
+            assert isinstance(found, Glass), "a dielectric's"
+            glass = found
+            if filmed or self._has("coat_weight"):
+                other = self._misses_otherwise(glass, bare, filmed, rough, eta)
         return Between(
             alpha=alpha,
             rough=rough,
@@ -352,36 +408,85 @@ class OpenPBR(BSDF):
             sheer=sheer,
             joint=joint / sheer,
             bent=bent,  # type: ignore[arg-type]
-            facets=self._balanced(rough) if self._has("coat_weight") else (),
+            filmed=filmed,
+            extra=extra,
+            facets=self._balanced(rough, over_hats) if self._has("coat_weight") else (),
             metal=metal,
             metal_again=_again(f_metal, metal.average),
             sheet_again=sheet,
             glass=glass,
+            other=other,
         )
 
-    def _settled(self) -> OpenPBR:
+    def _at_places(
+        self, ratio: Scalar, eta: Scalar, medium: Scalar
+    ) -> tuple[list[Scalar], tuple[Spectrum, ...], Scalar]:
+        """F of the bare dielectric at `PLACES`, what a film adds there, and the mean of that."""
+        cosines = [x + 0.0 * ratio for x in PLACES]
+        bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
+        if not self._has("thin_film_weight"):
+            return bare, (), 0.0 * ratio
+        filmed = tuple(
+            (self._clear_film(cos, eta, medium) - one) * self.thin_film_weight
+            for cos, one in zip(cosines, bare, strict=True)
+        )
+        return bare, filmed, mean(_averaged(list(filmed)))
+
+    def _misses_otherwise(
+        self, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
+    ) -> Other:
+        """What that glass misses more or less than bare glass of index eta."""
+        white = 1.0 + 0.0 * self.base_color
+        less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
+        for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
+            cos = x + 0.0 * eta
+            known = exact.dielectric(cos, fresnel.cos_transmitted(cos, eta), eta)
+            less.append(white * (one - known) + filmed[n] if filmed else white * (one - known))
+            reflected = reflected + less[-1] * weight
+        few = tuple(_sum([one * share for one, share in zip(less, row, strict=True)]) for row in FROM_PLACES)
+        shares = tables.spared_on_average(rough, eta, self._masking)
+        count = len(few)
+        thin, dense = (
+            maximum(_over_pi(side.scale) + _sum([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
+            for side, part in ((glass.thin, shares[:count]), (glass.dense, shares[count:]))
+        )
+        enters = (1.0 - reflected) / (thin + dense)
+        return Other(few, thin, dense, enters * dense, enters * thin / sqr(eta))
+
+    def _settled(self) -> Self:
         """A copy that holds what is derived, where that differs from ray to ray: it is asked for in many places."""
-        return self if self._derived is not None else binding.with_derived(self, self.derive())
+        if self._derived is not None:
+            return self
+        derived = binding.settled(self, MOST_RAYS) if self.wavelengths is None else None
+        return binding.with_derived(self, self.derive() if derived is None else derived)
 
     def prepare(self) -> None:
         """Find the tables, before a loop is recorded."""
-        _albedos(self._masking)
-        _scattering(self._masking)
+        tables.prepare(self._masking)
 
-    def _balanced(self, rough: Scalar) -> tuple[Scalar, ...]:
+    def _kept_at_nodes(self, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
+        """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
+        found = []
+        E_of = tables.reflected_at_nodes(rough, ratio, self._masking)[HATS:]
+        faced = tables.faced_at_nodes(rough, self._masking) if filmed else [()] * len(E_of)
+        for E, shares in zip(E_of, faced, strict=True):
+            found.append(1.0 - _covered(E + 0.0 * self.base_color, filmed, shares))
+        return found
+
+    def _balanced(self, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar, ...]:
         """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
 
         A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
         light all over and the rest on, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
+
+        kept  1 - E_coat at the nodes
         """
-        rows, kept, w = [], [], []
-        q = sqrt(self._coat_kept(0.45 + 0.0 * rough))
-        for n in range(HATS):
-            cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
-            rows.append(scattered(cos, rough, self._masking))
-            kept.append(self._coat_kept(cos))
+        rows, w = tables.scattered_at_nodes(rough, self._masking), []
+        q = sqrt(kept[round(0.67 * (HATS - 1))])  # where most light is
+        for n, one in enumerate(kept):
+            cos = (n / (HATS - 1.0)) ** 2
             b = sqr(rough) / (sqr(rough) + cos + 1e-3)
-            w.append(2.0 * kept[-1] / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * kept[-1] + 1e-12)))
+            w.append(2.0 * one / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * one + 1e-12)))
         for _ in range(STEPS):
             met = [_sum([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
             w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
@@ -389,39 +494,50 @@ class OpenPBR(BSDF):
 
     # ------------------------------------------------------------------ reflectances
 
-    def _film(self, cos: Scalar, eta: Spectrum, k: Spectrum, medium: Scalar) -> Spectrum:
+    def _film(self, cos: Scalar, eta: Spectrum, k: Spectrum | None, medium: Scalar) -> Spectrum:
         """R of the film over a base of index eta + i k, both over the medium's, under a cosine outside."""
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(medium))
         thickness = 1000.0 * self.thin_film_thickness
         one = film.Film(eta, k, self.thin_film_ior / medium, thickness, "belcour-barla", self.wavelengths)
         return film.reflectance(inner, one)
 
+    @function
+    def _clear_film(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
+        """R of the film over the dielectric."""
+        white = 1.0 + 0.0 * self.base_color
+        # one value for all channels, so that compilers do the work for one
+        alike = ops.of_channels(white, [eta / medium] * len(ops.channels(white)))
+        return self._film(cos, alike, None, medium)
+
     def _glossy(self, cos: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
         """F of the dielectric from outside, without its tint."""
-        white = 1.0 + 0.0 * self.base_color
-        bare = white * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
+        bare = (1.0 + 0.0 * self.base_color) * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
         if not self._has("thin_film_weight"):
             return bare
-        # one value for all channels, so that compilers do the work for one
-        alike, none = ((ops.of_channels(white, [one] * len(ops.channels(white)))) for one in (eta / medium, 0.0 * eta))
-        filmed = self._film(cos, alike, none, medium)
-        return _mix(bare, filmed, self.thin_film_weight)
+        return _mix(bare, self._clear_film(cos, eta, medium), self.thin_film_weight)
 
+    @function
+    def _bare_metal(self, cos: Scalar) -> Spectrum:
+        """F82 by its colours."""
+        r0 = self.base_color * self.base_weight
+        return f82(cos, r0, self.specular_color * schlick(GRAZING, r0)) * minimum(self.specular_weight, 1.0)
+
+    @function
     def _metal(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
-        """F of the metal: F82 by its colours; under a film of the index that Gulbrandsen2014 finds for them."""
-        weight, r0 = minimum(self.specular_weight, 1.0), self.base_color * self.base_weight
-        bare = f82(cos, r0, self.specular_color * schlick(GRAZING, r0))
+        """F of the metal; under a film of the index that Gulbrandsen2014 finds for them."""
+        bare = self._bare_metal(cos)
         if not self._has("thin_film_weight"):
-            return bare * weight
+            return bare
+        r0 = self.base_color * self.base_weight
         r = clamp(r0, 1e-4, 0.999)
         least, root = (1.0 - r) / (1.0 + r), sqrt(r)
         n = self.specular_color * least + (1.0 - self.specular_color) * ((1.0 + root) / (1.0 - root))
         k = safe_sqrt((r * sqr(n + 1.0) - sqr(n - 1.0)) / (1.0 - r))
-        return _mix(bare, self._film(cos, n, k, medium), self.thin_film_weight) * weight
+        filmed = self._film(cos, n, k, medium) * minimum(self.specular_weight, 1.0)
+        return _mix(bare, filmed, self.thin_film_weight)
 
-    def _sheet(self, cos: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> tuple[Spectrum, Spectrum]:
-        """What a thin sheet reflects and lets through, all bounces between its faces together."""
-        f = self._glossy(cos, ratio, eta, medium)
+    def _sheet(self, cos: Scalar, f: Spectrum, eta: Scalar) -> tuple[Spectrum, Spectrum]:
+        """What a thin sheet whose faces reflect f sends back and lets through, all bounces between them together."""
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(eta))
         t = _power(self.transmission_color, 1.0 / maximum(inner, 0.05))
         rest = sqr(1.0 - f) * t / maximum(1.0 - sqr(f * t), 1e-6)
@@ -437,32 +553,12 @@ class OpenPBR(BSDF):
             turned = sin2 > 1e-12
             seen2 = where(turned, (along2 + across2) / maximum(sin2, 1e-12), sqr(b.alpha.x))
             rough = where(turned, minimum(sqrt(sqrt(seen2)), 1.0), rough)
-        return self._kept_below(w.z, rough, b.ratio, b.eta, b.medium, FACETS)
+        return self._kept_below(w.z, rough, b.ratio, b.filmed)
 
-    def _kept_below(
-        self,
-        cos: Scalar,
-        rough: Scalar,
-        ratio: Scalar,
-        eta: Scalar,
-        medium: Scalar,
-        facets: Sequence[tuple[float, float, float]],
-    ) -> Spectrum:
-        """The same by what follows from the parameters; a few of the facets seen say what a film adds."""
-        E = reflected(cos, rough, ratio, self._masking)
-        if not self._has("thin_film_weight"):
-            return 1.0 - (E + 0.0 * self.base_color)
-        width = maximum(sqr(rough), SMALLEST)
-        ndf, alpha, o = distribution("ggx"), vec2(width, width), _at(cos)
-        bare, filmed = 1e-6 + 0.0 * rough, 1e-6 + 0.0 * self.base_color
-        for u1, u2, share in facets:
-            m = ndf.sample_visible(o, u1 + 0.0 * cos, u2 + 0.0 * cos, alpha)
-            i, at = frame.reflect(o, m), maximum(ops.dot(o, m), 1e-3)
-            above = i.z > 0.0
-            weight = where(above, share / (1.0 + ndf.Lambda(where(above, i, o), alpha)), 0.0)
-            bare = bare + weight * exact.dielectric(at, fresnel.cos_transmitted(at, ratio), ratio)
-            filmed = filmed + self._glossy(at, ratio, eta, medium) * weight
-        return 1.0 - clamp(filmed * (E / bare), 0.0, 1.0)
+    def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
+        """The same by what follows from the parameters."""
+        E = tables.reflected(cos, rough, ratio, self._masking) + 0.0 * self.base_color
+        return 1.0 - _covered(E, filmed, tables.faced(cos, rough, self._masking) if filmed else ())
 
     def _even(self, w: Direction, coated: bool) -> Scalar:
         """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
@@ -473,7 +569,7 @@ class OpenPBR(BSDF):
         rough = self.base_diffuse_roughness
         lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": 1.0 + 0.0 * self.base_color, "roughness": rough})
         sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), 0.0 * w.z
-        nodes = [x * x for x in gauss(NODES)[0].tolist()]
+        nodes = [x * x for x in NODES]
         for node, off in zip(nodes, self.derived.bent[coated], strict=True):
             slant = sin * (math.sqrt(1.0 - node * node) * inv_pi) * (1.0 / maximum(w.z, node) - 1.0)
             twice = lost * (lobe._lost(_at(node + 0.0 * w.z)) / (GRAZING_LOSS - MEAN_LOSS))
@@ -487,7 +583,7 @@ class OpenPBR(BSDF):
     @function
     def _coat_kept(self, cos: Scalar) -> Scalar:
         """1 - E of the coat's surface."""
-        return 1.0 - reflected(cos, self.coat_roughness, self.coat_ior, self._masking)
+        return 1.0 - tables.reflected(cos, self.coat_roughness, self.coat_ior, self._masking)
 
     # ------------------------------------------------------------------ layers
 
@@ -522,7 +618,7 @@ class OpenPBR(BSDF):
         tint = _power(self.coat_color, 0.5 / self._inside(cos)) * sqrt(self._darkened(cos))
         place = sqrt(maximum(cos, 0.0)) * (HATS - 1.0)
         here = _sum([maximum(1.0 - abs(place - float(n)), 0.0) * w for n, w in enumerate(b.facets)])
-        met = _sum([p * w for p, w in zip(scattered(cos, b.rough, self._masking), b.facets, strict=True)])
+        met = _sum([p * w for p, w in zip(tables.scattered(cos, b.rough, self._masking), b.facets, strict=True)])
         return kept, tint, sqrt(here * kept / maximum(met, 1e-4))
 
     def _through_coat(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
@@ -608,59 +704,73 @@ class OpenPBR(BSDF):
         lost = self.derived.metal
         return lost.at(wo) * lost.at(wi) * lost.over_average(wi) * wi.z
 
+    def _twice(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+        """What facets of glass scatter more than once, to both sides, times |cos theta_i|."""
+        lost, other = self.derived.glass, self.derived.other
+        assert lost is not None, "derived where light is transmitted"
+        cos = abs(wi.z) * lost.radiance(wo, wi, mode)
+        if other is None:
+            bare = lost.at(wo) * lost.at(wi) * lost.over_average(wi) * lost.share(wo, wi)
+            return (1.0 + 0.0 * self.base_color) * (bare * cos)
+        into = where(wo.z > 0.0, other.into, other.out)
+        share = where(wo.z * wi.z > 0.0, 1.0 - into, into)
+        level = where(wi.z > 0.0, other.thin, other.dense)
+        return self._missed(wo) * self._missed(wi) * share * (cos * inv_pi) / level
+
+    def _missed(self, w: Direction) -> Spectrum:
+        """What glass misses at a direction, from its own side."""
+        b = self.derived
+        assert b.glass is not None and b.other is not None, "derived where light is transmitted"
+        shares = tables.spared(abs(w.z), b.rough, b.eta, self._masking)
+        count = len(b.other.less)
+        more = [
+            one * where(w.z > 0.0, thin, dense)
+            for one, thin, dense in zip(b.other.less, shares[:count], shares[count:], strict=True)
+        ]
+        return maximum(b.glass.at(w) + _sum(more), 0.0)
+
+    # ------------------------------------------------------------------ values
+
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """The sum of all lobes times |cos theta_i|; the light that goes straight on is a delta lobe."""
+        """The sum of all lobes times |cos theta_i|; mirrors and the light that goes straight on are delta lobes."""
         value = self._settled()._surface(wo, wi, mode)
         return value * self.geometry_opacity if self._has_holes() else value
 
-    def _surface(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """Where the surface is there."""
+    def _surface(self, wo: Direction, wi: Direction, mode: Mode, ideal: Mask | None = None) -> Spectrum:
+        """Where the surface is there.
+
+        ideal  rays whose two directions smooth facets join: there the value is what those send on
+        """
         b = self.derived
         pair = self._pair(wo, wi)
         o, i = pair.wo, pair.wi
         M, T = self.base_metalness, self.transmission_weight
         zero = 0.0 * self.base_color * o.z
         h, cos = facet(o, i)
-        ndf = distribution("ggx")
-        g = masking.masking_shadowing(self._masking, ndf, o, i, h, b.alpha)
-        facets = ndf.D(h, b.alpha) * g / (4.0 * o.z)
-        again = self._returned(o, i)
-        glossy = self._glossy(cos, b.ratio, b.eta, b.medium)
-        dielectric = glossy * self.specular_color
+        smooth = self._smooth(b.alpha, "specular_roughness")
+        facets = _lobe(self._facets(o, i, h, b.alpha), smooth, ideal)
+        again = _lobe(self._returned(o, i), None, ideal)
         through = zero
+        if self._refracts:
+            glossy, dielectric, through = self._glass(wo, wi, pair, cos, mode, facets, smooth, ideal)
+        else:
+            glossy = self._glossy(cos, b.ratio, b.eta, b.medium)
+            dielectric = glossy * self.specular_color * facets
         if self.geometry_thin_walled and self._has("transmission_weight"):
             assert b.sheet_again is not None, "derived where walls are thin"
-            back, on = self._sheet(cos, b.ratio, b.eta, b.medium)
-            sheet = back * self.specular_color * facets + b.sheet_again[0] * self.specular_color * again
-            opaque = dielectric * facets
-            dielectric = _mix(opaque, sheet, T)
+            back, on = self._sheet(cos, glossy, b.eta)
+            sheet = (back * facets + b.sheet_again[0] * again) * self.specular_color
+            dielectric = _mix(dielectric, sheet, T)
             through = (on * facets + b.sheet_again[1] * again) * ((1.0 - M) * T)
-        elif self._refracts:
-            assert b.glass is not None, "derived where light is transmitted"
-            # from inside, what coat and fuzz would send back comes back with what the base reflects
-            cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
-            inner = where(cos_t > 0.0, self._glossy(cos_t, b.ratio, b.eta, b.medium), 1.0 + zero)
-            inner = 1.0 - (1.0 - inner) * self._past_layers(maximum(cos_t, 1e-4))
-            lost = b.glass
-            twice = lost.at(wo) * lost.at(wi) * lost.over_average(wi) * lost.share(wo, wi) * abs(wi.z)
-            twice = twice * lost.radiance(wo, wi, mode)
-            tint = where(wo.z > 0.0, self.specular_color, 1.0 + zero)
-            mirrored = where(wo.z > 0.0, dielectric, _mix(glossy, inner, T))
-            dielectric = mirrored * facets + tint * (T * twice)
-            outside = self._past_layers(where(wo.z > 0.0, o.z, i.z))
-            colour = where(self.transmission_depth > 0.0, 1.0 + zero, self.transmission_color)
-            through = (self._refracted(wo, wi, mode) + twice) * colour * outside * ((1.0 - M) * T)
-        else:
-            dielectric = dielectric * facets
         base = dielectric * (1.0 - M)
         if self._has("base_metalness"):
             metal = self._metal(cos, b.eta, b.medium) * facets + b.metal_again * again
             base = base + metal * M
-        body, passed = self._diffuse(pair)
+        body, passed = (_lobe(one, None, ideal) for one in self._diffuse(pair))
         if self._has("coat_weight"):
             by_facets, by_body = self._through_coat(pair)
-            coat = self._coat(o, i) * self.coat_weight
+            coat = self._coat(o, i, h, cos, ideal) * self.coat_weight
             base = base * by_facets + where(pair.above, coat, 0.0)
             body, passed = body * by_body, passed * by_body
             if self.geometry_thin_walled:
@@ -671,31 +781,63 @@ class OpenPBR(BSDF):
         if self._has("fuzz_weight"):
             fuzz = self._fuzz()
             left = 1.0 - self.fuzz_weight * fuzz._lobe(o).R
-            total = where(pair.above, total * left + fuzz.eval(o, i) * self.fuzz_weight, total)
+            over = _lobe(fuzz.eval(o, i), None, ideal) * self.fuzz_weight
+            total = where(pair.above, total * left + over, total)
             if self.geometry_thin_walled:
                 through = through * left
         if not self._two_faced:
             return where(pair.near, total, 0.0)
         return where(pair.near, total, where((wo.z != 0.0) & (wi.z != 0.0), through, 0.0))
 
-    @function
-    def _coat(self, o: Direction, i: Direction) -> Scalar:
-        """The coat's own lobe, times cos theta_i."""
-        h, cos = facet(o, i)
-        ndf, alpha = distribution("ggx"), self.derived.coat_alpha
+    def _facets(self, o: Direction, i: Direction, h: Direction, alpha: Pair) -> Scalar:
+        """D G / (4 cos theta_o), which is the lobe of facets at F = 1, times cos theta_i."""
+        ndf = distribution("ggx")
         g = masking.masking_shadowing(self._masking, ndf, o, i, h, alpha)
-        f = exact.dielectric(cos, fresnel.cos_transmitted(cos, self.coat_ior), self.coat_ior)
-        return f * (ndf.D(h, alpha) * g / (4.0 * o.z))
+        return ndf.D(h, alpha) * g / (4.0 * o.z)
 
-    def _refracted(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
-        """What facets refract to the other side."""
-        b, glass = self.derived, self._interface()
+    def _coat(self, o: Direction, i: Direction, h: Direction, cos: Scalar, ideal: Mask | None) -> Scalar:
+        """The coat's own lobe, times cos theta_i."""
+        alpha = self.derived.coat_alpha
+        f = exact.dielectric(cos, fresnel.cos_transmitted(cos, self.coat_ior), self.coat_ior)
+        return f * _lobe(self._facets(o, i, h, alpha), self._smooth(alpha, "coat_roughness"), ideal)
+
+    def _glass(
+        self,
+        wo: Direction,
+        wi: Direction,
+        pair: _Pair,
+        cos: Scalar,
+        mode: Mode,
+        facets: Scalar,
+        smooth: Mask | None,
+        ideal: Mask | None,
+    ) -> tuple[Spectrum, Spectrum, Spectrum]:
+        """(F, what glass reflects, what it lets through) of a pair of directions, from either side."""
+        b, glass, T = self.derived, self._interface(), self.transmission_weight
+        white, above = 1.0 + 0.0 * self.base_color, wo.z > 0.0
         eta = glass._relative_eta(wo)
         at = glass._facet(wo, wi, eta)
-        outer = where(wo.z > 0.0, abs(at.dot_o), abs(at.dot_i))
-        value = glass._value(at)
-        value = value * sqr(eta) if mode == "importance" else value
-        return (1.0 - self._glossy(outer, b.ratio, b.eta, b.medium)) * where(at.reflects, 0.0, value)
+        # F is a matter of the cosine outside, wherever light comes from
+        cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
+        joined, outside = where(above, abs(at.dot_o), abs(at.dot_i)), where(above, pair.wo.z, pair.wi.z)
+        crosses = joined if ideal is None else where(ideal, outside, joined)
+        outer = where(pair.near, where(above, cos, maximum(cos_t, 1e-4)), crosses)
+        f = self._glossy(outer, b.ratio, b.eta, b.medium)
+        # from inside, what coat and fuzz would send back comes back with what the base reflects
+        inner = where(cos_t > 0.0, f, white)
+        inner = 1.0 - (1.0 - inner) * self._past_layers(maximum(cos_t, 1e-4))
+        twice = _lobe(self._twice(wo, wi, mode), None, ideal)
+        # what is no glass looks from below as from above
+        opaque = self._glossy(cos, b.ratio, b.eta, b.medium)
+        mirrored = where(above, f * self.specular_color, _mix(opaque, inner, T))
+        tint = where(above, self.specular_color, white)
+        reflected = mirrored * facets + tint * (twice * T)
+        spread = _lobe(where(at.reflects, 0.0, glass._value(at)), smooth, ideal, 1.0 / sqr(eta))
+        spread = spread * sqr(eta) if mode == "importance" else spread
+        colour = where(self.transmission_depth > 0.0, white, self.transmission_color)
+        left = self._past_layers(outside) * colour
+        through = ((1.0 - f) * spread + twice) * left * ((1.0 - self.base_metalness) * T)
+        return f, reflected, through
 
     # ------------------------------------------------------------------ sampling
 
@@ -713,7 +855,8 @@ class OpenPBR(BSDF):
         if self._has("coat_weight"):
             coat = where(above, self.coat_weight * (1.0 - self._coat_kept(cos)), 0.0) * left
             left = left - coat
-        glossy = mean(self._glossy(cos, b.ratio, b.eta, b.medium))
+        # a film's part by its mean: its colours would double the work, for probabilities
+        glossy = clamp(exact.dielectric(cos, fresnel.cos_transmitted(cos, b.ratio), b.ratio) + b.extra, 0.0, 1.0)
         body = self.base_color * self.base_weight
         thin = self.geometry_thin_walled and self._has("subsurface_weight")
         S = self.subsurface_weight
@@ -724,19 +867,19 @@ class OpenPBR(BSDF):
             passed = passed * (1.0 - M) * (1.0 - T) * (1.0 - glossy)
         even = maximum(even - passed, 0.0)
         lost = b.metal.at(o)
-        metal = mean(self._metal(cos, b.eta, b.medium)) if self._has("base_metalness") else zero
+        metal = mean(self._bare_metal(cos)) + abs(b.extra) if self._has("base_metalness") else zero
         refracted, back = zero, glossy
         near, far = lost * metal * M, zero
         if self.geometry_thin_walled and self._has("transmission_weight"):
-            on = self._sheet(cos, b.ratio, b.eta, b.medium)
+            on = self._sheet(cos, glossy + 0.0 * self.base_color, b.eta)
             back = _mix(glossy, mean(on[0]), T)
             refracted = mean(on[1]) * (1.0 - M) * T
             near, far = near + lost * T * mean(on[0]), lost * T * mean(on[1])
         elif self._refracts:
             assert b.glass is not None, "derived where light is transmitted"
             cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
-            inner = where(cos_t > 0.0, mean(self._glossy(cos_t, b.ratio, b.eta, b.medium)), 1.0)
-            inner = clamp(inner, 0.02, 0.98)
+            inner = exact.dielectric(cos_t, fresnel.cos_transmitted(cos_t, b.ratio), b.ratio) + b.extra
+            inner = clamp(where(cos_t > 0.0, inner, 1.0), 0.02, 0.98)
             here = where(wo.z > 0.0, clamp(glossy, 0.02, 1.0), inner)
             back = _mix(glossy, here, T)
             refracted = (1.0 - here) * ((1.0 - M) * T)
@@ -763,11 +906,13 @@ class OpenPBR(BSDF):
         o, i = pair.wo, pair.wi
         h, _ = facet(o, i)
         ndf = distribution("ggx")
-        mirrored = 0.25 * ndf.visible_per_cosine(o, h, b.alpha)
+        smooth = self._smooth(b.alpha, "specular_roughness")
+        mirrored = _lobe(0.25 * ndf.visible_per_cosine(o, h, b.alpha), smooth, None)
         cosine = i.z * inv_pi
         density = shares.mirrored * mirrored + shares.near * cosine
         if self._has("coat_weight"):
-            density = density + shares.coat * (0.25 * ndf.visible_per_cosine(o, h, b.coat_alpha))
+            coat = 0.25 * ndf.visible_per_cosine(o, h, b.coat_alpha)
+            density = density + shares.coat * _lobe(coat, self._smooth(b.coat_alpha, "coat_roughness"), None)
         if self._has("fuzz_weight"):
             density = density + shares.fuzz * self._fuzz().pdf(o, i)
         if not self._two_faced:
@@ -778,7 +923,7 @@ class OpenPBR(BSDF):
             glass = self._interface()
             eta = glass._relative_eta(wo)
             at = glass._facet(wo, wi, eta)
-            through = shares.refracted * where(at.reflects, 0.0, glass._density(at, eta))
+            through = shares.refracted * _lobe(where(at.reflects, 0.0, glass._density(at, eta)), smooth, None)
         through = through + shares.far * cosine
         return where(pair.near, density, where((wo.z != 0.0) & (wi.z != 0.0), through, 0.0))
 
@@ -795,7 +940,6 @@ class OpenPBR(BSDF):
             pick = minimum(safe_div(u.x, self.geometry_opacity), ALMOST_ONE)
         o = upper(wo) if self._two_faced else wo
         o = where(o.z > 0.0, o, frame.upright(o))
-        ndf = distribution("ggx")
         ends = [shares.fuzz]
         for share in shares[1:]:
             ends.append(ends[-1] + share)
@@ -803,7 +947,20 @@ class OpenPBR(BSDF):
         on_facets, on_refracted = (pick >= ends[1]) & (pick < ends[2]), (pick >= ends[2]) & (pick < ends[3])
         on_near = (pick >= ends[3]) & (pick < ends[4])
         alpha = vec2(where(on_coat, b.coat_alpha.x, b.alpha.x), where(on_coat, b.coat_alpha.y, b.alpha.y))
-        m = ndf.sample_visible(o, u.y, u.z, alpha)
+        m = distribution("ggx").sample_visible(o, u.y, u.z, alpha)
+        smooth = self._smooth(b.alpha, "specular_roughness")
+        smooth_coat = self._smooth(b.coat_alpha, "coat_roughness") if self._has("coat_weight") else None
+        ideal, found = None, 0.0 * pick  # rays on smooth facets, and the probability of their direction
+        for mirror, here, joins, share in (
+            (smooth_coat, on_coat, on_coat | on_facets, shares.coat),
+            (smooth, on_facets, on_coat | on_facets, shares.mirrored),
+            (smooth, on_refracted, on_refracted, shares.refracted),
+        ):
+            if mirror is not None:
+                ideal = here & mirror if ideal is None else ideal | (here & mirror)
+                found = found + where(joins & mirror, share, 0.0)
+        if ideal is not None:
+            m = where(ideal, frame.upright(o), m)
         mirrored = frame.reflect(o, m)
         cosine = square_to_cosine_hemisphere(u.y, u.z)
         wi = where(on_coat | on_facets, mirrored, cosine)
@@ -826,49 +983,40 @@ class OpenPBR(BSDF):
             wi = where(on_refracted, bent, where(far, below, wi))
             valid = where(on_refracted, passes, where(far, wi.z < 0.0, valid))
             wi = where(wo.z < 0.0, -wi, wi)
-        density = where(valid, self._density(shares, wo, wi), 0.0)
-        weight = self._surface(wo, wi, mode) * safe_div(1.0, density)
+        density = self._density(shares, wo, wi)
+        if ideal is not None:
+            density = where(ideal, found, density)
+        density = where(valid, density, 0.0)
+        weight = self._surface(wo, wi, mode, ideal) * safe_div(1.0, density)
         one = 1.0 + 0.0 * density
         eta = one
         if self._refracts:
             eta = where(wo.z * wi.z > 0.0, one, where(wo.z >= 0.0, b.eta, 1.0 / b.eta))
-        delta = density != density
+        delta = density != density if ideal is None else ideal & valid
         if self._has_holes():
             through = 1.0 - self.geometry_opacity
             wi, weight = where(covered, wi, -wo), where(covered, weight, one)
             density = where(covered, density * self.geometry_opacity, through)
-            eta, delta = where(covered, eta, one), ~covered
+            eta, delta = where(covered, eta, one), ~covered | delta
         return Sample(wi, weight, density, delta, eta)
 
     # ------------------------------------------------------------------ facts
 
-    def _has_holes(self) -> bool:
-        value = self.plain.geometry_opacity
-        if isinstance(self.geometry_opacity, Node) or backend.is_drjit(value):
-            return True
-        return bool(np.any(np.asarray(value, float) != 1.0))
-
     @property
     def transmits(self) -> bool:
-        return self._two_faced or self.plain._has_holes()
-
-    @property
-    def _refracts(self) -> bool:
-        """Whether light goes on into a body."""
-        return not self.geometry_thin_walled and self.plain._has("transmission_weight")
-
-    @property
-    def _two_faced(self) -> bool:
-        """Whether there is anything to see from below."""
-        return self.geometry_thin_walled or self._refracts
+        return self._two_faced or self._has_holes()
 
     @property
     def delta(self) -> Delta:
-        return "maybe" if self.plain._has_holes() else "never"
+        mirror = self._may_be_smooth("specular_roughness")
+        mirror = mirror or (self._has("coat_weight") and self._may_be_smooth("coat_roughness"))
+        return "maybe" if mirror or self._has_holes() else "never"
 
     @property
     def isotropic(self) -> bool:
         plain = self.plain
+        if isinstance(self.specular_roughness_anisotropy, Node):  # a recording's may take any value
+            return False
         widths = plain.specular_roughness_anisotropy, plain.coat_roughness_anisotropy
         return all(isinstance(one, int | float) and one == 0 for one in widths)
 
@@ -895,88 +1043,6 @@ class OpenPBR(BSDF):
         return _mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
 
 
-# --------------------------------------------------------------------------- tables
-
-INDICES, ROUGHNESSES, COSINES = 25, 17, 49
-HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
-STEPS = 4
-# Of those seen, under a film, (u1, u2, share): by Gauss in the radius, three rings of three, mirrored at the plane
-FACETS = [
-    (radius, turn, weight * share)
-    for (radius, weight), turns in zip(
-        ((0.1127, 5 / 18), (0.5, 4 / 9), (0.8873, 5 / 18)), ((0.0, 1 / 3), (0.5, 1 / 6), (0.0, 1 / 3)), strict=True
-    )
-    for turn, share in zip(turns, (1 / 3, 2 / 3), strict=True)
-]
-
-
-@function
-def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
-    """E of GGX facets of a dielectric of an index of 1 to 5, what they reflect at once."""
-    table = _albedos(masking)
-    f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
-    at = [inset(x, count) for x, count in zip((f0, roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
-    return clamp(lookup(table, *at)[0], 0.0, 1.0)
-
-
-@lru_cache
-def _albedos(masking: str) -> Table:
-    """E over (root of F0, roughness, root of the cosine)."""
-
-    def build() -> np.ndarray:
-        root = np.linspace(0.0, LARGEST, INDICES)[:, None, None]
-        alpha = np.maximum(np.linspace(0.0, 1.0, ROUGHNESSES) ** 2, SMALLEST)[None, :, None]
-        mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
-        eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
-        return quadrature.glass("ggx", masking, "exact", mu, alpha, eta).reflected
-
-    values = cache.remember(("openpbr", masking, INDICES, ROUGHNESSES, COSINES), build)
-    return Table("openpbr_reflected", values[..., None])
-
-
-def scattered(cos: Scalar, roughness: Scalar, masking: str) -> tuple[Scalar, ...]:
-    """Shares of light that white facets, all bounces together, send to the neighbourhoods of `HATS` cosines."""
-    table = _scattering(masking)
-    at = [inset(x, count) for x, count in zip((roughness, sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
-    return lookup(table, *at)
-
-
-@lru_cache
-def _scattering(masking: str) -> Table:
-    """Those shares over (roughness, root of the cosine)."""
-
-    def build() -> np.ndarray:
-        x, w = gauss(64)
-        sin, turns = np.sqrt(1.0 - x**4), (np.arange(96) + 0.5) / 96 * np.pi
-        wi = np.stack(
-            np.broadcast_arrays(sin[:, None] * np.cos(turns), sin[:, None] * np.sin(turns), x[:, None] ** 2), -1
-        )
-        hats = _hats(x) * (4.0 * np.pi * w * x**3)[:, None]
-        places = np.linspace(0.0, 1.0, COSINES)
-        cos = np.maximum(places**2, 1e-3)
-        wo = np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1)
-        found = np.tile(_hats(places), (ROUGHNESSES, 1, 1))
-        for row, roughness in enumerate(np.linspace(0.0, 1.0, ROUGHNESSES)):
-            if roughness < 0.12:  # narrower than the nodes: a mirror's
-                continue
-            white = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking))
-            pairs = np.repeat(wo, wi[..., 0].size, 0), np.tile(wi.reshape(-1, 3), (COSINES, 1))
-            value = white.f(*pairs, precision="float64")[:, 0].reshape(COSINES, len(x), -1).mean(2)
-            shares = value @ hats
-            missed = np.maximum(1.0 - shares.sum(1, keepdims=True), 0.0)  # a peak between the integral's nodes
-            found[row] = (shares + missed * found[row]) / (shares.sum(1, keepdims=True) + missed)
-        return found
-
-    values = cache.remember(("openpbr-scattered", masking, ROUGHNESSES, COSINES, HATS), build)
-    return Table("openpbr_scattered", values)
-
-
-def _hats(x: np.ndarray) -> np.ndarray:
-    """Shares of places among the nodes on both sides of them, (N, HATS)."""
-    shares: np.ndarray = np.maximum(1.0 - np.abs(x[:, None] * (HATS - 1) - np.arange(HATS)), 0.0)
-    return shares
-
-
 # --------------------------------------------------------------------------- small formulas
 
 
@@ -1000,11 +1066,23 @@ def _sum(terms: list[Array]) -> Array:
     return total
 
 
-def _mean_of(reflectance: Callable[[Scalar], Spectrum], like: Scalar) -> Spectrum:
-    """2 int F mu dmu, as `fresnel.average` with as many nodes as the other means here."""
-    x, w = (part.tolist() for part in gauss(NODES))
-    terms = [reflectance(one * one + 0.0 * like) * (4.0 * weight * one**3) for one, weight in zip(x, w, strict=True)]
-    return _sum(terms)
+def _covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
+    """The albedo of facets under a film: what it changes at `PLACES`, by how much these count."""
+    if not filmed:
+        return E
+    return clamp(E + _sum([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
+
+
+def _averaged(values: list[Array]) -> Array:
+    """2 int F mu dmu of what F is at `PLACES`, or at `FEW_PLACES`."""
+    x, w = gauss(len(values))
+    return _sum([value * weight for value, weight in zip(values, (2.0 * w * x).tolist(), strict=True)])
+
+
+@function
+def _over_pi(scale: Scalar) -> Scalar:
+    """The mean whose inverse over pi that is; 0 of 0."""
+    return safe_div(inv_pi, scale)
 
 
 def _again(f: Spectrum, lost: Scalar) -> Spectrum:
@@ -1021,3 +1099,11 @@ def _power(colour: Spectrum, exponent: Scalar) -> Spectrum:
 def _at(cos: Scalar) -> Direction:
     """A direction of a cosine."""
     return vec3(safe_sqrt(1.0 - sqr(cos)), 0.0 * cos, cos)
+
+
+def _lobe(value: Array, smooth: Mask | None, ideal: Mask | None, mirror: Scalar | float = 1.0) -> Array:
+    """A lobe's value; 0 where its facets are smooth, and of what is ideal `mirror` of smooth ones alone."""
+    if ideal is None:
+        return value if smooth is None else where(smooth, 0.0, value)
+    rough = where(ideal, 0.0, value)
+    return rough if smooth is None else where(smooth, where(ideal, mirror, 0.0), rough)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias, overload
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from ...ops import (
     sqrt,
     where,
 )
+from ...ops.types import Value
 from .. import colour
 from ..indices import RGB_WAVELENGTHS
 from .polarization import Diattenuation
@@ -52,14 +53,15 @@ def _of_unit(height: float, place: float, variance: float) -> tuple[float, float
     return height * math.sqrt(2.0 * math.pi * variance) / 1.0685e-7, place, variance
 
 
-# Fits of the observer's curves over wave numbers (Belcour2017, supplemental code): height, place and variance, the
-# second bell of x last, which the other curves have at height 0
-BELLS = (
-    _of_unit(5.4856e-13, 1.6810e6, 4.3278e9),
-    _of_unit(4.4201e-13, 1.7953e6, 9.3046e9),
-    _of_unit(5.2481e-13, 2.2084e6, 6.6121e9),
+Curve: TypeAlias = tuple[tuple[float, float, float], ...]
+
+# Fits of the observer's curves over wave numbers, as sums of bells (Belcour2017, supplemental code): height, place and
+# variance
+CURVES: tuple[Curve, Curve, Curve] = (
+    (_of_unit(5.4856e-13, 1.6810e6, 4.3278e9), _of_unit(9.7470e-14, 2.2399e6, 4.5282e9)),
+    (_of_unit(4.4201e-13, 1.7953e6, 9.3046e9),),
+    (_of_unit(5.2481e-13, 2.2084e6, 6.6121e9),),
 )
-SECOND = (_of_unit(9.7470e-14, 2.2399e6, 4.5282e9), (0.0, 1.0, 1.0), (0.0, 1.0, 1.0))
 HARMONICS = 3  # the next is r^4 of the first, and the eye's curves have blurred it
 WHITE = (0.95047, 1.0, 1.08883)  # XYZ of D65: the curves were fitted under even light
 
@@ -70,10 +72,12 @@ class Complex(NamedTuple):
     re: Scalar
     im: Scalar
 
-    def plus(self, other: Complex) -> Complex:
-        return Complex(self.re + other.re, self.im + other.im)
+    def plus(self, other: Amplitude) -> Complex:
+        return Complex(self.re + other.re, self.im if isinstance(other, Real) else self.im + other.im)
 
-    def times(self, other: Complex) -> Complex:
+    def times(self, other: Amplitude) -> Complex:
+        if isinstance(other, Real):
+            return self.scaled(other.re)
         return Complex(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
 
     def scaled(self, factor: Scalar | float) -> Complex:
@@ -88,8 +92,37 @@ class Complex(NamedTuple):
         """Its absolute value, squared."""
         return sqr(self.re) + sqr(self.im)
 
-    def over(self, other: Complex) -> Complex:
+    def over(self, other: Amplitude) -> Complex:
         return self.times(other.conjugate).scaled(1.0 / maximum(other.square, 1e-30))
+
+
+class Real(NamedTuple):
+    """A real number in the place of a complex one: of clear bases, for a third of the work."""
+
+    re: Scalar
+
+    def plus(self, other: Real) -> Real:
+        return Real(self.re + other.re)
+
+    def times(self, other: Amplitude) -> Amplitude:
+        return other.scaled(self.re)
+
+    def scaled(self, factor: Scalar | float) -> Real:
+        return Real(self.re * factor)
+
+    @property
+    def conjugate(self) -> Real:
+        return self
+
+    @property
+    def square(self) -> Scalar:
+        return sqr(self.re)
+
+    def over(self, other: Real) -> Real:
+        return Real(self.re / maximum(other.re, 1e-30))
+
+
+Amplitude: TypeAlias = Complex | Real
 
 
 class Faces(NamedTuple):
@@ -107,19 +140,37 @@ class Faces(NamedTuple):
     way: Scalar
 
 
+class ClearFaces(NamedTuple):
+    """The same of a base that is clear."""
+
+    top: tuple[Scalar, Scalar]
+    base: tuple[Real, Real]
+    bare: tuple[Real, Real]
+    way: Scalar
+
+
 @function
-def faces(cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar) -> Faces:
-    """Of a film of real index film_eta >= 1 on a base of index eta + i k."""
+def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces | ClearFaces:
+    """Of a film of real index film_eta >= 1 on a base of index eta + i k; k None: one that is clear, see `Film`."""
     sin2 = 1.0 - sqr(cos_i)
     inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
-    w = _root(sqr(eta) - sqr(k) - sin2, eta * k)
     contrast = (1.0 - film_eta) * (1.0 + film_eta)
     top_s = contrast / sqr(cos_i + inside)
     top_p = -top_s * (cos_i * inside - sin2) / maximum(cos_i * inside + sin2, 1e-30)
+    under, outside = (film_eta - eta) * (film_eta + eta), (1.0 - eta) * (1.0 + eta)
+    if k is None:
+        below = sqrt(maximum(sqr(eta) - sin2, 1e-12))
+        base = _clear_face(inside, below, under, sin2)
+        bare = _clear_face(cos_i, below, outside, sin2)
+        return ClearFaces((top_s, top_p), base, bare, thickness * inside)
+    w = _root(sqr(eta) - sqr(k) - sin2, eta * k)
     loss = 2.0 * eta * k
-    base = _face(inside, w, Complex((film_eta - eta) * (film_eta + eta) + sqr(k), -loss), sin2)
-    bare = _face(cos_i, w, Complex((1.0 - eta) * (1.0 + eta) + sqr(k), -loss), sin2)
-    return Faces((top_s, top_p), base, bare, thickness * inside)
+    return Faces(
+        (top_s, top_p),
+        _face(inside, w, Complex(under + sqr(k), -loss), sin2),
+        _face(cos_i, w, Complex(outside + sqr(k), -loss), sin2),
+        thickness * inside,
+    )
 
 
 def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tuple[Complex, Complex]:
@@ -130,6 +181,12 @@ def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tup
     product = below.scaled(above)
     turned = Complex(sin2 - product.re, -product.im).over(Complex(sin2 + product.re, product.im))
     return s, s.times(turned)
+
+
+def _clear_face(above: Scalar, below: Scalar, contrast: Scalar, sin2: Scalar) -> tuple[Real, Real]:
+    """The same, both media clear."""
+    s, product = contrast / sqr(above + below), above * below
+    return Real(s), Real(s * (sin2 - product) / maximum(sin2 + product, 1e-30))
 
 
 def _root(real: Scalar, half_imaginary: Scalar) -> Complex:
@@ -150,7 +207,7 @@ class Amplitudes(NamedTuple):
 
 
 @function
-def airy(film: Faces, wavelength: Scalar | float) -> Amplitudes:
+def airy(film: Faces | ClearFaces, wavelength: Scalar | float) -> Amplitudes:
     """The sum of all waves at a wavelength, in the unit of the thickness.
 
     Above the line stands r12 + r23 E = r13 (1 + r12 r23) + r23 (E - 1), with r13 of the bare surface: it cancels only
@@ -161,18 +218,20 @@ def airy(film: Faces, wavelength: Scalar | float) -> Amplitudes:
     sin, cos = sincos(half_angle)
     less = Complex(-2.0 * sqr(sin), 2.0 * sin * cos)  # E - 1
     over, under = [], []
-    for top, base, bare in zip(film.top, film.base, film.bare, strict=True):
-        inner = base.times(less)
-        once = Complex(1.0 + top * base.re, top * base.im)
-        over.append(bare.times(once).plus(inner))
-        under.append(once.plus(inner.scaled(top)))
+    for number, top in enumerate(film.top):
+        base, bare = film.base[number], film.bare[number]
+        inner = less.times(base)
+        share = base.scaled(top)
+        once = share._replace(re=1.0 + share.re)
+        over.append(inner.plus(bare.times(once)))
+        under.append(inner.scaled(top).plus(once))
     return Amplitudes(over[0].over(under[0]), over[1].over(under[1]), *under)
 
 
 class Film(NamedTuple):
     """A film on a base, as a material has it.
 
-    eta, k      of the base, colours
+    eta, k      of the base, colours; k None: it is clear, and light from outside always finds a way into it, eta > sin
     film_eta    index of the film
     thickness   nm
     form        a name of `FORMS`
@@ -180,7 +239,7 @@ class Film(NamedTuple):
     """
 
     eta: Spectrum
-    k: Spectrum
+    k: Spectrum | None
     film_eta: Scalar
     thickness: Scalar
     form: str
@@ -198,7 +257,7 @@ def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
 
 
 @function
-def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scalar, thickness: Scalar) -> Spectrum:
+def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
     """The colour of R under daylight, summed over `NODES`."""
     mixing = WEIGHTS if len(channels(eta)) == 3 else np.tile((WEIGHTS @ colour.LUMINANCE)[:, None], 3)
     seen = 0.0 * eta
@@ -212,7 +271,7 @@ def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Di
     """What reflection and refraction do to polarization, from outside, summed over wavelengths whatever the form is."""
 
     def seen(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
-        def at(eta: Scalar, k: Scalar, nm: Scalar | float) -> Scalar:
+        def at(eta: Scalar, k: Scalar | None, nm: Scalar | float) -> Scalar:
             return what(airy(faces(cos_i, eta, k, film.film_eta, film.thickness), nm))
 
         return _seen(film, at)
@@ -239,7 +298,7 @@ def _over_sum(s: Spectrum, p: Spectrum, real: Spectrum, imaginary: Spectrum) -> 
 
 @function
 def _unpolarized(
-    cos_i: Scalar, eta: Scalar, k: Scalar, film_eta: Scalar, thickness: Scalar, wavelength: Scalar | float
+    cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar, wavelength: Scalar | float
 ) -> Scalar:
     """R at one wavelength."""
     waves = airy(faces(cos_i, eta, k, film_eta, thickness), wavelength)
@@ -250,7 +309,7 @@ def _unpolarized(
 def _node(
     cos_i: Scalar,
     eta: Spectrum,
-    k: Spectrum,
+    k: Spectrum | None,
     film_eta: Scalar,
     thickness: Scalar,
     nm: float,
@@ -259,24 +318,27 @@ def _node(
     blue: float,
 ) -> Spectrum:
     """What a wavelength adds to the colour of R."""
-    R = _unpolarized(cos_i, _between(channels(eta), nm), _between(channels(k), nm), film_eta, thickness, nm)
+    R = _unpolarized(cos_i, _between(channels(eta), nm), _between(_of(k, eta), nm), film_eta, thickness, nm)
     return of_channels(eta, [R * share for share in (red, green, blue)][: len(channels(eta))])
 
 
-def _seen(film: Film, at: Callable[[Scalar, Scalar, Scalar | float], Scalar]) -> Spectrum:
+def _seen(film: Film, at: Callable[[Scalar, Scalar | None, Scalar | float], Scalar]) -> Spectrum:
     """What `at` gives for eta, k and a wavelength: one for each channel of a spectrum, else a colour under daylight."""
     if film.wavelengths is None:
         return _sum(film.eta, film.k, range(len(NODES)), at)
-    triples = zip(channels(film.eta), channels(film.k), channels(film.wavelengths), strict=True)
+    triples = zip(channels(film.eta), _of(film.k, film.eta), channels(film.wavelengths), strict=True)
     return of_channels(film.eta, [at(*one) for one in triples])
 
 
 def _sum(
-    eta: Spectrum, k: Spectrum, nodes: Sequence[int], at: Callable[[Scalar, Scalar, Scalar | float], Scalar]
+    eta: Spectrum,
+    k: Spectrum | None,
+    nodes: Sequence[int],
+    at: Callable[[Scalar, Scalar | None, Scalar | float], Scalar],
 ) -> Spectrum:
     """The colour of what `at` gives at some of the nodes. The indices of red, green and blue stand for
     `RGB_WAVELENGTHS`; between them they are straight, beyond them level."""
-    etas, ks = channels(eta), channels(k)
+    etas, ks = channels(eta), _of(k, eta)
     mixing = WEIGHTS if len(etas) == 3 else (WEIGHTS @ colour.LUMINANCE)[:, None]
     totals: list[Scalar] = []
     for node in nodes:
@@ -287,8 +349,19 @@ def _sum(
     return of_channels(eta, totals)
 
 
-def _between(values: Sequence[Scalar], nm: float) -> Scalar:
+def _of(k: Spectrum | None, eta: Spectrum) -> Sequence[Scalar | None]:
+    """The channels of k, as many as those of eta."""
+    return [None] * len(channels(eta)) if k is None else channels(k)
+
+
+@overload
+def _between(values: Sequence[Scalar], nm: float) -> Scalar: ...
+@overload
+def _between(values: Sequence[Scalar | None], nm: float) -> Scalar | None: ...
+def _between(values: Sequence[Value], nm: float) -> Value:
     """The value at a wavelength of one that is known at `RGB_WAVELENGTHS`."""
+    if values[0] is None:
+        return None
     if len(values) != 3:
         return values[0]
     red, green, blue = RGB_WAVELENGTHS
@@ -300,16 +373,18 @@ def _between(values: Sequence[Scalar], nm: float) -> Scalar:
 
 
 @function
-def _in_fourier_space(cos_i: Scalar, eta: Spectrum, k: Spectrum, film_eta: Scalar, thickness: Scalar) -> Spectrum:
+def _in_fourier_space(
+    cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar
+) -> Spectrum:
     """Belcour2017, eq. 6 to 10, the mean term kept as a colour; harmonics of red, green and blue indices are taken for
     those of x, y and z."""
-    etas, ks = channels(eta), channels(k)
+    etas, ks = channels(eta), _of(k, eta)
     if len(etas) != 3:
-        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, *BELLS[1], *SECOND[1])
+        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, CURVES[1])
         return clamp(of_channels(eta, [luminance.mean + luminance.wave]), 0.0, 1.0)
-    x = _band(cos_i, etas[0], ks[0], film_eta, thickness, *BELLS[0], *SECOND[0])
-    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, *BELLS[1], *SECOND[1])
-    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, *BELLS[2], *SECOND[2])
+    x = _band(cos_i, etas[0], ks[0], film_eta, thickness, CURVES[0])
+    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, CURVES[1])
+    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, CURVES[2])
     X, Y, Z = (band.wave * white for band, white in zip((x, y, z), WHITE, strict=True))
     waves = [X * float(row[0]) + Y * float(row[1]) + Z * float(row[2]) for row in colour.XYZ_TO_RGB]
     total = [band.mean + wave for band, wave in zip((x, y, z), waves, strict=True)]
@@ -327,44 +402,66 @@ class Band(NamedTuple):
 def _band(
     cos_i: Scalar,
     eta: Scalar,
-    k: Scalar,
+    k: Scalar | None,
     film_eta: Scalar,
     thickness: Scalar,
-    height: float,
-    place: float,
-    variance: float,
-    height_too: float,
-    place_too: float,
-    variance_too: float,
+    curve: Curve,
 ) -> Band:
-    """Mean of both polarizations; the curve is the sum of two bells."""
+    """Mean of both polarizations."""
     film = faces(cos_i, eta, k, film_eta, thickness)
     mean, wave = 0.0 * cos_i, 0.0 * cos_i
-    trips: list[Complex] = []  # once through the film and back, without the way
+    trips: list[Amplitude] = []  # once through the film and back, without the way
     sizes: list[Scalar] = []
-    for top, base in zip(film.top, film.base, strict=True):
+    for number, top in enumerate(film.top):
+        base = film.base[number]
         outer, inner = sqr(top), base.square
         passed = 1.0 - outer
         bounced = sqr(passed) * inner / maximum(1.0 - outer * inner, 1e-6)
         mean = mean + 0.5 * (outer + bounced)
         trips.append(base.scaled(-top))
         sizes.append(bounced - passed)
+    path = film.way * 2e-9
+    bells = [_bell(path, place, variance) for _, place, variance in curve]
+    # A path n times as long turns a bell's wave n times as far, and dies out as the n^2-th power
+    waves = [bell.turn for bell in bells]
     powers = trips
     for order in range(1, HARMONICS + 1):
-        path = film.way * (2.0 * order * 1e-9)
-        curve = _bell(path, height, place, variance).plus(_bell(path, height_too, place_too, variance_too))
         if order > 1:
+            waves = [turned.times(bell.turn) for turned, bell in zip(waves, bells, strict=True)]
             powers = [power.times(trip) for power, trip in zip(powers, trips, strict=True)]
+        parts = [
+            turned.scaled(_power(bell.left, order * order) * height)
+            for turned, bell, (height, _, _) in zip(waves, bells, curve, strict=True)
+        ]
+        seen = parts[0] if len(parts) == 1 else parts[0].plus(parts[1])
         for size, power in zip(sizes, powers, strict=True):
-            wave = wave + size * power.times(curve).re
+            wave = wave + size * seen.times(power).re
     return Band(mean, wave)
 
 
+class Bell(NamedTuple):
+    """The Fourier transform of a bell over wave numbers: a wave that dies out.
+
+    turn  where the wave stands
+    left  what is left of it
+    """
+
+    turn: Complex
+    left: Scalar
+
+
 @function
-def _bell(path: Scalar, height: float, place: float, variance: float) -> Complex:
-    """The Fourier transform of a bell over wave numbers at a path, metres: a wave that dies out."""
+def _bell(path: Scalar, place: float, variance: float) -> Bell:
+    """At a path, metres."""
     turns = path * place
     angle = (turns - floor(turns)) * (2.0 * math.pi)
     sin, cos = sincos(angle)
-    size = exp(sqr(path) * (variance * -((2.0 * math.pi) ** 2))) * height
-    return Complex(cos, sin).scaled(size)
+    return Bell(Complex(cos, sin), exp(sqr(path) * (variance * -((2.0 * math.pi) ** 2))))
+
+
+def _power(x: Scalar, exponent: int) -> Scalar:
+    """x^exponent, by squaring."""
+    if exponent == 1:
+        return x
+    even = sqr(_power(x, exponent // 2))
+    return even * x if exponent % 2 else even

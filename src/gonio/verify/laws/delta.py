@@ -353,7 +353,9 @@ def _turned(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: i
 
 
 def _tinted(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: int) -> Wrong:
-    """What a lobe carries is affine in each albedo."""
+    """What a lobe carries is affine in each albedo, unless values are declared not to be."""
+    if "linearity" in subject.breaches:
+        return
     names = [name for name, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0]
     for name in names:
         low, high, middle = (lobes.of(subject.replace(**{name: v}), wo, seed) for v in (0.125, 0.875, 0.3125))

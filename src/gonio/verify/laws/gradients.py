@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of
 
 TOLERANCE = 1e-4
+ROWS = 1 << 17  # rays in flight
 STEP = 1e-4  # of the parameter's size: with five points the truncation is its fourth power, the rounding 1e-16 / 1e-4
 
 
@@ -42,8 +43,9 @@ class Gradients(Law):
         worst, place, name, tried = -1.0, 0, "", []
         skipped = 0.0
         problems: list[str] = []
-        for label, parameter in _numeric(subject.model):
-            exact, differences, smooth, least = _derivatives(subject.model, label, parameter, wo, wi)
+        labels = dict(_numeric(subject.model))
+        for label, (exact, differences, smooth, least) in _derivatives(subject.model, list(labels), wo, wi).items():
+            parameter = labels[label]
             if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
                 if _steps(subject, label, parameter, wo, wi):
                     problems.append(f"the derivative by {label} is 0 everywhere, and the values follow it in steps")
@@ -94,9 +96,8 @@ class Gradients(Law):
     ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """The parameter that was worst, pairs away from edges, and its derivatives there, by both ways."""
         name = finding.worst.partition(":")[0]
-        parameter = dict(_numeric(subject.model))[name]
         wo, wi = pairs(subject, 4096, seed)
-        exact, differences, smooth, _ = _derivatives(subject.model, name, parameter, wo, wi)
+        exact, differences, smooth, _ = _derivatives(subject.model, [name], wo, wi)[name]
         return name, wo[smooth], wi[smooth], exact[smooth], differences[smooth]
 
 
@@ -130,47 +131,86 @@ def _size(value: Any) -> float:
     return size if size > 0.0 else 1.0
 
 
-def _derivatives(
-    model: BSDF, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """By autodiff and by differences, (N, channels) each, where two different steps agree (N,), and the
-    derivative below which there is none.
-    """
+def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], Any]:
+    """How a bound value is moved."""
+
+    def moved(bound: Any) -> Any:
+        if parameter.kind != "angle":
+            return bound + shift
+        # the bound value is (cos, sin), or nothing at all where the angle is 0
+        kind = backend.types_like(type(shift))
+        s, c = backend.drjit().sincos(backend.float_of(plain, kind) + shift)
+        return kind.vec2(c, s)
+
+    return moved
+
+
+class _Derivatives(NamedTuple):
+    """By autodiff and by differences, (N, channels) each, where two different steps agree (N,), and the derivative
+    below which there is none."""
+
+    exact: np.ndarray
+    differences: np.ndarray
+    smooth: np.ndarray
+    least: float
+
+
+def _derivatives(model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray) -> dict[str, _Derivatives]:
+    """The derivatives by parameters at some paths. All are asked for at once, each on its own rays, where the others
+    are moved by 0: one kernel serves them all. Where another has no derivative, which 0 times does not mend, one is
+    moved alone."""
+    found: dict[str, _Derivatives] = {}
+    most = max(1, ROWS // len(wo))
+    for first in range(0, len(paths), most):
+        some = paths[first : first + most]
+        for path, one in zip(some, _together(model, some, wo, wi), strict=True):
+            found[path] = one if np.isfinite(one.exact).all() else _together(model, [path], wo, wi)[0]
+    return found
+
+
+def _together(model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray) -> list[_Derivatives]:
     dr = backend.drjit()
     kind = backend.types("float64")
-    a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
-    plain = tree.value_at(model, path)
+    rays, count = len(wo), len(paths)
+    a, b = (backend.vector_of(np.tile(w, (count, 1)), 3, kind) for w in (wo, wi))
+    given = {leaf.path: leaf for leaf in tree.leaves(model) if leaf.path in paths}
+    sizes = [_size(given[path].value) for path in paths]
+    own = {path: backend.float_of(np.repeat(np.eye(count)[n], rays), kind) for n, path in enumerate(paths)}
+    steps = backend.float_of(np.repeat(STEP * np.array(sizes), rays), kind)
 
     def value(shift: Any) -> Any:
-        def shifted(bound: Any) -> Any:
-            if parameter.kind != "angle":
-                return bound + shift
-            # the bound value is (cos, sin), or nothing at all where the angle is 0
-            s, c = dr.sincos(backend.float_of(plain, kind) + shift)
-            return kind.vec2(c, s)
-
-        bound = binding.shift(model.bind(kind), path, shifted)
+        bound = model.bind(kind)
+        for path, leaf in given.items():
+            bound = binding.shift(bound, path, _shifted(leaf.parameter, leaf.value, own[path] * shift))
         return guarded(model, "eval", lambda: bound.eval(a, b, "radiance"))
 
-    def number(shift: float) -> np.ndarray:
-        return np.array(backend.to_numpy(value(dr.opaque(kind.float, shift)), len(wo)), float)
+    def rows(values: Any) -> np.ndarray:
+        found = np.array(backend.to_numpy(values, rays * count), float)
+        return found.reshape(count, rays, -1)
+
+    def number(step: float) -> np.ndarray:
+        return rows(value(dr.opaque(kind.float, step) * steps))
 
     delta = dr.opaque(kind.float, 0.0)
     dr.enable_grad(delta)
     result = value(delta)
+    slopes = np.zeros((count, rays, 3))
     if dr.grad_enabled(result):
         dr.forward(delta)
-        exact = np.array(backend.to_numpy(dr.grad(result), len(wo)), float)
-    else:
-        exact = np.zeros((len(wo), 3))
-    step = STEP * _size(plain)
-    shifted = {s: number(s * step) for s in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)}
+        slopes = rows(dr.grad(result))
+    plain = number(0.0)
+    shifted = {s: number(s) for s in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)}
+    return [_judged(slopes[n], {s: v[n] for s, v in shifted.items()}, plain[n], size) for n, size in enumerate(sizes)]
+
+
+def _judged(exact: np.ndarray, shifted: dict[float, np.ndarray], plain: np.ndarray, size: float) -> _Derivatives:
+    step = STEP * size
     one, two, half = (shifted[s] - shifted[-s] for s in (1.0, 2.0, 0.5))
     lit = np.array([np.any(v != 0.0, axis=1) for v in shifted.values()])
     wide = (8.0 * one - two) / (12.0 * step)
     narrow = (8.0 * half - one) / (6.0 * step)
     # a percent more of the parameter that changes a value by less than its hundred-millionth changes nothing
-    least = 1e-6 * float(np.max(np.abs(number(0.0)), initial=0.0)) / _size(plain)
+    least = 1e-6 * float(np.max(np.abs(plain), initial=0.0)) / size
     noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.percentile(np.abs(narrow), 90.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
-    return exact, narrow, smooth, least
+    return _Derivatives(exact, narrow, smooth, least)

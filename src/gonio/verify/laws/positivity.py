@@ -253,9 +253,11 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
         return []
     dr.backward(dr.sum(dr.sum(value, axis=0)))
     found = []
-    for name, bounds in leaves.items():
-        for bound in bounds:
-            gradient = np.asarray(dr.grad(bound).numpy())
+    gradients = {name: [dr.grad(bound) for bound in bounds] for name, bounds in leaves.items()}
+    dr.eval(gradients)  # together: one by one each would be a kernel, most of it the same
+    for name, each in gradients.items():
+        for one in each:
+            gradient = np.asarray(one.numpy())
             wrong = ~np.isfinite(gradient.reshape(-1, gradient.shape[-1])).all(0)
             if wrong.any():
                 found.append((name, int(np.argmax(wrong)) if len(wrong) == len(wo) else 0))
