@@ -96,8 +96,8 @@ class Sky:
     def sample(self, it: Interaction, u: Point, active: Mask) -> tuple[Vector, Point, Float, Radiance]:
         """(direction, a point far away in it, density in 1/sr, radiance from there)."""
         mi = self.mi
-        row, down = self._found(self._rows, mi.UInt32(0), self.height, u.y)
-        column, along = self._found(self._columns, row * self.width, self.width, u.x)
+        row, down = found_among(mi, self._rows, mi.UInt32(0), self.height, u.y)
+        column, along = found_among(mi, self._columns, row * self.width, self.width, u.x)
         y, step = mi.Float(row), dr.pi / self.height
         cosine = dr.lerp(dr.cos(y * step), dr.cos((y + 1.0) * step), down)
         direction = self._toward((mi.Float(column) + along) * (1.0 / self.width), cosine)
@@ -106,13 +106,13 @@ class Sky:
         si.wi, si.wavelengths, si.time = -direction, it.wavelengths, it.time
         return direction, dr.fma(direction, self._far, it.p), density, self.emitter.eval(si, active)
 
-    def _found(self, sums: Float, begin: UInt, count: int, u: Float) -> tuple[UInt, Float]:
-        """Where u falls among `count` running sums, a power of two of them, and how far into that step."""
-        mi = self.mi
-        at, half = mi.UInt32(0), count // 2
-        while half:
-            at = dr.select(dr.gather(mi.Float, sums, begin + at + (half - 1)) <= u, at + half, at)
-            half //= 2
-        low = dr.select(at > 0, dr.gather(mi.Float, sums, begin + dr.maximum(at, 1) - 1), 0.0)
-        high = dr.gather(mi.Float, sums, begin + at)
-        return at, dr.clip((u - low) / dr.maximum(high - low, 1e-30), 0.0, 1.0)
+
+def found_among(mi: ModuleType, sums: Float, begin: UInt, count: int, u: Float) -> tuple[UInt, Float]:
+    """Where u falls among `count` running sums, a power of two of them, and how far into that step."""
+    at, half = mi.UInt32(0), count // 2
+    while half:
+        at = dr.select(dr.gather(mi.Float, sums, begin + at + (half - 1)) <= u, at + half, at)
+        half //= 2
+    low = dr.select(at > 0, dr.gather(mi.Float, sums, begin + dr.maximum(at, 1) - 1), 0.0)
+    high = dr.gather(mi.Float, sums, begin + at)
+    return at, dr.clip((u - low) / dr.maximum(high - low, 1e-30), 0.0, 1.0)
