@@ -17,6 +17,7 @@ from types import ModuleType
 import drjit as dr
 
 from ..errors import InputError
+from .nearby import Nearby
 from .sky import Sky
 from .surfaces import Surfaces
 from .types import (
@@ -303,7 +304,9 @@ class Lights:
             self.probability = self._probabilities()
             self.choice = mi.DiscreteDistribution(self.probability)
             self.place = mi.UInt32(order)  # of each of `emitters` among the scene's
-            self.by_pointer = self._by_pointer()
+            self.by_pointer = self._by_pointer(self.probability)
+            self.nearby = Nearby(mi, scene, self.emitters)
+            self.number = self._by_pointer(dr.arange(mi.UInt32, self.count))
 
     def _sky(self, beside_lobes: bool) -> tuple[Sky | None, int]:
         """The environment's density, where it is one that varies, and its place among the emitters."""
@@ -346,12 +349,12 @@ class Lights:
         share = [f / total if total > 0 else 1 / self.count for f in flux]
         return mi.Float([0.5 / self.count + 0.5 * s for s in share])
 
-    def _by_pointer(self) -> Float:
-        """The probabilities again, indexed by Dr.Jit's number of the emitter (what an EmitterPtr holds)."""
+    def _by_pointer(self, values: Float) -> Float:
+        """A value of each of `emitters`, indexed by Dr.Jit's number of the emitter (what an EmitterPtr holds)."""
         mi = self.mi
         number = dr.reinterpret_array(mi.UInt32, self.scene.emitters_dr())
-        table = dr.zeros(mi.Float, int(dr.max(number)[0]) + 1)
-        dr.scatter(table, self.probability, dr.gather(mi.UInt32, number, self.place))
+        table = dr.zeros(type(values), int(dr.max(number)[0]) + 1)
+        dr.scatter(table, values, dr.gather(mi.UInt32, number, self.place))
         dr.eval(table)
         return table
 
@@ -379,7 +382,7 @@ class Lights:
                 return self._toward_sky(self.sky, si, u, active)
             ds, weight = self.emitters[0].sample_direction(si, u, active)
             return LightSample(ds, weight, mi.Bool(ds.delta), mi.Float(0))
-        index, left, probability = self.choice.sample_reuse_pmf(u.x, active)
+        index, left, probability = self.nearby.choose(si.p, u.x)
         u = mi.Point2f(left, u.y)
         place = dr.gather(mi.UInt32, self.place, index, active)
         emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), place, active)
@@ -424,7 +427,8 @@ class Lights:
         else:
             lamp = active & si.is_valid()  # the sky is what no surface is before
             density = dr.select(lamp, ds.emitter.pdf_direction(it, ds, lamp), self.sky.pdf(ds.d))
-        return density * dr.gather(mi.Float, self.by_pointer, number, active)
+        index = dr.gather(mi.UInt32, self.number, number, active)
+        return density * self.nearby.probability(origin, index, active)
 
     def share(self, pdf: Float, other: Float) -> Float:
         """What one of two strategies of a sample each is weighed by, of densities `pdf` and `other`, lights and lobes.

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from . import engine
 from .types import Emitter, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt, Vector
 
-HEIGHT, WIDTH = 1 << 9, 1 << 10  # cells: .35 degrees, finer than most maps
+NARROWEST, WIDEST = 64, 1024  # cells around, twice as many as from pole to pole: as fine as the map, up to .35 degrees
 LEAST = 0.05  # of its luminance that each cell keeps: lobes that are badly sampled have to be found here
-MOST_POINTS = 1 << 23  # of a map, to be looked at
+MOST_STEPS = 4  # a side, in which a cell is looked at: maps of 4096 texels around are read whole
 
 
 class Sky:
@@ -29,12 +29,12 @@ class Sky:
 
     def __init__(self, mi: ModuleType, scene: Scene, emitter: Emitter, compensated: bool) -> None:
         self.mi, self.emitter = mi, emitter
-        pixels = dict(mi.traverse(emitter)).get("data")
-        across = 1 if pixels is None else int(dr.ceil(pixels.shape[1] / WIDTH))
-        across = max(1, min(across, int((MOST_POINTS / (HEIGHT * WIDTH)) ** 0.5)))
-        luminance = self._seen(across)
-        edges = np.cos(np.pi * np.arange(HEIGHT + 1) / HEIGHT)
-        angle = (edges[:-1] - edges[1:])[:, None] * (2.0 * np.pi / WIDTH)  # steradian of a cell
+        texels = max(int(mi.traverse(emitter)["data"].shape[1]) - 2, 1)  # Mitsuba repeats a column at each end
+        self.width = min(max(1 << (texels - 1).bit_length(), NARROWEST), WIDEST)
+        self.height = self.width // 2
+        luminance = self._seen(min(max(-(-texels // self.width), 2), MOST_STEPS))
+        edges = np.cos(np.pi * np.arange(self.height + 1) / self.height)
+        angle = (edges[:-1] - edges[1:])[:, None] * (2.0 * np.pi / self.width)  # steradian of a cell
         if compensated:
             mean = float(np.sum(luminance * angle) / (4.0 * np.pi))
             luminance = np.maximum(luminance - mean, LEAST * luminance)
@@ -54,25 +54,28 @@ class Sky:
     def _held(self, values: NDArray[np.float64]) -> Float:
         return engine.own(self.mi.Float, np.ascontiguousarray(values.ravel(), np.float32))
 
-    def _seen(self, across: int) -> NDArray[np.float64]:
-        """Mean luminance of each cell, from so many points a side."""
-        mi = self.mi
-        index = dr.arange(mi.UInt32, HEIGHT * WIDTH)
-        row = index // WIDTH
-        x, y = mi.Float(index - row * WIDTH), mi.Float(row)
-        total = dr.zeros(mi.Float, HEIGHT * WIDTH)
-        for k in range(across * across):
-            du, dv = (((k % across) + 0.5) / across, ((k // across) + 0.5) / across)
-            direction = self._toward((x + du) * (1.0 / WIDTH), dr.cos((y + dv) * (dr.pi / HEIGHT)))
-            si = dr.zeros(mi.SurfaceInteraction3f, HEIGHT * WIDTH)
-            si.wi = -direction
-            if mi.is_spectral:
-                si.wavelengths = type(si.wavelengths)(*np.linspace(450.0, 620.0, len(si.wavelengths)).tolist())
-            seen = self.emitter.eval(si)
-            total += mi.luminance(seen) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(seen))
-            dr.eval(total)
-        found = np.array(total, np.float64).reshape(HEIGHT, WIDTH) / across**2
-        return np.where(np.isfinite(found), np.maximum(found, 0.0), 0.0)
+    def _seen(self, steps: int) -> NDArray[np.float64]:
+        """Luminance of each cell, from points so many steps apart on its edges and inside: between mean and largest, so
+        that no cell which holds a part of a sun seems dark."""
+        mi, high, wide = self.mi, steps * self.height, steps * self.width
+        index = dr.arange(mi.UInt32, (high + 1) * wide)
+        row = index // wide
+        across, down = dr.opaque(mi.Float, 1.0 / wide), dr.opaque(mi.Float, np.pi / high)
+        si = dr.zeros(mi.SurfaceInteraction3f, len(index))
+        si.wi = -self._toward(mi.Float(index - row * wide) * across, dr.cos(mi.Float(row) * down))
+        if mi.is_spectral:
+            si.wavelengths = type(si.wavelengths)(*np.linspace(450.0, 620.0, len(si.wavelengths)).tolist())
+        seen = self.emitter.eval(si)
+        seen = mi.luminance(seen) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(seen))
+        points = np.array(seen, np.float32).reshape(high + 1, wide)
+        points = np.where(np.isfinite(points), np.maximum(points, 0.0), 0.0)
+        points = np.concatenate([points, points[:, :1]], axis=1)
+        largest = total = np.zeros((self.height, self.width), np.float32)
+        for i in range(steps + 1):
+            for j in range(steps + 1):
+                part = points[i : i + high - steps + 1 : steps, j : j + wide - steps + 1 : steps]
+                largest, total = np.maximum(largest, part), total + part
+        return 0.5 * (largest + total / (steps + 1) ** 2).astype(np.float64)
 
     def _toward(self, longitude: Float, cosine: Float) -> Vector:
         """A direction: longitude in turns, cosine of the angle with the grid's axis, y."""
@@ -86,30 +89,30 @@ class Sky:
         turns = dr.atan2(direction.z, direction.x) * (0.5 * dr.inv_pi)
         turns -= dr.floor(turns)
         down = dr.acos(dr.clip(direction.y, -1.0, 1.0)) * dr.inv_pi
-        column = dr.minimum(mi.UInt32(turns * WIDTH), WIDTH - 1)
-        row = dr.minimum(mi.UInt32(down * HEIGHT), HEIGHT - 1)
-        return dr.gather(mi.Float, self._density, row * WIDTH + column)
+        column = dr.minimum(mi.UInt32(turns * self.width), self.width - 1)
+        row = dr.minimum(mi.UInt32(down * self.height), self.height - 1)
+        return dr.gather(mi.Float, self._density, row * self.width + column)
 
     def sample(self, it: Interaction, u: Point, active: Mask) -> tuple[Vector, Point, Float, Radiance]:
         """(direction, a point far away in it, density in 1/sr, radiance from there)."""
         mi = self.mi
-        row, down = self._found(self._rows, mi.UInt32(0), HEIGHT, u.y)
-        column, along = self._found(self._columns, row * WIDTH, WIDTH, u.x)
-        y, step = mi.Float(row), dr.pi / HEIGHT
+        row, down = found_among(mi, self._rows, mi.UInt32(0), self.height, u.y)
+        column, along = found_among(mi, self._columns, row * self.width, self.width, u.x)
+        y, step = mi.Float(row), dr.pi / self.height
         cosine = dr.lerp(dr.cos(y * step), dr.cos((y + 1.0) * step), down)
-        direction = self._toward((mi.Float(column) + along) * (1.0 / WIDTH), cosine)
-        density = dr.gather(mi.Float, self._density, row * WIDTH + column)
+        direction = self._toward((mi.Float(column) + along) * (1.0 / self.width), cosine)
+        density = dr.gather(mi.Float, self._density, row * self.width + column)
         si: SurfaceInteraction = dr.zeros(mi.SurfaceInteraction3f)
         si.wi, si.wavelengths, si.time = -direction, it.wavelengths, it.time
         return direction, dr.fma(direction, self._far, it.p), density, self.emitter.eval(si, active)
 
-    def _found(self, sums: Float, begin: UInt, count: int, u: Float) -> tuple[UInt, Float]:
-        """Where u falls among `count` running sums, a power of two of them, and how far into that step."""
-        mi = self.mi
-        at, half = mi.UInt32(0), count // 2
-        while half:
-            at = dr.select(dr.gather(mi.Float, sums, begin + at + (half - 1)) <= u, at + half, at)
-            half //= 2
-        low = dr.select(at > 0, dr.gather(mi.Float, sums, begin + dr.maximum(at, 1) - 1), 0.0)
-        high = dr.gather(mi.Float, sums, begin + at)
-        return at, dr.clip((u - low) / dr.maximum(high - low, 1e-30), 0.0, 1.0)
+
+def found_among(mi: ModuleType, sums: Float, begin: UInt, count: int, u: Float) -> tuple[UInt, Float]:
+    """Where u falls among `count` running sums, a power of two of them, and how far into that step."""
+    at, half = mi.UInt32(0), count // 2
+    while half:
+        at = dr.select(dr.gather(mi.Float, sums, begin + at + (half - 1)) <= u, at + half, at)
+        half //= 2
+    low = dr.select(at > 0, dr.gather(mi.Float, sums, begin + dr.maximum(at, 1) - 1), 0.0)
+    high = dr.gather(mi.Float, sums, begin + at)
+    return at, dr.clip((u - low) / dr.maximum(high - low, 1e-30), 0.0, 1.0)
