@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+MODELS = {"Disney2015"}  # that are called as a citation is
 KEY = re.compile(r"\b(?:[A-Z][A-Za-z]+(?:19|20)\d{2}[a-z]?|PBRT4|SchottBK7)\b")
 
 
@@ -15,7 +16,7 @@ def cited() -> dict[str, str]:
     found: dict[str, str] = {}
     for folder, pattern in (("src", "*.py"), ("docs", "*.md")):
         for path in (ROOT / folder).rglob(pattern):
-            for key in KEY.findall(path.read_text(encoding="utf-8")):
+            for key in set(KEY.findall(path.read_text(encoding="utf-8"))) - MODELS:
                 found[key] = str(path.relative_to(ROOT))
     return found
 

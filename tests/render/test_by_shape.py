@@ -115,6 +115,6 @@ def test_derivatives_are_along_one_materials_numbers(tmp_path: Path, monkeypatch
     rng = np.random.default_rng(7)
     folder = written(tmp_path, [paint(rng) for _ in range(9)])
     monkeypatch.setattr(build, "MANY", 4)
-    picture, slope = go.render(folder, spp=4, max_depth=2, gradient=["shapes.4.material.albedo"])
+    _, slope = go.render(folder, spp=4, max_depth=2, gradient=["shapes.4.material.albedo"])
     moved = np.abs(slope).sum(axis=2) > 0
     assert 0 < moved.mean() < 0.1, "of a ball in the middle, lit directly"
