@@ -39,7 +39,7 @@ class _Slabs(OpenPBR):
         return eta, eta, 1.0 + 0.0 * eta
 
 
-class Disney2015(BSDF):
+class DisneyBSDF(BSDF):
     """Disney's principled BSDF of 2015, on slabs that keep energy: glass, metal and thin walls by one set of dials.
 
     The dials are those of Burley2015: `disney` of 2012 with the index in place of `specular`, `spec_trans` for glass
@@ -54,6 +54,7 @@ class Disney2015(BSDF):
     transmission is as rough as its reflection. docs/openpbr.md has the sizes.
     """
 
+    name: ClassVar[str] = "disney2015"
     reads_wavelengths: ClassVar[bool] = True
 
     base_color: Colour = spectrum(default=0.5, doc="colour of the surface", low=0.0, high=1.0)

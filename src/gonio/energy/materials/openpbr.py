@@ -61,6 +61,7 @@ from ..compensation.missing import missing_energy
 from . import _openpbr_tables as tables
 from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, LARGEST, NODES, PLACES
 
+NARROWEST = 1e-3  # of two widths
 NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
 MOST_RAYS = 1 << 18  # for which what is derived is kept, a hundred numbers each: it halves what is compiled
 STEPS = 4  # of the iteration in `_balanced`
@@ -326,7 +327,9 @@ class OpenPBR(BSDF):
         """alpha along x and y, whose squares add up to twice roughness^4, held at 1, where the tables end."""
         low = 1.0 - anisotropy
         along = sqr(roughness) * sqrt(2.0 / (1.0 + sqr(low)))
-        return vec2(clamp(along, SMOOTH, 1.0), clamp(along * low, SMOOTH, 1.0))
+        # of a lobe that is no mirror neither width: a thread of 1e-4 is narrower than samples resolve
+        across = maximum(along * low, minimum(along, NARROWEST))
+        return vec2(clamp(along, SMOOTH, 1.0), clamp(across, SMOOTH, 1.0))
 
     def _smooth(self, alpha: Pair, name: str) -> Mask | None:
         """Where facets of these widths are a mirror; None where they are nowhere."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -393,22 +393,34 @@ def _slopes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: i
     u = lobes.chosen(16, seed)
     many, numbers = np.repeat(views, len(u), axis=0), np.tile(u, (len(views), 1))
     a, b = (backend.vector_of(w, 3, kind) for w in (many, numbers))
-    for leaf in tree.leaves(subject.model):
-        if not leaf.parameter.numeric or leaf.parameter.kind in ("angle", "alpha") or np.ndim(leaf.value) > 1:
-            continue
+    numeric = [
+        leaf
+        for leaf in tree.leaves(subject.model)
+        if leaf.parameter.numeric and leaf.parameter.kind not in ("angle", "alpha") and np.ndim(leaf.value) <= 1
+    ]
+    for leaf in numeric:
+        # all are moved, the others by 0: one kernel serves for each of them
+        own = {one.path: dr.opaque(kind.float, float(one is leaf)) for one in numeric}
 
-        def carried(shift: object, path: str = leaf.path) -> tuple[object, object]:
-            bound = binding.shift(subject.model.bind(kind), path, functools.partial(operator.add, shift))
+        def carried(shift: Any, own: dict[str, Any] = own) -> tuple[Any, Any]:
+            bound = subject.model.bind(kind)
+            for path, much in own.items():
+                bound = binding.shift(bound, path, functools.partial(operator.add, much * shift))
             s = guarded(subject.model, "sample", lambda: bound.sample(a, b, "radiance"))
             return kind.vec3(s[1]) * s[2], kind.bool(s[3]) & (s[2] > 0.0)
 
-        delta = dr.opaque(kind.float, 0.0)
-        dr.enable_grad(delta)
-        value, lit = carried(delta)
-        exact = np.zeros((len(many), 3))
-        if dr.grad_enabled(value):
+        def slope(own: dict[str, Any] = own) -> tuple[np.ndarray, Any]:
+            delta = dr.opaque(kind.float, 0.0)
+            dr.enable_grad(delta)
+            value, lit = carried(delta, own)
+            if not dr.grad_enabled(value):
+                return np.zeros((len(many), 3)), lit
             dr.forward(delta)
-            exact = backend.to_numpy(dr.grad(value), len(many))
+            return np.asarray(backend.to_numpy(dr.grad(value), len(many))), lit
+
+        exact, lit = slope()
+        if not np.isfinite(exact).all():  # where another has no derivative, which 0 times does not mend
+            exact, lit = slope({leaf.path: own[leaf.path]})
         size = float(np.max(np.abs(np.asarray(leaf.value, float)))) or 1.0
         step = 1e-4 * size
         ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0)]
