@@ -282,7 +282,10 @@ class Lights:
     A scene lit by one rectangle, as most of the lab's are, takes a short way: no choice of light, no virtual call,
     solid-angle sampling whether the emitter is `gonio_area` or Mitsuba's one-sided `area`, and for a path's last
     ray a hit test of one rectangle. Every other scene asks the emitters themselves (point, environment, ...); one of
-    several is chosen with a probability half uniform, half proportional to the light it sends into the scene.
+    several is chosen by the light that it sends to where one is (`Nearby`), and for particles, which begin at lamps, by
+    `probability`: half evenly, half by the light that it sends into the scene.
+
+    beside_lobes  lobes are sampled too: an environment's own samples leave to them what they find (`Sky`)
     """
 
     def __init__(self, mi: ModuleType, scene: Scene, surfaces: Surfaces | None = None, beside_lobes: bool = False):

@@ -19,7 +19,7 @@ from .types import Emitter, Float, Mask, Point, Scene, UInt
 CELLS = 8  # a side, at most
 MOST = 1 << 21  # numbers of a table
 POINTS = 4  # of a cell, at which lamps are looked at
-EVEN = 0.25  # of the choice: a lamp's weight stays below 4 times their number
+EVEN = 0.25  # of the choice, or one over their number: of a lamp and a sky each gets a quarter of the samples at least
 
 
 class Nearby:
@@ -55,7 +55,8 @@ class Nearby:
             table[:, place] = np.where(np.isfinite(light) & (light > 0), light, 0).reshape(n, POINTS).mean(1)
         total = table.sum(1, keepdims=True)
         table[:, :count] = np.where(total > 0, table[:, :count] / np.maximum(total, 1e-300), 1 / count)
-        table[:, :count] = (1 - EVEN) * table[:, :count] + EVEN / count
+        even = max(EVEN, 1.0 / count)
+        table[:, :count] = (1.0 - even) * table[:, :count] + even / count
         sums = np.cumsum(table, axis=1)
         sums[:, count - 1 :] = 1.0
         self._chance = engine.own(mi.Float, table.ravel().astype(np.float32))
