@@ -42,27 +42,27 @@ KIND = "render"
 class Sources:
     """What a picture is made from.
 
-    text     the scene as it is rendered, overrides and all
+    text     writes down the scene as it is rendered, overrides and all; which takes a while where it is large
     files    those that it names, by the name that it gives them
     how      integrator, sampler, seed and what else there is to set
     version  of Gonio and Mitsuba
     device   what computes
     """
 
-    text: str
+    text: Callable[[], str]
     files: Mapping[str, Path]
     how: str
     version: str
     device: str
 
     @staticmethod
-    def of(mi: ModuleType, text: str, files: Mapping[str, Path], how: str) -> Sources:
+    def of(mi: ModuleType, text: Callable[[], str], files: Mapping[str, Path], how: str) -> Sources:
         return Sources(text, files, how, facts.versions(), _device(mi))
 
     def identity(self) -> dict[str, str]:
         """A hash or a name of each thing that the picture depends on, by what a person calls it."""
         found = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
-        found |= {"settings": self.how, "scene": _hash(self.text.encode("utf-8", "surrogateescape"))}
+        found |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
         for name, path in self.files.items():
             found[f"file {name}"] = facts.file_hash(path)
         return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -133,15 +133,15 @@ def _mitsuba_text(error: Exception) -> str:
     return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
 
 
-def sources(file: Path, parameters: Mapping[str, object]) -> tuple[str, dict[str, Path]]:
-    """The text of a scene with all that it includes, and every file that it names, by the name that it gives it."""
+def sources(file: Path, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
+    """What tells the text of a scene and all that it includes; and the files that it names, by their names in it."""
     texts, named = [repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))], {}
     texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
     for _, name, target, included in _named(file, parameters):
         named[name] = target
         if included:
             texts.append(target.read_text(encoding="utf-8", errors="surrogateescape"))
-    return "\n".join(texts), named
+    return lambda: "\n".join(texts), named
 
 
 def check_files(file: Path, parameters: Mapping[str, object], allow_outside: bool = False) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -140,8 +140,8 @@ def _key(part: type[Part], field: str) -> str:
     return pointer(part.model_fields[field].alias or field)
 
 
-def sources(description: SceneDescription) -> tuple[str, dict[str, Path]]:
-    """The scene as text, overrides and all, and every file that it names: textures, meshes, and Python that it runs."""
+def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str, Path]]:
+    """What writes the scene as text, overrides and all, and the files it names: textures, meshes, Python that runs."""
     named: dict[str, Path] = {}
     for where, part in parts(description):
         if (name := part.__dict__.get("file")) is not None:
@@ -151,7 +151,10 @@ def sources(description: SceneDescription) -> tuple[str, dict[str, Path]]:
         if isinstance(part, MaterialPart) and outside.is_outside(part.model):
             code = Path(inspect.getsourcefile(part.model) or "")
             named[code.name] = code
-    text = json.dumps(description.raw, sort_keys=True, default=lambda part: part.model_dump_json(by_alias=True))
+
+    def text() -> str:
+        return json.dumps(description.raw, sort_keys=True, default=lambda part: part.model_dump_json(by_alias=True))
+
     return text, named
 
 

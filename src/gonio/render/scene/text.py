@@ -29,18 +29,21 @@ def pointer(*steps: str | int) -> str:
 def read_json(path: Path) -> dict[str, Json]:
     """The object in a JSON file. Raises InputError for anything a scene file must not hold."""
     text = _text(path)
-    _check_depth(text, path)
     try:
-        value = json.loads(text, object_pairs_hook=_Object, parse_constant=_NotFinite)
+        value = _checked(json.loads(text, object_pairs_hook=_Object, parse_constant=_NotFinite), path, ())
+    except RecursionError:
+        _check_depth(text, path)
+        raise
     except json.JSONDecodeError as error:
         raise InputError(
             f"not valid JSON: {error.msg[0].lower()}{error.msg[1:]}",
             f"{path}:{error.lineno}:{error.colno}",
             _syntax_hint(text, error.pos),
         ) from None
+    except InputError:
+        raise
     except ValueError as error:  # an integer of more digits than Python converts
         raise InputError(f"not a usable number: {error}", str(path), "give a number below 1e18") from None
-    value = _checked(value, path, ())
     if not isinstance(value, dict):
         raise InputError(
             f"expected an object {{...}} at the top level, got {kind_of(value)}",
@@ -104,6 +107,7 @@ def _text(path: Path) -> str:
 
 
 def _check_depth(text: str, path: Path) -> None:
+    """Raises InputError with the line where the text is nested too deep."""
     depth = 0
     # Strings first, so that brackets inside them are not counted; an unclosed string is left to the JSON reader.
     for match in re.finditer(r'"(?:[^"\\]|\\.)*"|[\[{\]}]', text):
@@ -130,6 +134,8 @@ def _checked(value: Json, path: Path, steps: tuple[str | int, ...]) -> Json:
     """The value in plain types; raises at the first thing that JSON forbids or that a scene cannot use."""
     if _plain(value):
         return value
+    if len(steps) >= MAX_DEPTH and isinstance(value, (dict, list)):
+        raise RecursionError  # said with the line
 
     def refuse(what: str, hint: str) -> NoReturn:
         raise InputError(what, f"{path}#{pointer(*steps)}", hint)
