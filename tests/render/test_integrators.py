@@ -330,10 +330,10 @@ def test_where_numpy_puts_an_array_recompiles_nothing(monkeypatch: pytest.Monkey
         return tiles
 
     scene = mi.load_dict(scene_dict())
-    monkeypatch.setattr(progressive, "_tiles", placed(0))
+    monkeypatch.setattr(progressive, "tiles", placed(0))
     for _ in range(2):
         aligned = picture(scene, 2)
-    monkeypatch.setattr(progressive, "_tiles", placed(4))
+    monkeypatch.setattr(progressive, "tiles", placed(4))
     images: list[np.ndarray] = []
     assert launched(lambda: images.append(picture(scene, 2))) == 0
     assert np.array_equal(images[0], aligned)

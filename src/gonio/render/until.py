@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from .integrators import Render, Settings
 from .integrators.progressive import SHARE, TILE, tiles
@@ -43,6 +42,8 @@ def squares(a: Picture, b: Picture) -> NDArray[np.float64]:
     A single bright sample in one of them would hide itself if the pixel's own mean stood for its true value, below the
     squared difference. So it stands for it only up to what its neighbours or both pictures agree on.
     """
+    from scipy import ndimage  # here, since not every render loads SciPy
+
     a, b = a.astype(np.float64), b.astype(np.float64)
     mean = 0.5 * (a + b)
     agreed = np.maximum(ndimage.median_filter(mean, (3, 3, 1)), np.minimum(a, b))
@@ -195,6 +196,8 @@ def shares(noise: NDArray[np.float64]) -> tuple[Share, float]:
     By the root of the noise the error is least (Neyman's allocation); tiles, as `Render` has them, keep together what
     is traced together.
     """
+    from scipy import ndimage
+
     height, width = noise.shape
     order = tiles(width, height)
     smooth = 0.5 * (noise + np.maximum(ndimage.uniform_filter(noise, AROUND), 0.0))  # rounding goes below 0

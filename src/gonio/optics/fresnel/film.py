@@ -151,7 +151,7 @@ class ClearFaces(NamedTuple):
 
 @function
 def faces(cos_i: Scalar, eta: Scalar, k: Scalar | None, film_eta: Scalar, thickness: Scalar) -> Faces | ClearFaces:
-    """Of a film of real index film_eta >= 1 on a base of index eta + i k; k None: one that is clear, see `Film`."""
+    """Of a film of real index film_eta >= 1 on a base of index eta + i k, or clear without k, see `Film`."""
     sin2 = 1.0 - sqr(cos_i)
     inside = sqrt(maximum(sqr(film_eta) - sin2, 1e-12))
     contrast = (1.0 - film_eta) * (1.0 + film_eta)
@@ -189,6 +189,7 @@ def _clear_face(above: Scalar, below: Scalar, contrast: Scalar, sin2: Scalar) ->
     return Real(s), Real(s * (sin2 - product) / maximum(sin2 + product, 1e-30))
 
 
+@function
 def _root(real: Scalar, half_imaginary: Scalar) -> Complex:
     """sqrt(real + 2 i half_imaginary), both parts >= 0; the smaller is found from the larger, which cancels nothing."""
     size = sqrt(maximum(sqr(real) + 4.0 * sqr(half_imaginary), 1e-30))
@@ -380,11 +381,12 @@ def _in_fourier_space(
     those of x, y and z."""
     etas, ks = channels(eta), _of(k, eta)
     if len(etas) != 3:
-        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, CURVES[1])
+        luminance = _band(cos_i, etas[0], ks[0], film_eta, thickness, *CURVES[1][0])
         return clamp(of_channels(eta, [luminance.mean + luminance.wave]), 0.0, 1.0)
-    x = _band(cos_i, etas[0], ks[0], film_eta, thickness, CURVES[0])
-    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, CURVES[1])
-    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, CURVES[2])
+    (wide, other), (middle,), (narrow,) = CURVES
+    x = _band_of_two(cos_i, etas[0], ks[0], film_eta, thickness, *wide, *other)
+    y = _band(cos_i, etas[1], ks[1], film_eta, thickness, *middle)
+    z = _band(cos_i, etas[2], ks[2], film_eta, thickness, *narrow)
     X, Y, Z = (band.wave * white for band, white in zip((x, y, z), WHITE, strict=True))
     waves = [X * float(row[0]) + Y * float(row[1]) + Z * float(row[2]) for row in colour.XYZ_TO_RGB]
     total = [band.mean + wave for band, wave in zip((x, y, z), waves, strict=True)]
@@ -405,9 +407,42 @@ def _band(
     k: Scalar | None,
     film_eta: Scalar,
     thickness: Scalar,
-    curve: Curve,
+    height: float,
+    place: float,
+    variance: float,
 ) -> Band:
-    """Mean of both polarizations."""
+    """Mean of both polarizations, through a curve of one bell."""
+    return _through([(height, place, variance)], cos_i, eta, k, film_eta, thickness)
+
+
+@function
+def _band_of_two(
+    cos_i: Scalar,
+    eta: Scalar,
+    k: Scalar | None,
+    film_eta: Scalar,
+    thickness: Scalar,
+    height: float,
+    place: float,
+    variance: float,
+    other_height: float,
+    other_place: float,
+    other_variance: float,
+) -> Band:
+    """Mean of both polarizations, through a curve of two bells."""
+    fits = [(height, place, variance), (other_height, other_place, other_variance)]
+    return _through(fits, cos_i, eta, k, film_eta, thickness)
+
+
+def _through(
+    fits: Sequence[tuple[float, float, float]],
+    cos_i: Scalar,
+    eta: Scalar,
+    k: Scalar | None,
+    film_eta: Scalar,
+    thickness: Scalar,
+) -> Band:
+    """Through a curve that is a sum of bells, each height, place and variance."""
     film = faces(cos_i, eta, k, film_eta, thickness)
     mean, wave = 0.0 * cos_i, 0.0 * cos_i
     trips: list[Amplitude] = []  # once through the film and back, without the way
@@ -421,7 +456,7 @@ def _band(
         trips.append(base.scaled(-top))
         sizes.append(bounced - passed)
     path = film.way * 2e-9
-    bells = [_bell(path, place, variance) for _, place, variance in curve]
+    bells = [_bell(path, place, variance) for _, place, variance in fits]
     # A path n times as long turns a bell's wave n times as far, and dies out as the n^2-th power
     waves = [bell.turn for bell in bells]
     powers = trips
@@ -431,7 +466,7 @@ def _band(
             powers = [power.times(trip) for power, trip in zip(powers, trips, strict=True)]
         parts = [
             turned.scaled(_power(bell.left, order * order) * height)
-            for turned, bell, (height, _, _) in zip(waves, bells, curve, strict=True)
+            for turned, bell, (height, _, _) in zip(waves, bells, fits, strict=True)
         ]
         seen = parts[0] if len(parts) == 1 else parts[0].plus(parts[1])
         for size, power in zip(sizes, powers, strict=True):
