@@ -147,6 +147,7 @@ def canvas(page: Page, samples: int, early: bool) -> np.ndarray:
     return images.from_screen(values / np.float32(255.0))
 
 
+@pytest.mark.slow
 def test_the_early_picture_is_nearer_the_truth_at_every_number_of_samples(lit: Page) -> None:
     """The criterion by which the split sum is exact enough to be shown first: GGX, and Beckmann with compensation."""
     lit.set("s.solo = null; s.slots[2].visible = false; s.view.labels = false")

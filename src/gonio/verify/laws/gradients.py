@@ -146,8 +146,8 @@ def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], An
 
 
 class _Derivatives(NamedTuple):
-    """By autodiff and by differences, (N, channels) each, where two different steps agree (N,), and the derivative
-    below which there is none."""
+    """By autodiff and by differences, (N, channels) each, where two different steps agree and no kink explains what is
+    between autodiff and them (N,), and the derivative below which there is none."""
 
     exact: np.ndarray
     differences: np.ndarray
@@ -213,4 +213,11 @@ def _judged(exact: np.ndarray, shifted: dict[float, np.ndarray], plain: np.ndarr
     least = 1e-6 * float(np.max(np.abs(plain), initial=0.0)) / size
     noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.percentile(np.abs(narrow), 90.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
-    return _Derivatives(exact, narrow, smooth, least)
+    # A kink at the parameter's very value, such as a table's node: differences to both sides are the mean of its two
+    # slopes, and any between them is a derivative.
+    left, right = ((4.0 * shifted[0.5 * s] - shifted[s] - 3.0 * plain) / (s * step) for s in (-1.0, 1.0))
+    steep = np.maximum(np.abs(left), np.abs(right))
+    slack = 1e-6 * steep + 1e-8 * float(np.percentile(steep, 90.0))
+    kink = np.any(np.abs(right - left) > 2.0 * slack, axis=1)
+    between = (exact >= np.minimum(left, right) - slack) & (exact <= np.maximum(left, right) + slack)
+    return _Derivatives(exact, narrow, smooth & ~(kink & np.all(between, axis=1)), least)
