@@ -317,26 +317,36 @@ def test_changed_values_recompile_nothing() -> None:
     assert launched(lambda: picture(scene, 17, max_depth=7)) == 0
 
 
+def placed(offset: int, count: int) -> np.ndarray:
+    """0, 1, ..., `offset` bytes behind where a cache line begins."""
+    raw = np.empty(4 * count + 128, np.uint8)
+    start = -raw.ctypes.data % 64 + offset
+    lanes = raw[start : start + 4 * count].view(np.uint32)
+    lanes[:] = np.arange(count)
+    return lanes
+
+
+def kernels(work: Callable[[], object]) -> set[str]:
+    """What is launched: where a kernel lies in the cache on disk, one more counts as none in `launched`."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        work()
+        return {k["hash"] for k in dr.kernel_history([dr.KernelType.JIT])}
+
+
 def test_where_numpy_puts_an_array_recompiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def placed(offset: int) -> Callable[[int, int], np.ndarray]:
-        def tiles(width: int, height: int) -> np.ndarray:
-            count = width * height
-            raw = np.empty(4 * count + 128, np.uint8)
-            start = -raw.ctypes.data % 64 + offset
-            lanes = raw[start : start + 4 * count].view(np.uint32)
-            lanes[:] = np.arange(count)
-            return lanes
-
-        return tiles
-
     scene = mi.load_dict(scene_dict())
-    monkeypatch.setattr(progressive, "tiles", placed(0))
-    for _ in range(2):
-        aligned = picture(scene, 2)
-    monkeypatch.setattr(progressive, "tiles", placed(4))
-    images: list[np.ndarray] = []
-    assert launched(lambda: images.append(picture(scene, 2))) == 0
-    assert np.array_equal(images[0], aligned)
+    found, images = [], []
+    for offset in (0, 0, 4):  # the first loads the scene too
+        monkeypatch.setattr(progressive, "tiles", lambda w, h, offset=offset: placed(offset, w * h))
+        found.append(kernels(lambda: images.append(picture(scene, 2))))
+    assert found[2] == found[1]
+    assert np.array_equal(images[2], images[1])
+
+
+def test_dr_jit_compiles_another_kernel_where_an_array_is_not_aligned() -> None:
+    aligned, odd = (kernels(lambda at=at: dr.eval(mi.UInt32(placed(at, 256)) * 7 + 3)) for at in (0, 4))
+    assert aligned != odd, "then `engine.own` is needed no more"
 
 
 def test_the_recompilation_test_would_see_a_new_kernel() -> None:
