@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import gonio as go
@@ -57,9 +58,9 @@ class Draws(NamedTuple):
 # ------------------------------------------------------------------ inputs
 
 
-def draw(model: go.BSDF, rng: np.random.Generator, count: int = COUNT) -> Draws:
-    """Directions and parameters over all that is allowed, extremes among them."""
-    fields = dict(_fields(model, rng, count))
+def draw(model: go.BSDF, rng: np.random.Generator, count: int = COUNT, without: Collection[str] = ()) -> Draws:
+    """Directions and parameters over all that is allowed, extremes among them; `without` keep the model's values."""
+    fields = {path: values for path, values in _fields(model, rng, count) if path not in without}
     wo = _directions(rng, count, model.transmits)
     wi = _directions(rng, count, model.transmits)
     u = rng.random((count, 3)).astype(np.float32)
@@ -125,7 +126,7 @@ def _values(owner: str, parameter: Parameter, value: Any, rng: np.random.Generat
 def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ...]:
     """What Python says in float64; each result as (N, channels) or (N,)."""
     kind = backend.types("float64")
-    rows = iter(draws.fields.values())
+    rows, drawn = iter(draws.fields.values()), {path.rpartition(".")[2] for path in draws.fields}
 
     def column(x: np.ndarray) -> Any:
         return kind.float(np.ascontiguousarray(x, dtype=np.float64))
@@ -136,6 +137,8 @@ def reference(model: go.BSDF, draws: Draws, method: str) -> tuple[np.ndarray, ..
     def convert(parameter: Parameter, value: Any) -> Any:
         if parameter.inside or (parameter.kind == "angle" and isinstance(value, int | float) and value == 0):
             return None
+        if parameter.is_off(value) and parameter.name not in drawn:
+            return value
         x = next(rows)
         return column(x[:, 0]) if x.shape[1] == 1 else vector(x)
 

@@ -13,7 +13,8 @@ import numpy as np
 import parity
 import pytest
 from gonio.emit import bundle
-from variants import EVERY, FEW
+from gonio.models.recording import switched_off
+from variants import EVERY, FEW, LEAN
 
 import browser
 import materials
@@ -40,16 +41,16 @@ def page() -> Iterator[Any]:
         yield opened
 
 
-def _check(page: Any, lang: str, name: str, side: int) -> None:
-    material = EVERY[name]
-    made = bundle(material, lang)
-    draws = parity.draw(material, np.random.default_rng(7), side * side)
+def _check(page: Any, lang: str, name: str, side: int, lean: bool = False) -> None:
+    material = LEAN[name] if lean else EVERY[name]
+    made = bundle(material, lang, lean=lean)
+    draws = parity.draw(material, np.random.default_rng(7), side * side, switched_off(material) if lean else ())
     got = RUN[lang](page, made, draws)
     verdicts = parity.judge(material, draws, got, [term["name"] for term in made.manifest["terms"]])
     assert {"eval", "pdf", "sample.wi", "sample.weight"} <= set(verdicts)
     for result, v in verdicts.items():
         share = SAMPLED if result.startswith("sample") else FRINGES if name.startswith("film") else 0.0
-        share = max(share, LAYERED if name in materials.COMPOSED else 0.0)
+        share = max(share, LAYERED if lean or name in materials.COMPOSED else 0.0)
         share += 1.5 / len(draws.wo) if share else 0.0
         inputs = {path: rows[v.draw].tolist() for path, rows in draws.fields.items()}
         where = f"{result} at {draws.wo[v.draw].tolist()}, {draws.wi[v.draw].tolist()}, u {draws.u[v.draw].tolist()}"
@@ -78,3 +79,14 @@ def test_wgsl_gives_the_values_of_python(page: Any, name: str) -> None:
 @pytest.mark.parametrize("name", EVERY)
 def test_every_model_at_65536_draws(page: Any, name: str, lang: str) -> None:
     _check(page, lang, name, 256)
+
+
+def test_a_lean_shader_gives_the_values_of_python(page: Any) -> None:
+    _check(page, "glsl", "openpbr", 64, lean=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lang", ["glsl", "wgsl"])
+@pytest.mark.parametrize("name", LEAN)
+def test_every_lean_shader_at_65536_draws(page: Any, name: str, lang: str) -> None:
+    _check(page, lang, name, 256, lean=True)

@@ -42,3 +42,15 @@ FEW = {
     **COATED,
     **NESTED,
 }
+# with few of their layers; of roughness 0, as what might be a mirror has code of its own
+SMOOTH = {"specular_roughness": 0.0, "coat_roughness": 0.0}
+LEAN = {
+    "openpbr": go.OpenPBR(**SMOOTH),
+    "openpbr-metal": go.OpenPBR(**SMOOTH, base_metalness=1.0),
+    "openpbr-coated": go.OpenPBR(**SMOOTH, coat_weight=0.5),
+    "openpbr-glass": go.OpenPBR(**SMOOTH, transmission_weight=0.7),
+    "openpbr-film": go.OpenPBR(**SMOOTH, thin_film_weight=0.7),
+    "openpbr-fuzz": go.OpenPBR(**SMOOTH, fuzz_weight=0.7),
+    "disney2015": go.model("disney2015")(roughness=0.0),
+    "disney2015-clearcoat": go.model("disney2015")(roughness=0.0, clearcoat=0.7),
+}

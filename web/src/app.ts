@@ -7,7 +7,7 @@ import { type MeshBuffers, type Mesh, shaderBall, torus, upload } from "./meshes
 import type { App, Panel, Picked, Picture, Presenter } from "./panel";
 import { type Hit, hitBalls, hitSphere } from "./pick";
 import { type DrawnBall, Renderer, type Scene } from "./renderer";
-import { type Shader, ShaderLibrary } from "./shaders";
+import { type Shader, ShaderLibrary, isNumeric } from "./shaders";
 import { Change, type State, Store, initialState } from "./state";
 import { decodeState, encodeState } from "./url";
 import { cameraFrame, cross, dot, normalize, pixelRay, sub } from "./vectors";
@@ -124,9 +124,24 @@ export class PageApp implements App {
 
   // ---------------------------------------------------------------- the state, resolved
 
-  shaderOf(slot: number): Shader {
+  /** Weights that are not off on some ball of a row. */
+  switchedOn(slot: number): string[] {
+    const { material, values, balls } = this.slot(slot);
+    const parameters = this.shaders.material(material).variants[0]?.manifest.parameters ?? [];
+    return parameters
+      .filter(({ path, off, value }) => off !== null && balls.some(({ set }) => (set[path] ?? values[path] ?? value) !== off))
+      .map(({ path }) => path);
+  }
+
+  /** The shader that fits a row, or null where the page lacks it. */
+  fitting(slot: number): Shader | null {
     const { material, choices } = this.slot(slot);
-    const found = this.shaders.find(material, choices);
+    return this.shaders.find(material, choices, this.switchedOn(slot));
+  }
+
+  shaderOf(slot: number): Shader {
+    const { material } = this.slot(slot);
+    const found = this.fitting(slot);
     if (found) {
       this.lastShader.set(slot, found);
       return found;
@@ -138,7 +153,7 @@ export class PageApp implements App {
 
   valuesOf(slot: number, ball: number): Values {
     const values: Values = {};
-    for (const parameter of this.shaderOf(slot).manifest.parameters) if (parameter.field !== null) values[parameter.path] = parameter.value;
+    for (const parameter of this.shaderOf(slot).manifest.parameters) if (isNumeric(parameter)) values[parameter.path] = parameter.value;
     const { values: own, balls } = this.slot(slot);
     return { ...values, ...own, ...balls[ball]?.set };
   }
@@ -207,8 +222,8 @@ export class PageApp implements App {
     if (change.touches("display.theme")) this.themeChanged();
     if (change.touches("slots", "solo", "selection")) this.selectShown();
     if (change.touches("slots"))
-      this.state.slots.forEach((slot, index) => {
-        if (!this.shaders.find(slot.material, slot.choices)) this.onMissingVariant(index);
+      this.state.slots.forEach((_, index) => {
+        if (!this.fitting(index)) this.onMissingVariant(index);
       });
     if (change.touches("slots", "selection", "camera", "view.mesh", "view.spacing", "solo")) this.repick();
     this.saveLink();

@@ -32,8 +32,13 @@ export interface Parameter {
   doc: string;
   symbol: string;
   choices?: Record<string, string> | null;
-  /** The struct's field that holds it; null for choices and flags, which shape the code and so pick a variant. */
+  /**
+   * The struct's field that holds it; null for choices and flags, which shape the code and so pick a variant, and for
+   * a weight that this variant was written without.
+   */
   field: string | null;
+  /** The value at which what a weight weighs is not there; null where there is none. */
+  off: number | null;
 }
 
 export interface TableTexture {
@@ -72,6 +77,8 @@ export interface Variant {
   /** Same key, same text and tables. */
   key: string;
   choices: Choices;
+  /** Weights that it was written without: it does for balls that have them off. */
+  off: string[];
   manifest: Manifest;
   text: string;
   /** Uniform name to little-endian float32 in base64, x fastest, channels last. */

@@ -3,7 +3,7 @@
  * of every ball and, for the split sum, the environment blurred by the lobe at a few widths.
  */
 import { type Values, decodeBase64 } from "./data";
-import { albedoText, prefilterText } from "./glsl";
+import { albedoText, atOnce, prefilterText } from "./glsl";
 import { distribution } from "./importance";
 import type { Shader, ShaderLibrary } from "./shaders";
 import { createTarget, floatToHalf, sequence, type Target } from "./targets";
@@ -108,7 +108,8 @@ export class AlbedoTables {
     const before = entry.passes;
     const limit = this.full ? ALBEDO_PASSES : 8; // float16 sums saturate
     if (entry.passes < limit) {
-      const program = this.shaders.program(`albedo ${shader.key}`, FULLSCREEN_VERTEX, albedoText(shader, ALBEDO_SAMPLES));
+      const some = atOnce(shader, ALBEDO_SAMPLES);
+      const program = this.shaders.program(`albedo ${shader.key}`, FULLSCREEN_VERTEX, albedoText(shader, some));
       gl.useProgram(program.handle);
       this.shaders.bind(program, shader, values, 0);
       gl.uniform1f(program.uniform("width"), ALBEDO_WIDTH);
@@ -117,10 +118,11 @@ export class AlbedoTables {
       gl.disable(gl.DEPTH_TEST);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE);
-      for (let i = 0; i < passes && entry.passes < limit; i++, entry.passes++) {
-        gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * ALBEDO_SAMPLES));
-        gl.drawArrays(gl.TRIANGLES, 0, 3);
-      }
+      for (let i = 0; i < passes && entry.passes < limit; i++, entry.passes++)
+        for (let from = 0; from < ALBEDO_SAMPLES; from += some) {
+          gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * ALBEDO_SAMPLES + from));
+          gl.drawArrays(gl.TRIANGLES, 0, 3);
+        }
       gl.disable(gl.BLEND);
     }
     return { row: entry.row, complete: entry.passes >= limit, finished: before < limit && entry.passes >= limit };
@@ -227,7 +229,8 @@ export class PrefilteredEnvironments {
 
   private pass(entry: Prefiltered, shader: Shader, values: Values, alpha: string | null, picture: EnvironmentPicture): void {
     const { gl } = this;
-    const program = this.shaders.program(`prefilter ${shader.key}`, FULLSCREEN_VERTEX, prefilterText(shader, LEVEL_SAMPLES));
+    const some = atOnce(shader, LEVEL_SAMPLES);
+    const program = this.shaders.program(`prefilter ${shader.key}`, FULLSCREEN_VERTEX, prefilterText(shader, some));
     gl.useProgram(program.handle);
     gl.disable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);
@@ -245,12 +248,14 @@ export class PrefilteredEnvironments {
       gl.uniform1f(program.uniform("has_map"), 1);
       gl.uniform1f(program.uniform("environment_scale"), 1);
       gl.uniform1f(program.uniform("environment_rotation"), 0);
-      gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * LEVEL_SAMPLES));
       gl.uniform2f(program.uniform("size"), size, size / 2);
       gl.uniform1f(program.uniform("points"), LEVEL_SAMPLES * passes);
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
       gl.viewport(0, 0, size, size / 2);
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      for (let from = 0; from < LEVEL_SAMPLES; from += some) {
+        gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * LEVEL_SAMPLES + from));
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
+      }
     });
     gl.disable(gl.BLEND);
     entry.passes += 1;

@@ -3,11 +3,11 @@
  *
  * Directions go in as float32 textures, one texel a query; a fragment a query calls the emitted text; results leave
  * through RGBA32F targets and a pixel buffer, so that the page does not wait for the GPU (fenceSync). What depends on
- * the parameters alone (`derive`) is computed in the vertex shader, three times a call instead of once a query.
+ * the parameters alone (`derive`) is computed once a call, not once a query (`derived.ts`).
  * All values on this page that are not pixels of the picture come from here: no formula of a material is typed in web/.
  */
 import type { Values } from "./data";
-import { derivedVaryings } from "./glsl";
+import { derivedIn, derivedOut } from "./derived";
 import { HEADER, type Program, type Shader, type ShaderLibrary } from "./shaders";
 import { SOBOL_WIDTH, sobolTexels } from "./sobol";
 
@@ -38,7 +38,7 @@ type Floats = Float32Array | readonly number[];
 const WIDTH = 1024;
 /** Independent digital shifts: their scatter gives the standard error (15 degrees of freedom). */
 const REPLICATES = 16;
-/** Points a fragment adds in one pass: few enough that a pass on a software rasteriser stays near 50 ms. */
+/** Points of a shift in one pass, a fragment each: few enough that a pass on a software rasteriser stays near 50 ms. */
 const POINTS = 64;
 
 const VERTEX_MAIN = `
@@ -123,17 +123,13 @@ export class Evaluator {
   ): Promise<AlbedoEstimate> {
     const { error = 5e-4, limit = REPLICATES * 4096, progress } = options;
     const body = `
-  vec3 sum = vec3(0.0);
-  uvec3 shift = shifts[int(gl_FragCoord.y)];
+  uvec3 shift = shifts[int(gl_FragCoord.y) / ${POINTS}];
+  int at = start + int(gl_FragCoord.y) % ${POINTS};
   vec3 wo = texelFetch(first_rows, ivec2(int(gl_FragCoord.x), 0), 0).xyz;
-  for (int n = 0; n < ${POINTS}; n++) {
-    int at = start + n;
-    uvec3 point = texelFetch(sobol, ivec2(at % ${SOBOL_WIDTH}, at / ${SOBOL_WIDTH}), 0).xyz ^ shift;
-    // 24 bits: the most that a float below 1 can hold without rounding up to 1.
-    Sample drawn = ${needed(shader, "sample")}(${self(shader)}, wo, vec3(point >> 8u) * (1.0 / 16777216.0));
-    sum += drawn.weight * (drawn.eta * drawn.eta);
-  }
-  result0 = vec4(sum, 0.0);`;
+  uvec3 point = texelFetch(sobol, ivec2(at % ${SOBOL_WIDTH}, at / ${SOBOL_WIDTH}), 0).xyz ^ shift;
+  // 24 bits: the most that a float below 1 can hold without rounding up to 1.
+  Sample drawn = ${needed(shader, "sample")}(${self(shader)}, wo, vec3(point >> 8u) * (1.0 / 16777216.0));
+  result0 = vec4(drawn.weight * (drawn.eta * drawn.eta), 0.0);`;
     const extra = `
 uniform highp usampler2D sobol;
 uniform uvec3 shifts[${REPLICATES}];
@@ -146,7 +142,7 @@ uniform int start;`;
       const start = points;
       const [packed] = await this.run(shader, values, "albedo", body, 1, wo, [0, 0, 0], count, {
         declarations: extra,
-        height: REPLICATES,
+        height: REPLICATES * POINTS,
         width: count,
         bind: (program, unit) => {
           const gl = this.gl;
@@ -158,8 +154,11 @@ uniform int start;`;
         },
       });
       const all = packed as Float32Array;
-      for (let i = 0; i < REPLICATES * count; i++)
-        for (let c = 0; c < 3; c++) sums[3 * i + c] = (sums[3 * i + c] as number) + (all[4 * i + c] as number);
+      for (let row = 0; row < REPLICATES * POINTS; row++)
+        for (let i = 0; i < count; i++) {
+          const [from, to] = [4 * (row * count + i), 3 * (Math.floor(row / POINTS) * count + i)];
+          for (let c = 0; c < 3; c++) sums[to + c] = (sums[to + c] as number) + (all[from + c] as number);
+        }
       points += POINTS;
       const estimate = summarise(sums, count, points);
       const worst = estimate.error.reduce((a, b) => Math.max(a, b), 0);
@@ -245,17 +244,15 @@ uniform int start;`;
   }
 
   private program(shader: Shader, kind: string, body: string, outputs: number, declarations: string): Program {
-    const { struct, derived, functions } = shader.manifest;
-    // Null also where a model derives more than fits between the stages: it then derives in every query.
-    const flat = derivedVaryings(shader.manifest);
-    const varyings = (direction: "in" | "out") =>
-      Array.from({ length: flat?.vectors ?? 0 }, (_, i) => `flat ${direction} vec4 derived_${i};`).join("\n");
-    const vertex = flat
+    const { struct } = shader.manifest;
+    const out = derivedOut(shader);
+    const derived = derivedIn(shader, true);
+    const vertex = out
       ? `${HEADER}${shader.text}
 uniform ${struct} material;
-${varyings("out")}
+${out.declarations}
 void main() {
-${flat.pack}${VERTEX_MAIN}
+${out.body}${VERTEX_MAIN}
 }`
       : `${HEADER}void main() {${VERTEX_MAIN}\n}`;
     const fragment = `${HEADER}${shader.text}
@@ -263,15 +260,14 @@ uniform ${struct} material;
 uniform sampler2D first_rows;
 uniform sampler2D second_rows;
 ${declarations}
-${varyings("in")}
-${Array.from({ length: outputs }, (_, i) => `layout(location = ${i}) out vec4 result${i};`).join("\n")}
+${derived.declarations}${Array.from({ length: outputs }, (_, i) => `layout(location = ${i}) out vec4 result${i};`).join("\n")}
 vec3 row_of(sampler2D rows) {
   // A texture of one texel stands for one direction shared by all queries.
   return texelFetch(rows, min(ivec2(gl_FragCoord.xy), textureSize(rows, 0) - 1), 0).xyz;
 }
 void main() {
   vec3 first = row_of(first_rows), second = row_of(second_rows);
-  ${derived ? `${derived.struct} derived = ${flat ? flat.unpack : `${functions.derive}(material)`};` : ""}${body}
+${derived.body}${body}
 }`;
     return this.library.program(`${shader.key}/evaluator/${kind}`, vertex, fragment);
   }

@@ -4,6 +4,7 @@
  * How the surface scatters is never written here; it is called by the names that the manifest gives.
  */
 import type { Manifest } from "./data";
+import { derivedIn, derivedOut } from "./derived";
 import { IMPORTANCE_GLSL } from "./importance";
 import { HEADER, type Shader } from "./shaders";
 import type { Term } from "./state";
@@ -15,49 +16,33 @@ export type EnvironmentUse = "none" | "sampled" | "mapped" | "albedo" | "split-s
 
 export interface ShadingKey {
   geometry: "sphere" | "mesh";
-  lights: boolean;
+  /** 0: none; else how many times the light's part is written (`copies`). */
+  lights: number;
   environment: EnvironmentUse;
   /** What is taken off again, to see by how much two ways differ. */
   minus: EnvironmentUse;
   term: Term;
 }
 
-const SIZES = { float: 1, vec2: 2, vec3: 3 } as const;
+/**
+ * Characters beyond which a material is called in no loop: what draws in software compiles a loop around such a call for
+ * minutes, until the browser gives up.
+ */
+const LONG = 40_000;
+const isLong = (shader: Shader) => shader.text.length > LONG;
+/** How many samples of `count` one draw takes. */
+export const atOnce = (shader: Shader, count: number): number => (isLong(shader) ? 1 : count);
+/** How many times the part of a light is written for so many: once, in a loop, or for each. */
+export const copies = (shader: Shader, lights: number): number => (isLong(shader) ? lights : Math.min(lights, 1));
 
-/** Flat varyings: WebGL 2 promises 15 vectors a stage, of which a mesh needs four. */
-const MOST_VARYINGS = 11;
+/** A body that reads `i`, from 0 to below a count. */
+const repeated = (count: number, body: string): string =>
+  count === 1 ? `  { const int i = 0;\n${body}  }\n` : `  for (int i = 0; i < ${count}; i++) {\n${body}  }\n`;
 
-/** Derived values travel from the vertex shader, where they are computed once, in as few vec4 as will hold them. */
-export function derivedVaryings(manifest: Manifest): { vectors: number; pack: string; unpack: string } | null {
-  const { derived, functions } = manifest;
-  if (!derived || !functions.derive) return null;
-  const parts: string[] = [];
-  const arguments_: string[] = [];
-  for (const field of derived.fields) {
-    const size = SIZES[field.type];
-    const slots: string[] = [];
-    for (let i = 0; i < size; i++) {
-      slots.push(`derived_${parts.length >> 2}.${"xyzw"[parts.length & 3]}`);
-      parts.push(size === 1 ? `derived.${field.name}` : `derived.${field.name}.${"xyz"[i]}`);
-    }
-    arguments_.push(size === 1 ? (slots[0] as string) : `${field.type}(${slots.join(", ")})`);
-  }
-  const vectors = Math.ceil(parts.length / 4);
-  if (vectors > MOST_VARYINGS) return null;
-  while (parts.length & 3) parts.push("0.0");
-  const stores: string[] = [];
-  for (let v = 0; v < vectors; v++) stores.push(`  derived_${v} = vec4(${parts.slice(4 * v, 4 * v + 4).join(", ")});`);
-  return {
-    vectors,
-    pack: `  ${derived.struct} derived = ${functions.derive}(material);\n${stores.join("\n")}`,
-    unpack: `${derived.struct}(${arguments_.join(", ")})`,
-  };
-}
-
-/** The material's text, its uniform, and `call("eval", "wo, wi")` with the arguments that its functions want. */
-export function materialText(shader: Shader, derived = "derived_values()"): { text: string; call: (name: "eval" | "pdf" | "sample" | "terms", rest: string) => string } {
+/** The material's text, its uniform, and `call("eval", "wo, wi")` with the arguments that its functions want: `derived` among them. */
+export function materialText(shader: Shader): { text: string; call: (name: "eval" | "pdf" | "sample" | "terms", rest: string) => string } {
   const { manifest } = shader;
-  const extra = manifest.derived ? `, ${derived}` : "";
+  const extra = manifest.derived ? ", derived" : "";
   return {
     text: `${shader.text}\nuniform ${manifest.struct} material;\n`,
     call: (name, rest) => {
@@ -97,33 +82,29 @@ void main() {
 export const DEPTH_FRAGMENT = `${HEADER}out vec4 color;\nvoid main() { color = vec4(0.0); }\n`;
 
 export function vertexText(shader: Shader, geometry: "sphere" | "mesh"): string {
-  const varyings = derivedVaryings(shader.manifest);
-  let flat = "";
-  for (let v = 0; v < (varyings?.vectors ?? 0); v++) flat += `flat out vec4 derived_${v};\n`;
-  const material = varyings ? materialText(shader).text : "";
-  const derive = varyings ? varyings.pack : "";
+  const out = derivedOut(shader);
+  const material = out ? materialText(shader).text : "";
+  const { declarations, body } = out ?? { declarations: "", body: "" };
   if (geometry === "sphere")
-    return `${HEADER}${material}${CAMERA}${flat}
+    return `${HEADER}${material}${CAMERA}${declarations}
 uniform vec4 bounds;   // of the ball in the picture, device coordinates
 out vec3 ray;
 void main() {
-${derive}
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+${body}  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
   vec2 position = mix(bounds.xy, bounds.zw, corner);
   vec2 through = (position + jitter) * half_size;
   ray = right * through.x + up * through.y - back;
   gl_Position = vec4(position, 0.0, 1.0);
 }
 `;
-  return `${HEADER}${material}${CAMERA}${flat}${DEPTH_RANGE}
+  return `${HEADER}${material}${CAMERA}${declarations}${DEPTH_RANGE}
 layout(location = 0) in vec3 mesh_position;
 layout(location = 1) in vec3 mesh_normal;
 layout(location = 2) in vec3 mesh_tangent;
 invariant gl_Position;
 out vec3 world, world_normal, world_tangent;
 void main() {
-${derive}
-  world = mesh_position + ball_center;
+${body}  world = mesh_position + ball_center;
   world_normal = mesh_normal;
   world_tangent = mesh_tangent;
   vec3 d = world - eye;
@@ -299,16 +280,11 @@ function environmentBody(shader: Shader, use: EnvironmentUse, term: Term, add: "
 }
 
 export function fragmentText(shader: Shader, key: ShadingKey): string {
-  const varyings = derivedVaryings(shader.manifest);
-  let flat = "";
-  for (let v = 0; v < (varyings?.vectors ?? 0); v++) flat += `flat in vec4 derived_${v};\n`;
   const { manifest } = shader;
   const { text, call } = materialText(shader);
-  const derived = manifest.derived
-    ? `${manifest.derived.struct} derived_values() { return ${varyings ? varyings.unpack : `${manifest.functions.derive}(material)`}; }\n`
-    : "";
+  const derived = derivedIn(shader, true);
   const factor = isFactor(key.term);
-  const parts = [HEADER, text, CAMERA, DEPTH_RANGE, flat, derived, RANDOM];
+  const parts = [HEADER, text, CAMERA, DEPTH_RANGE, derived.declarations, RANDOM];
   const body: string[] = [];
   if (factor) {
     const known = hasTerm(manifest, key.term);
@@ -320,12 +296,13 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
   } else {
     if (key.lights) {
       parts.push(LIGHTS);
-      body.push(`  for (int i = 0; i < light_count; i++) {
-    vec3 d;
-    vec3 irradiance = page_light_at(i, surface, d);
+      const light = (i: string) => `    vec3 d;
+    vec3 irradiance = page_light_at(${i}, surface, d);
     vec3 wi = d * frame;
     radiance += irradiance * (${scattered(shader, key.term)});
-  }`);
+  }`;
+      if (!isLong(shader)) body.push(`  for (int i = 0; i < light_count; i++) {\n${light("i")}`);
+      else for (let i = 0; i < key.lights; i++) body.push(`  {\n${light(String(i))}`);
     }
     const uses = [key.environment, key.minus];
     const any = (...wanted: EnvironmentUse[]) => uses.some((use) => wanted.includes(use));
@@ -372,7 +349,7 @@ ${place}
   mat3 frame = mat3(tangent, cross(n, tangent), n);
   vec3 wo = outward * frame;
   vec3 radiance = vec3(0.0);
-${body.join("\n")}
+${derived.body}${body.join("\n")}
   // One bad sample would stay in the sum for good. What is not finite counts as missing light, and the eye sees a dot.
   if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
   color = vec4(draw_gain * radiance, draw_cover);
@@ -382,48 +359,43 @@ ${body.join("\n")}
 
 /** E(mu) of a ball, by the material's own sampling: rows of the albedo table. */
 export function albedoText(shader: Shader, samples: number): string {
-  const { text, call } = materialText(shader, "derived_here()");
-  const { manifest } = shader;
-  const derived = manifest.derived ? `${manifest.derived.struct} derived_here() { return ${manifest.functions.derive}(material); }\n` : "";
-  return `${HEADER}${text}${derived}
+  const { text, call } = materialText(shader);
+  const derived = derivedIn(shader, false);
+  return `${HEADER}${text}${derived.declarations}
 uniform vec3 random_point;
 uniform float width;
 layout(location = 0) out vec4 color;
 void main() {
-  float t = gl_FragCoord.x / width;
+${derived.body}  float t = gl_FragCoord.x / width;
   float mu = t * t;
   vec3 wo = vec3(sqrt(max(1.0 - mu * mu, 0.0)), 0.0, mu);
   vec3 sum = vec3(0.0);
   // R3 (Roberts 2018); the page moves the starting point on from pass to pass
-  for (int i = 0; i < ${samples}; i++) {
-    vec3 u = fract(random_point + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
+${repeated(samples, `    vec3 u = fract(random_point + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
     vec3 weight = ${call("sample", "wo, u")}.weight;
     if (!any(isnan(weight)) && !any(isinf(weight))) sum += weight;
-  }
-  color = vec4(sum, ${samples}.0);
+`)}  color = vec4(sum, ${samples}.0);
 }
 `;
 }
 
 /** One level of the prefiltered environment: seen straight on, where the lobe goes, with the weights normalised. */
 export function prefilterText(shader: Shader, samples: number): string {
-  const { text, call } = materialText(shader, "derived_here()");
-  const { manifest } = shader;
-  const derived = manifest.derived ? `${manifest.derived.struct} derived_here() { return ${manifest.functions.derive}(material); }\n` : "";
-  return `${HEADER}${text}${derived}${RANDOM}${ENVIRONMENT}
+  const { text, call } = materialText(shader);
+  const derived = derivedIn(shader, false);
+  return `${HEADER}${text}${derived.declarations}${RANDOM}${ENVIRONMENT}
 uniform vec2 size;
 uniform float points;   // over all passes
 layout(location = 0) out vec4 color;
 void main() {
-  vec2 uv = gl_FragCoord.xy / size;
+${derived.body}  vec2 uv = gl_FragCoord.xy / size;
   float p = 6.283185307179586 * uv.x + environment_rotation, theta = 3.141592653589793 * uv.y;
   vec3 n = vec3(sin(theta) * sin(p), cos(theta), sin(theta) * cos(p));
   vec3 t = normalize(abs(n.y) < 0.99 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0) - n.x * n);
   mat3 frame = mat3(t, cross(n, t), n);
   vec4 sum = vec4(0.0);
   vec3 start = random_point + page_shift(uvec2(gl_FragCoord.xy), 11u);
-  for (int i = 0; i < ${samples}; i++) {
-    vec3 u = fract(start + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
+${repeated(samples, `    vec3 u = fract(start + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
     Sample s = ${call("sample", "vec3(0.0, 0.0, 1.0), u")};
     float weight = dot(s.weight, vec3(1.0 / 3.0));
     // As much of the picture as one sample stands for, by its mip levels (Krivanek and Colbert 2008): a small sun
@@ -432,8 +404,7 @@ void main() {
     vec2 texels = vec2(textureSize(environment_map, 0));
     float lod = s.delta ? 0.0 : max(0.0, 0.5 * log2(share * texels.x * texels.y / 12.566370614359172) + 0.5);
     if (weight > 0.0) sum += weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), lod).rgb, 1.0);
-  }
-  color = sum;
+`)}  color = sum;
 }
 `;
 }

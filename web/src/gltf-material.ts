@@ -2,6 +2,7 @@
 import type { PageApp } from "./app";
 import type { Parameter, Value, Values } from "./data";
 import * as edits from "./edits";
+import { isNumeric } from "./shaders";
 
 export interface Factors {
   name: string;
@@ -116,7 +117,7 @@ export function wear(app: PageApp, factors: Factors): string {
   const set: Record<string, Value> = {};
   for (const parameter of app.shaders.at(app.shaders.material(found.id), 0).manifest.parameters) {
     const value = words[edits.bare(parameter.path)];
-    if (parameter.field !== null && value !== undefined) set[parameter.path] = spread(parameter.kind, value);
+    if (isNumeric(parameter) && value !== undefined) set[parameter.path] = spread(parameter.kind, value);
   }
   edits.setBall(app, slot, set, factors.name || found.title);
   return `${called} is ${found.title} on the selected ball${factors.pictured ? ", without its pictures" : ""}.`;

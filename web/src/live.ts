@@ -76,8 +76,8 @@ export class Live {
       Object.assign(this.status, { connected: true, message: "" });
       this.onStatus();
       this.send();
-      this.app.state.slots.forEach((slot, index) => {
-        if (!this.app.shaders.find(slot.material, slot.choices)) this.ask(index);
+      this.app.state.slots.forEach((_, index) => {
+        if (!this.app.fitting(index)) this.ask(index);
       });
     });
     socket.addEventListener("message", (event) => {
@@ -176,12 +176,13 @@ export class Live {
   private ask(slot: number): void {
     const row = this.app.state.slots[slot];
     if (!row) return;
-    const wish = JSON.stringify([row.material, row.choices]);
+    const on = this.app.switchedOn(slot);
+    const wish = JSON.stringify([row.material, row.choices, on]);
     if (this.waiting.has(wish)) return;
     this.waiting.add(wish);
     this.wishes += 1;
     this.asked.set(this.wishes, wish);
-    this.text({ type: "choice", id: this.wishes, revision: this.app.data.revision, material: row.material, choices: row.choices });
+    this.text({ type: "choice", id: this.wishes, revision: this.app.data.revision, material: row.material, choices: row.choices, on });
   }
 
   private read(text: string): void {

@@ -7,7 +7,7 @@
 import { type Values, type Vec3, decodeFloats } from "./data";
 import { TONES, displayProgram } from "./display";
 import { AlbedoTables, type EnvironmentPicture, type PrefilteredLevel, PrefilteredEnvironments, alphaOf, roughnessOf } from "./environment";
-import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, fragmentText, hasTerm, isFactor, isSigned, isWhole, splits, vertexText } from "./glsl";
+import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, copies, fragmentText, hasTerm, isFactor, isSigned, isWhole, splits, vertexText } from "./glsl";
 import { actingLights, bindLights, environmentOf, localLights } from "./lights";
 import type { MeshBuffers } from "./meshes";
 import type { Picture, Presenter } from "./panel";
@@ -256,7 +256,7 @@ export class Renderer {
     const { gl } = this;
     const { term } = scene.state.view;
     // Lights that are no environment are summed exactly: between two integrals of it nothing of them is left.
-    const lights = term !== "split-error" && localLights(actingLights(scene.state)).length > 0;
+    const lights = term === "split-error" ? 0 : copies(draw.shader, localLights(actingLights(scene.state)).length);
     const key: ShadingKey = { geometry: scene.mesh ? "mesh" : "sphere", lights, ...uses, term };
     const { environment: use } = uses;
     let row = 0;

@@ -3,8 +3,9 @@
  *
  * Nothing here knows a formula. The text, the struct's fields and the table list come from the manifest.
  */
-import type { Choices, Field, Manifest, Material, PageData, Values, Variant } from "./data";
+import type { Choices, Field, Manifest, Material, PageData, Parameter, Values, Variant } from "./data";
 import { decodeFloats } from "./data";
+import { DerivedTables, derivesMuch } from "./derived";
 
 export interface Shader {
   /** The variant's: programs are kept by it. */
@@ -13,6 +14,8 @@ export interface Shader {
   variant: Variant;
   manifest: Manifest;
   text: string;
+  /** Whether what it derives stands in a row of texels (`derived.ts`). */
+  tabled: boolean;
 }
 
 export const HEADER = `#version 300 es
@@ -28,6 +31,9 @@ export interface Program {
   uniform(name: string): WebGLUniformLocation | null;
 }
 
+/** Whether a parameter has sliders: a number, also of a layer that this variant was written without. */
+export const isNumeric = (parameter: Parameter): boolean => parameter.field !== null || parameter.off !== null;
+
 /** What a variant's choices are: those it was made for, and the model's own for the rest. */
 export function variantChoice(variant: Variant, path: string): string | boolean | undefined {
   const own = variant.choices[path];
@@ -40,10 +46,16 @@ export class ShaderLibrary {
   private programs = new Map<string, Program>();
   private textures = new Map<string, WebGLTexture>();
 
+  private readonly derived: DerivedTables;
+  private readonly tables: boolean;
+
   constructor(
     readonly gl: WebGL2RenderingContext,
     readonly data: PageData,
-  ) {}
+  ) {
+    this.derived = new DerivedTables(gl);
+    this.tables = DerivedTables.possible(gl);
+  }
 
   material(id: string): Material {
     const material = this.data.materials.find((m) => m.id === id);
@@ -51,16 +63,24 @@ export class ShaderLibrary {
     return material;
   }
 
-  /** The variant that fits all choices, or null where the page lacks it (a live page asks the server for it). */
-  find(id: string, choices: Choices): Shader | null {
+  /**
+   * The shortest variant that fits all choices and has the weights that are on, or null where the page lacks it (a
+   * live page asks the server for it).
+   */
+  find(id: string, choices: Choices, on: readonly string[] = []): Shader | null {
     const material = this.material(id);
-    const index = material.variants.findIndex((v) => fits(v, choices));
-    return index < 0 ? null : this.at(material, index);
+    let found: number | null = null;
+    material.variants.forEach((variant, index) => {
+      if (!fits(variant, choices) || on.some((path) => variant.off.includes(path))) return;
+      if (found === null || variant.off.length > (material.variants[found] as Variant).off.length) found = index;
+    });
+    return found === null ? null : this.at(material, found);
   }
 
   at(material: Material, index: number): Shader {
     const variant = material.variants[index] as Variant;
-    return { key: variant.key, material, variant, manifest: variant.manifest, text: variant.text };
+    const { key, manifest, text } = variant;
+    return { key, material, variant, manifest, text, tabled: this.tables && derivesMuch(manifest) };
   }
 
   /** Drops the programs and tables of shaders that the page has no more. */
@@ -77,6 +97,7 @@ export class ShaderLibrary {
         this.gl.deleteTexture(texture);
         this.textures.delete(name);
       }
+    this.derived.forget(keys);
   }
 
   /** Compiles once per key. `key` must name the sources: shader key and what is drawn with it. */
@@ -94,6 +115,19 @@ export class ShaderLibrary {
    */
   bind(program: Program, shader: Shader, values: Values, unit: number, name = "material"): number {
     const gl = this.gl;
+    const location = program.uniform("derived_table");
+    if (location) {
+      const row = this.derived.row(shader, values, (vertex, fragment) => {
+        const own = this.program(`${shader.key} derived`, vertex, fragment);
+        gl.useProgram(own.handle);
+        this.bind(own, shader, values, unit);
+        return own;
+      });
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, row);
+      gl.uniform1i(location, unit);
+      unit += 1;
+    }
     for (const field of shader.manifest.fields) {
       const location = program.uniform(`${name}.${field.name}`);
       if (location) setField(gl, location, field, fieldValue(field, shader.manifest, values));

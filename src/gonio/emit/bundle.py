@@ -6,7 +6,7 @@ import inspect
 import json
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -16,7 +16,8 @@ import numpy as np
 from .. import files
 from .._version import __version__
 from ..errors import InputError
-from ..models import BSDF, notation, recording, tree
+from ..models import BSDF, notation, tree
+from ..models.recording import switched_off
 from ..ops import graph
 from ..ops.types import Value
 from ..owner import alone
@@ -70,7 +71,13 @@ class Bundle:
 
 
 @alone
-def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample")) -> str:
+def emit(
+    model: BSDF | str,
+    lang: str = "glsl",
+    functions: Sequence[str] = ("eval", "pdf", "sample"),
+    *,
+    lean: bool = False,
+) -> str:
     """A material as shader code: eval, pdf, sample and all that they need, as functions by name.
 
         print(go.emit(go.Conductor.preset("Au", alpha=0.2), "glsl"))
@@ -78,25 +85,35 @@ def emit(model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eva
     model      a material, or its text as the command line takes it: "conductor(preset=Au)"
     lang       a language's name, such as "glsl"; `gonio.emit.languages()` has them all
     functions  of "eval", "pdf", "sample", "terms" (D, G, F, ...; where the model has them)
+    lean       leave out what the material's own values switch off, such as a coat of weight 0: that weight is no
+               field then. Of `openpbr` as it comes an eighth of the text is left
     Numeric parameters become the fields of a struct, choices shape the code. Spectra are RGB, values those of
     "radiance" mode. Directions are unit vectors of the local frame, +z the shading normal.
     Raises InputError for a stochastic material (RandomWalk): there is no code for it.
     """
-    return bundle(model, lang, functions).text
+    return bundle(model, lang, functions, lean=lean).text
 
 
 @alone
 def bundle(
-    model: BSDF | str, lang: str = "glsl", functions: Sequence[str] = ("eval", "pdf", "sample", "terms")
+    model: BSDF | str,
+    lang: str = "glsl",
+    functions: Sequence[str] = ("eval", "pdf", "sample", "terms"),
+    *,
+    lean: bool = False,
+    on: Collection[str] = (),
 ) -> Bundle:
-    """Shader, manifest and tables of a material; arguments as in `emit`."""
+    """Shader, manifest and tables of a material; arguments as in `emit`.
+
+    on  paths of weights that stay fields of a lean shader although they are off now
+    """
     language = Language.family.get(str(lang))
     if isinstance(model, str):
         model = notation.named(model)[0]
     functions = programs.check(model, functions, "emit")
     numbers = dict(_numbers(model))  # raises where there is more than one material's worth
     try:
-        made = Program(model, functions)
+        made = Program(model, functions, [path for path in switched_off(model) if path not in on] if lean else ())
     except graph.RecordingError as error:
         raise InputError(f"no shader code for it: {error.what}", error.where, error.hint) from error
     names = Names(made, language)
@@ -143,6 +160,9 @@ def _head(made: Program, names: Names) -> list[str]:
     choices = [f"{path} = {value}" for path, value in _choices(model)]
     lines = [f"// {type(model).__name__}, written by Gonio {__version__} from its Python source.", "//"]
     lines += comment(re.sub(r"\s\(`gonio\.[\w.]+`\)", "", inspect.cleandoc(type(model).__doc__ or "")))
+    if made.without:
+        off = ", ".join(f"{path} = {tree.value_at(model, path):g}" for path in made.without)
+        lines += ["//", *(f"// {text}" for text in textwrap.wrap(f"Written without what is off: {off}.", 105))]
     if choices:
         lines += ["//", *(f"// {text}" for text in textwrap.wrap("With " + ", ".join(choices) + ".", 105))]
     lines += ["//"]
@@ -230,7 +250,7 @@ def _manifest(made: Program, names: Names, numbers: dict[str, Json]) -> dict[str
     ]
     terms = made.entries.get("terms")
     derived = made.derived
-    facts = recording.symbols(model)  # of the code, whose parameters may take other values than the material has
+    facts = made.bound  # of the code, whose parameters may take other values than the material has
     return {
         "version": 1,
         "lang": language.name,
@@ -304,6 +324,7 @@ def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
             "symbol": SYMBOLS.get(parameter.name, parameter.name),
             "choices": parameter.choices,
             "field": programs.flat(path) if path in fields else None,
+            "off": parameter.off,
         }
 
 

@@ -38,13 +38,14 @@ class Program:
     routines  in order of definition, callees first
     entries   method -> its routine, "derive" among them where there is something to derive
     structs   of parameters, derived values and results, in order of use
+    without   paths of parameters that are off and shape the code
     tables    the tables that are read
     readings  of each, by identity, how: "lookup" and "fetch"
     """
 
-    def __init__(self, model: BSDF, functions: tuple[str, ...]) -> None:
-        self.model = model
-        self.bound = recording.symbols(model)
+    def __init__(self, model: BSDF, functions: tuple[str, ...], without: Sequence[str] = ()) -> None:
+        self.model, self.without = model, tuple(without)
+        self.bound = recording.symbols(model, self.without)
         recorded = _record(self.bound, functions)
         found = routines(recorded)
         self.driver = found.pop()

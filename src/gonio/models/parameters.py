@@ -106,6 +106,7 @@ class Parameter:
     low, high  closed range; outside it is an error, above `high` only a warning where `soft_high`
     white      its value in the material's white twin (`BSDF.white`); None leaves it as it is
     inside     whether it is of what lies behind the surface: no formula of the surface depends on it
+    off        a number's value at which what it weighs is not there, so that code can be written without it
     """
 
     kind: ClassVar[str] = ""
@@ -121,6 +122,7 @@ class Parameter:
     soft_high: bool = False
     white: Value = None
     inside: bool = False
+    off: float | None = None
 
     @property
     def required(self) -> bool:
@@ -151,6 +153,10 @@ class Parameter:
     def symbol(self, value: object) -> Value:
         """The symbol that stands for the value in a recording; what shapes the code stays as it is."""
         return value
+
+    def is_off(self, value: object) -> bool:
+        """Whether that is the plain number at which what it weighs is not there."""
+        return self.off is not None and isinstance(value, int | float) and value == self.off
 
     def rows(self, value: object) -> int:
         """How many rays the value has entries for, 1 where it is the same for all."""
@@ -367,12 +373,15 @@ def number(
     high: float = math.inf,
     unit: str = "",
     inside: bool = False,
+    off: float | None = None,
 ) -> Number:
     """Declare a number with its closed range and unit.
 
     inside  it is of what lies behind the surface, which no formula of the surface depends on
+    off     the value, such as a layer's weight of 0, at which `eval`, `pdf`, `sample` and `derive` do without what it
+            weighs where they see that plain number: lean shaders are written without it
     """
-    return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit, inside=inside)
+    return _declare(NumberParameter, default, doc, low=low, high=high, unit=unit, inside=inside, off=off)
 
 
 def index(default: PlainIndex, doc: str, *, low: float, high: float) -> Index:

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterable
 from typing import Any, TypeVar
 
 from .. import ops
 from ..ops import Mode, graph
-from . import binding
+from . import binding, tree
 from .parameters import Material
 
 M = TypeVar("M", bound=Material)
 
 
-def symbols(material: M) -> M:
-    """A copy bound to symbols, one for each numeric parameter; an angle that is the plain number 0 is none."""
-    return binding.bind(material, lambda parameter, value: parameter.symbol(value))
+def symbols(material: M, without: Iterable[str] = ()) -> M:
+    """A copy bound to symbols, one for each numeric parameter; an angle that is the plain number 0 is none.
+
+    without  paths of parameters that are off (`switched_off`) and stay plain numbers: code is left out by them
+    """
+    bound = binding.bind(material, lambda parameter, value: parameter.symbol(value))
+    for path in without:
+        bound = binding.shift(bound, path, lambda _, path=path: tree.value_at(material, path))  # type: ignore[misc]
+    return bound
+
+
+def switched_off(material: Material) -> list[str]:
+    """Paths of the parameters whose value says that what they weigh is not there."""
+    return [leaf.path for leaf in tree.leaves(material) if leaf.parameter.is_off(leaf.value)]
 
 
 def record(material: Material, method: str = "eval", mode: Mode = "radiance") -> graph.Graph:

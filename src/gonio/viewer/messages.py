@@ -138,13 +138,14 @@ class Upload(Part):
 
 
 class Wish(Part):
-    """Ask for a material's shader with other choices."""
+    """Ask for a material's shader with other choices, and with these weights (`on`) that are off by themselves."""
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
     revision: Annotated[int, Field(ge=0, lt=2**53)] = 0
     material: Key
     choices: dict[Path, Choice] = Field(max_length=32)
+    on: list[Path] = Field(default=[], max_length=64)
 
 
 Message = Annotated[Scene | Ack | Upload | Wish, Field(discriminator="type")]

@@ -11,7 +11,7 @@ import hashlib
 import html as escaping
 import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias, TypedDict
@@ -23,7 +23,8 @@ from .._version import __version__
 from ..emit import bundle as written_for
 from ..energy.tables import bake
 from ..errors import InputError, MachineError
-from ..models import BSDF
+from ..models import BSDF, tree
+from ..models.recording import switched_off
 from ..owner import alone
 from . import panels, stage
 from .stage import PresetData, Stage, Value
@@ -32,10 +33,14 @@ Json: TypeAlias = "dict[str, object]"  # what becomes JSON, as docs/viewer.md de
 
 
 class VariantData(TypedDict):
-    """A material with some choices made, as shader code."""
+    """A material with some choices made, as shader code.
+
+    off  paths of weights at whose value of nothing it was written: it does for balls that have them so
+    """
 
     key: str
     choices: dict[str, Value]
+    off: list[str]
     manifest: Json
     text: str
     tables: dict[str, str]
@@ -96,7 +101,11 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> Page
         "mode": "export" if socket is None else "live",
         "socket": socket,
         "revision": revision,
-        "materials": [material_data(key, m) for key, m in what.materials.items() if key in used],
+        "materials": [
+            material_data(key, m, _switched_on(what, key), socket is None)
+            for key, m in what.materials.items()
+            if key in used
+        ],
         "scene": {
             "rows": [
                 {
@@ -117,22 +126,40 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> Page
     }
 
 
-def material_data(key: str, material: stage.Material) -> MaterialData:
-    """A material with its presets and one variant for every combination of its choices, the model's own first."""
-    names = list(material.choices)
-    combinations = [dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())]
+def _switched_on(what: Stage, key: str) -> set[str]:
+    """Paths of the weights that are not off on some ball of a material."""
+    material = what.materials[key].bsdf
+    balls = [ball.values for row in what.rows if row.material == key for ball in row.balls]
     return {
-        "id": key,
-        "title": material.title,
-        "presets": stage.presets(material.bsdf),
-        "variants": [variant_data(material.bsdf, choices) for choices in combinations],
+        leaf.path
+        for leaf in tree.leaves(material)
+        if leaf.parameter.off is not None
+        and any(not leaf.parameter.is_off(values.get(leaf.path, leaf.value)) for values in balls)
     }
 
 
+def material_data(key: str, material: stage.Material, on: Collection[str] = (), whole: bool = True) -> MaterialData:
+    """A material with its presets and one variant for every combination of its choices, the model's own first.
+
+    on     paths of weights that its balls switch on
+    whole  add variants with every layer, for a page that nobody writes another for
+    """
+    names = list(material.choices)
+    combinations = [dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())]
+    variants = [variant_data(material.bsdf, choices, on) for choices in combinations]
+    if whole and any(variant["off"] for variant in variants):
+        every = switched_off(material.bsdf)
+        variants += [variant_data(material.bsdf, choices, every) for choices in combinations]
+    return {"id": key, "title": material.title, "presets": stage.presets(material.bsdf), "variants": variants}
+
+
 @alone
-def variant_data(bsdf: BSDF, choices: Mapping[str, Value]) -> VariantData:
-    """Shader, manifest and tables of a model with some choices made otherwise."""
-    bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl")
+def variant_data(bsdf: BSDF, choices: Mapping[str, Value], on: Collection[str] = ()) -> VariantData:
+    """Shader, manifest and tables of a model with some choices made otherwise, without the layers that are off.
+
+    on  paths of weights that are written all the same
+    """
+    bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl", lean=True, on=on)
     tables = {name: encode(values) for name, values in bundle.tables.items()}
     manifest = bundle.manifest
     for texture in manifest["textures"]:
@@ -141,7 +168,16 @@ def variant_data(bsdf: BSDF, choices: Mapping[str, Value]) -> VariantData:
         texture |= {"axes": axes, "doc": doc}
     code = "".join([bundle.text, *(f"{name} {data}" for name, data in sorted(tables.items()))])
     key = hashlib.sha256(code.encode()).hexdigest()[:16]
-    return {"key": key, "choices": dict(choices), "manifest": manifest, "text": bundle.text, "tables": tables}
+    fields = {field["path"] for field in manifest["fields"]}
+    off = [p["path"] for p in manifest["parameters"] if p["off"] is not None and p["path"] not in fields]
+    return {
+        "key": key,
+        "choices": dict(choices),
+        "off": off,
+        "manifest": manifest,
+        "text": bundle.text,
+        "tables": tables,
+    }
 
 
 def encode(values: NDArray[np.floating]) -> str:

@@ -372,7 +372,7 @@ class _Variant:
     def __call__(self) -> None:
         wish = self.wish
         try:
-            variant = page.variant_data(self.stage.materials[wish.material].bsdf, dict(wish.choices))
+            variant = page.variant_data(self.stage.materials[wish.material].bsdf, dict(wish.choices), wish.on)
             answer = {"type": "variant", "id": wish.id, "material": wish.material, "variant": variant}
             answer["revision"] = wish.revision
             self.session.send_from_thread(json.dumps(answer, allow_nan=False))

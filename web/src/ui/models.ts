@@ -3,6 +3,7 @@ import type { GUI } from "lil-gui";
 import type { PageApp } from "../app";
 import type { Parameter, Value } from "../data";
 import * as edits from "../edits";
+import { isNumeric } from "../shaders";
 import { ChoiceControl, RangeControl, TickControl, TripleControl, addRow } from "./controls";
 import { button, element, short } from "./dom";
 
@@ -66,7 +67,7 @@ export class ModelsSection {
         ],
         () => material.presets.find((p) => p.name === edits.currentPreset(app, slot, material))?.f0 ?? null,
       );
-    const numeric = manifest.parameters.filter((p) => p.field !== null);
+    const numeric = manifest.parameters.filter(isNumeric);
     const row = app.state.slots[slot];
     const varying = numeric.filter((p) => row && edits.perBall(row, p.path));
     if (varying.length) {

@@ -29,6 +29,9 @@ def emit(
     bundle: Annotated[
         Path | None, Option(metavar="DIR", help="Write shader, manifest.json and tables (raw float32) there.")
     ] = None,
+    lean: Annotated[
+        bool, Option("--lean", help="Leave out what its values switch off, such as a coat of weight 0.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Write a material as shader code, traced from its own source: GLSL, WGSL, HLSL, or a language of yours.
@@ -38,6 +41,7 @@ def emit(
       gonio emit conductor --preset Au
       gonio emit dielectric --lang wgsl --functions eval -o glass.wgsl
       gonio emit kulla-conty -p base=conductor --bundle shaders
+      gonio emit openpbr -p coat_weight=1 --lean
     """
     from ... import files
     from ...emit import bundle as make_bundle
@@ -46,7 +50,7 @@ def emit(
         files.check_file(output)
     if bundle is not None:
         files.check_folder(bundle)
-    shader = make_bundle(made.text(model), lang, functions)
+    shader = make_bundle(made.text(model), lang, functions, lean=lean)
     written = [str(path) for path in shader.write(bundle)] if bundle is not None else []
     if output is not None:
         files.write_whole(output, shader.text.encode())

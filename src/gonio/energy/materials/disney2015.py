@@ -58,18 +58,18 @@ class DisneyBSDF(BSDF):
     reads_wavelengths: ClassVar[bool] = True
 
     base_color: Colour = spectrum(default=0.5, doc="colour of the surface", low=0.0, high=1.0)
-    metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0)
+    metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0, off=0.0)
     roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
-    anisotropic: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0)
+    anisotropic: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0)
     rotation: Angle = rotation_angle()
     eta: Number = number(default=1.5, doc="index inside over index outside", low=1.0, high=3.0)
     specular_tint: Number = number(
         default=0.0, doc="how much of the base colour is in what a dielectric reflects", low=0.0, high=1.0
     )
-    spec_trans: Number = number(default=0.0, doc="share of the dielectric that is glass", low=0.0, high=1.0)
-    sheen: Number = number(default=0.0, doc="fibres on a dielectric", low=0.0, high=1.0)
+    spec_trans: Number = number(default=0.0, doc="share of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
+    sheen: Number = number(default=0.0, doc="fibres on a dielectric", low=0.0, high=1.0, off=0.0)
     sheen_tint: Number = number(default=0.5, doc="how much of the base colour is in the sheen", low=0.0, high=1.0)
-    clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0)
+    clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0, off=0.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
     diff_trans: Number = number(
         default=0.0, doc="of a thin sheet: 0 is opaque, 1 even on both sides, 2 sends all light on", low=0.0, high=2.0

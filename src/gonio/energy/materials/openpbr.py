@@ -178,19 +178,21 @@ class OpenPBR(BSDF):
 
     base_weight: Number = number(default=1.0, doc="factor on the base's colour", low=0.0, high=1.0)
     base_color: Colour = spectrum(default=0.8, doc="diffuse colour; of metal, seen from above", low=0.0, high=1.0)
-    base_diffuse_roughness: Number = number(default=0.0, doc="of the diffuse lobe, as `eon`", low=0.0, high=1.0)
-    base_metalness: Number = number(default=0.0, doc="share of the surface that is metal", low=0.0, high=1.0)
+    base_diffuse_roughness: Number = number(
+        default=0.0, doc="of the diffuse lobe, as `eon`", low=0.0, high=1.0, off=0.0
+    )
+    base_metalness: Number = number(default=0.0, doc="share of the surface that is metal", low=0.0, high=1.0, off=0.0)
     specular_weight: Number = number(default=1.0, doc="factor on F0 by the index, and on metal", low=0.0, high=4.0)
     specular_color: Colour = spectrum(
         default=1.0, doc="tint of what is reflected outside; of metal, at the edge", low=0.0, high=1.0
     )
     specular_roughness: Number = number(default=0.3, doc="root of alpha", low=0.0, high=1.0)
     specular_roughness_anisotropy: Number = number(
-        default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0
+        default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0
     )
     specular_ior: Number = number(default=1.5, doc="index of the base", low=1.0, high=5.0)
     transmission_weight: Number = number(
-        default=0.0, doc="share of the dielectric that light passes through", low=0.0, high=1.0
+        default=0.0, doc="share of the dielectric that light passes through", low=0.0, high=1.0, off=0.0
     )
     transmission_color: Colour = spectrum(
         default=1.0, doc="what is left of white light after `transmission_depth`; at depth 0 a tint", low=0.0, high=1.0
@@ -207,7 +209,7 @@ class OpenPBR(BSDF):
     )
     transmission_dispersion_abbe_number: Number = number(default=20.0, doc="of that dispersion", low=0.0, inside=True)
     subsurface_weight: Number = number(
-        default=0.0, doc="share of the opaque dielectric that scatters under its surface", low=0.0, high=1.0
+        default=0.0, doc="share of the opaque dielectric that scatters under its surface", low=0.0, high=1.0, off=0.0
     )
     subsurface_color: Colour = spectrum(default=0.8, doc="its colour", low=0.0, high=1.0)
     subsurface_radius: Number = number(
@@ -219,20 +221,24 @@ class OpenPBR(BSDF):
     subsurface_scatter_anisotropy: Number = number(
         default=0.0, doc="of a thin wall: 1 sends all light on, -1 all back", low=-1.0, high=1.0
     )
-    coat_weight: Number = number(default=0.0, doc="share of the surface under the coat", low=0.0, high=1.0)
+    coat_weight: Number = number(default=0.0, doc="share of the surface under the coat", low=0.0, high=1.0, off=0.0)
     coat_color: Colour = spectrum(
         default=1.0, doc="what the coat leaves of light that crosses it twice, straight", low=0.0, high=1.0
     )
     coat_roughness: Number = number(default=0.0, doc="root of alpha", low=0.0, high=1.0)
-    coat_roughness_anisotropy: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0)
+    coat_roughness_anisotropy: Number = number(
+        default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0
+    )
     coat_ior: Number = number(default=1.6, doc="index of the coat", low=1.0, high=5.0)
     coat_darkening: Number = number(
         default=1.0, doc="how much light that bounces under the coat darkens the base", low=0.0, high=1.0
     )
-    fuzz_weight: Number = number(default=0.0, doc="share of the surface under fuzz", low=0.0, high=1.0)
+    fuzz_weight: Number = number(default=0.0, doc="share of the surface under fuzz", low=0.0, high=1.0, off=0.0)
     fuzz_color: Colour = spectrum(default=1.0, doc="factor on what the fuzz scatters", low=0.0, high=1.0)
     fuzz_roughness: Number = number(default=0.5, doc="0 is fibres along the normal, 1 dust", low=0.0, high=1.0)
-    thin_film_weight: Number = number(default=0.0, doc="share of the base under a thin film", low=0.0, high=1.0)
+    thin_film_weight: Number = number(
+        default=0.0, doc="share of the base under a thin film", low=0.0, high=1.0, off=0.0
+    )
     thin_film_thickness: Number = number(default=0.5, doc="of the film", low=0.0, high=3.0, unit="um")
     thin_film_ior: Number = number(default=1.4, doc="index of the film", low=1.0, high=3.0)
     emission_luminance: Number = number(
@@ -240,7 +246,11 @@ class OpenPBR(BSDF):
     )
     emission_color: Colour = spectrum(default=1.0, doc="of that emission", low=0.0, inside=True)
     geometry_opacity: Number = number(
-        default=1.0, doc="share of the surface that is there; light goes straight on elsewhere", low=0.0, high=1.0
+        default=1.0,
+        doc="share of the surface that is there; light goes straight on elsewhere",
+        low=0.0,
+        high=1.0,
+        off=1.0,
     )
     geometry_thin_walled: bool = flag(default=False, doc="whether it is a sheet without an inside")
     layering: str = choice("reciprocal", "how a coat dims what lies under it", LAYERINGS)

@@ -1,0 +1,69 @@
+"""Lean shaders: without what a material's own values switch off."""
+
+from __future__ import annotations
+
+import gonio as go
+import pytest
+from gonio.emit import bundle
+from gonio.models.recording import switched_off
+from gonio.ops import exp, inv_pi, log, maximum
+
+
+class Varnished(go.BSDF):
+    """Lambert under a lobe of powers of the normal's cosine."""
+
+    albedo: go.Colour = go.spectrum(0.5, "of the body", high=1.0)
+    varnish: go.Number = go.number(0.0, "weight of the lobe", low=0.0, high=1.0, off=0.0)
+    power: go.Number = go.number(5.0, "of the lobe", low=1.0, high=9.0)
+
+    def eval(self, wo, wi, mode="radiance"):
+        lobe = self.varnish * exp(self.power * log(maximum(wi.z, 1e-3)))
+        return (self.albedo * ((1.0 - self.varnish) * inv_pi) + lobe) * maximum(wi.z, 0.0)
+
+
+def fields(made: object) -> list[str]:
+    return [field["path"] for field in made.manifest["fields"]]  # type: ignore[attr-defined]
+
+
+def test_what_is_off_is_not_written() -> None:
+    whole, lean = bundle(Varnished(), functions=["eval"]), bundle(Varnished(), functions=["eval"], lean=True)
+    assert fields(whole) == ["albedo", "varnish", "power"] and fields(lean) == ["albedo", "power"]
+    assert "Written without what is off: varnish = 0." in lean.text
+    assert "power" in whole.text and "self.power" not in lean.text
+    declared = {p["path"]: (p["field"], p["off"]) for p in lean.manifest["parameters"]}
+    assert declared == {"albedo": ("albedo", None), "varnish": (None, 0.0), "power": ("power", None)}
+
+
+def test_what_is_on_or_asked_for_is_written() -> None:
+    for made in (
+        bundle(Varnished(varnish=0.2), functions=["eval"], lean=True),
+        bundle(Varnished(), functions=["eval"], lean=True, on=["varnish"]),
+    ):
+        assert fields(made) == ["albedo", "varnish", "power"] and "self.power" in made.text
+
+
+def test_inner_materials_have_switches_too() -> None:
+    mixed = go.mix(Varnished(), Varnished(varnish=0.3), 0.4)
+    assert switched_off(mixed) == ["a.varnish"]
+    assert "b_varnish" in go.emit(mixed, functions=["eval"], lean=True)
+
+
+@pytest.mark.parametrize(
+    ("material", "share"),
+    [
+        (go.OpenPBR(), 0.15),
+        (go.OpenPBR(base_metalness=1.0), 0.2),
+        (go.OpenPBR(transmission_weight=1.0), 0.3),
+        (go.model("disney2015")(), 0.3),
+    ],
+)
+def test_of_many_layers_few_lines_are_left(material: go.BSDF, share: float) -> None:
+    whole, lean = go.emit(material), go.emit(material, lean=True)
+    assert len(lean) < share * len(whole)
+
+
+def test_a_lean_mirrorless_surface_is_isotropic_and_opaque() -> None:
+    manifest = bundle(go.OpenPBR(), lean=True).manifest
+    assert manifest["isotropic"] and not manifest["transmits"]
+    whole = bundle(go.OpenPBR()).manifest
+    assert not whole["isotropic"] and whole["transmits"]
