@@ -418,8 +418,7 @@ class Transport(Integrator):
     def roulette(
         self, index: UInt, key: UInt, dimension: UInt, depth: UInt, throughput: Radiance, eta: Float, active: Mask
     ) -> tuple[Radiance, Mask]:
-        """End dim paths by chance: survive with SURVIVAL times the throughput's largest channel, at most 0.95, and weigh
-        by it.
+        """End dim paths by chance: survive with SURVIVAL times the throughput's largest channel, at most .95.
 
         Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
         """
