@@ -5,6 +5,7 @@
     python benchmarks/suite.py --quick                      # a quarter of the samples, references of 4 s
     python benchmarks/suite.py --figure suite.png           # and a figure of the pictures and ratios
     python benchmarks/suite.py --until-error .002           # is what `--until-error` promises true?
+    python benchmarks/suite.py --bias                       # 2^28 samples of five scenes: is any block off?
 
 Efficiency is 1 / (relMSE x time); relMSE = mean((x - r)^2 / (r^2 + floor)) with the floor at 1 % of the squared mean of
 the picture. Time is that of a whole new render of a loaded scene file, from its dictionary to the picture, kernels
@@ -46,6 +47,7 @@ from scenes import SCENES, Scene  # noqa: E402
 SAMPLERS = ("independent", "stratified", "multijitter", "ldsampler")
 ROUNDS = 3
 EACH = 16  # samples of a part of the reference
+ROUNDING = 1e-6  # of a mean, that Mitsuba's sums in 32 bits are off by: blocks of an even sky have no noise at all
 console = Console(width=None if os.isatty(1) else 130)
 
 
@@ -129,7 +131,7 @@ def many_of(draws: list[Callable[[int], np.ndarray]], seconds: float) -> list[np
 def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """How far apart the means of two stacks of blocks are: Student's t, as sigmas that are as rare."""
     squares = sum(np.var(x, 0, ddof=1) / len(x) for x in (a, b))
-    t = np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + 1e-20)
+    t = np.abs(np.mean(a, 0) - np.mean(b, 0)) / np.sqrt(squares + (ROUNDING * np.mean(b, 0)) ** 2 + 1e-20)
     return np.asarray(stats.norm.isf(stats.t.sf(t, min(len(a), len(b)) - 1)))
 
 
@@ -263,6 +265,42 @@ def promises(names: list[str], error: float) -> None:
     console.print(f"within a factor 1.3 of what was promised: {kept} of {judged}")
 
 
+BIASED = ("five-metals", "sun-environment", "textured", "rough-glass", "room")  # scenes whose light differs in kind
+SIDE, PARTS = 128, 64  # pixels a side of those pictures, and independent pictures that the samples are cut into
+
+
+def bias(names: list[str], log2_samples: int) -> None:
+    """So many samples of Gonio's `path`, and of Mitsuba's: how far apart the means of blocks of 10 x 10 pixels are.
+
+    Both draw the same scene of Mitsuba's, and share nothing but its shapes, materials and lamps. The spread of PARTS
+    pictures, each of its own seed, is the noise of a block's mean; Student's t says how rare a difference is. Of n
+    blocks the worst is as rare as its chance times n (Bonferroni).
+    """
+    spp = 2**log2_samples // (SIDE * SIDE * PARTS)
+    if spp < 1:
+        raise SystemExit(f"--bias {log2_samples}: {PARTS} pictures of {SIDE} x {SIDE} have more samples than that")
+    titles = ("scene", "samples", "mean over peer's", "its sigma", "worst block", "corrected", "median block's sigma")
+    table = Table(*titles, title="Gonio's path against Mitsuba's, blocks of 10 x 10 pixels")
+    for name in names:
+        scene = replace(SCENES[name], size=(SIDE, SIDE))
+        begin = time.perf_counter()
+        draws = [ours(scene, spp)(), theirs(scene, "independent", spp)()]
+        mine, other = (np.stack([draw(seed) for seed in range(PARTS)]) for draw in draws)
+        a, b = blocks(mine), blocks(other)
+        apart = sigmas(a, b)
+        lit = (a.mean(0) > 0) | (b.mean(0) > 0)  # nothing arrives at the others, of which there is nothing to tell
+        chance = min(2.0 * float(stats.norm.sf(apart[lit].max())) * int(lit.sum()), 1.0)
+        means = [x.mean((1, 2)) for x in (a, b)]
+        ratio = float(means[0].mean() / means[1].mean())
+        sigma = float(np.sqrt(sum(np.var(x, ddof=1) / PARTS for x in means)) / means[1].mean())
+        noise = np.sqrt(sum(np.var(x, 0, ddof=1) / PARTS for x in (a, b)))[lit] / b.mean(0)[lit]
+        row = [name, f"2^{log2_samples} each", f"{ratio:.6f}", f"{sigma:.1e}", f"{apart[lit].max():.2f} sigma"]
+        row += [f"{stats.norm.isf(chance / 2):.2f} sigma of {int(lit.sum())}", f"{np.median(noise):.1e}"]
+        table.add_row(*row)
+        console.print(" | ".join([*row, f"{time.perf_counter() - begin:.0f} s"]))
+    console.print(table)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", help=", ".join(SCENES))
@@ -270,9 +308,14 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a quarter of the samples, references of 4 seconds")
     parser.add_argument("--figure", type=Path, help="where to draw pictures and ratios")
     parser.add_argument("--until-error", type=float, metavar="E", help="judge renders until that error, small ones")
+    many = "against 2^N of Mitsuba's (N = 28), block by block, of the scenes given or of " + ", ".join(BIASED)
+    parser.add_argument("--bias", type=int, nargs="?", const=28, metavar="N", help="2^N samples " + many)
     given = parser.parse_args()
     if unknown := set(given.scenes) - set(SCENES):
         parser.error(f"no scene {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
+    if given.bias is not None:
+        bias(given.scenes or list(BIASED), given.bias)
+        return
     if given.until_error:
         promises(given.scenes or list(SCENES), given.until_error)
         return

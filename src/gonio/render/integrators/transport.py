@@ -41,6 +41,9 @@ from .sums import Sums
 
 # Russian roulette begins at this depth, as in Mitsuba's `path`: before it, paths are rarely dim enough to pay.
 ROULETTE_DEPTH = 5
+# How likely a path goes on, over what is left of its throughput. What ends a path early costs more than the path: by
+# 1 in its place, rough glass has 1.3 times the error, a room 1.2, a soft sky 1.08, for 0 to 16 % less time.
+SURVIVAL = 4.0
 
 # Dimensions of a path: each vertex takes VERTEX_DIMENSIONS of them.
 FIRST_VERTEX = FIRST_FREE
@@ -415,11 +418,11 @@ class Transport(Integrator):
     def roulette(
         self, index: UInt, key: UInt, dimension: UInt, depth: UInt, throughput: Radiance, eta: Float, active: Mask
     ) -> tuple[Radiance, Mask]:
-        """End dim paths by chance: survive with the throughput's largest channel, at most 0.95, and weigh by it.
+        """End dim paths by chance: survive with SURVIVAL times the throughput's largest channel, at most .95.
 
         Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
         """
-        survive = dr.clip(dr.max(dr.detach(throughput)) * dr.square(eta), 1e-6, 0.95)
+        survive = dr.clip(SURVIVAL * dr.max(dr.detach(throughput)) * dr.square(eta), 1e-6, 0.95)
         u, _ = sampler.independent_pair(key, index, dimension + ROULETTE)
         plays = depth + 1 >= ROULETTE_DEPTH
         active = active & (~plays | (u < survive))
