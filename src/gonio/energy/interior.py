@@ -49,7 +49,7 @@ HALF = 16  # steps of the directions that leave, and of those that cannot
 POINTS = 1 << 13  # directions drawn at each node
 NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R bends like it at grazing angles
 ROUGH = 33  # of those at which a rough interface is drawn from
-COLOURS, LEFT = 9, 13  # steps of the colour and of what one crossing leaves, see `colour_place` and `left_place`
+COLOURS, LEFT = 13, 13  # steps of the colour and of what one crossing leaves, see `colour_place` and `left_place`
 LEAST_LEFT = 0.03  # of the light after a crossing, the first step of that
 KEPT = 32  # accounts in memory
 LEAST = 1e-9
@@ -58,20 +58,20 @@ LEAST = 1e-9
 class Account(NamedTuple):
     """What a coat must know of its inside, as tables.
 
-    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's samples that
-           a cosine should replace, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
-    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2
+    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's samples that a
+           cosine should replace, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
+    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None where there is none
     again  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
     """
 
     coat: Table
-    rest: Table
+    rest: Table | None
     again: Table
 
 
 def colour_place(a: Array) -> Array:
-    """Where a colour stands on the tables' axis: in a / (2 - a) a series 1 / (1 - a k) is nearly straight, as of k = 1 / 2
-    it is exactly."""
+    """Where a colour stands on the tables' axis: in a / (2 - a) a series 1 / (1 - a k) is nearly straight, of k = 1 / 2
+    exactly."""
     return a / (2.0 - a)
 
 
@@ -143,9 +143,8 @@ def find(coat: Coated) -> Account:
     face = _interface(coat, index)
     if coat.base.delta == "always":
         columns = [face.reflected(outside), 0.0 * outside, 1.0 - face.reflected(outside), face.beyond(outside)]
-        none, once = np.zeros((1, 1, 1, 1)), np.array([1.0, 0.0]).reshape(1, 1, 2)
-        tables = Table("coat", np.stack(columns, -1)), Table("coat_rest", none), Table("coat_again", once)
-        return Account(*tables)
+        once = Table("coat_again", np.array([1.0, 0.0]).reshape(1, 1, 2))
+        return Account(Table("coat", np.stack(columns, -1)), None, once)
     seen = _drawn(coat.base, index)
     totally = (seen.weight * (seen.position <= 0.0)).sum(1) / np.maximum(seen.weight.sum(1), LEAST)
     t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT)
@@ -157,7 +156,7 @@ def find(coat: Coated) -> Account:
     columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
     return Account(
         Table("coat", np.stack(columns, -1)),
-        Table("coat_rest", rest[..., None]),
+        Table("coat_rest", rest[..., None]) if rest.any() else None,
         Table("coat_again", np.stack([1.0 / factor, norm], -1)),
     )
 
@@ -383,7 +382,7 @@ def _onto(weight: Floats, position: Floats, n: int) -> Floats:
     size = n * len(weight)
     found = np.bincount((row + cell).ravel(), (weight * (1.0 - part)).ravel(), size)
     found += np.bincount((row + cell + 1).ravel(), (weight * part).ravel(), size)
-    return found.reshape(len(weight), n)
+    return np.asarray(found, float).reshape(len(weight), n)
 
 
 def _at_nodes(x: Floats, nodes: Floats) -> Floats:

@@ -43,12 +43,12 @@ class Coat(BSDF):
     f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
 
     T = 1 - R is what the top lets through, o' and i' the refracted directions, t = exp(-absorption depth / cos) Beer's
-    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, g of it,
-    and a separable rest (`energy/interior.py` says how): over Lambert exact, over any base exact in albedo, channel by
-    channel, as far as its reflectance rises alike in all of them. Reciprocal; white on white keeps all light.
+    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, g of
+    it, and a separable rest (`energy/interior.py` says how): over Lambert exact, over a metal exact in albedo, channel
+    by channel. Reciprocal; white on white keeps all light.
 
-    With `bounces="white"` g and rest are a white base's: what is seen is R, and 1 - R of the base's colour, neither darker nor
-    deeper.
+    With `bounces="white"` g and rest are a white base's: what is seen is R, and 1 - R of the base's colour, neither
+    darker nor deeper.
 
     The base stands in the coat: an index of its own is over the coat's. A rough top reflects as rough glass does, by an
     albedo R; refracted light is not blurred. g and the rest are tables found when the material is first asked. Colours
@@ -154,18 +154,19 @@ class Coat(BSDF):
         """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
         met = 1.0 + 0.0 * a if self.bounces == "white" else a
         u = self._crossed() + 0.0 * a
-        account = self._account
+        account, ends = self._account, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
         factors, rests = [], []
         for colour, left in zip(ops.channels(colour_place(met)), ops.channels(left_place(u)), strict=True):
             place = [ops.inset(x, n) for x, n in zip((colour, left), account.again.shape, strict=True)]
-            factor, norm = ops.lookup(account.again, *place)
-            rest = ops.safe_div(1.0, norm)
-            for w in (wo, wi):
-                at = ops.inset(ops.sqrt(ops.abs(w.z)), account.rest.shape[0])
-                rest = rest * ops.lookup(account.rest, at, *place)[0]
-            factors.append(1.0 / factor)
-            rests.append(rest)
-        return ops.of_channels(a, factors), ops.of_channels(a, rests) * a * sqr(u)
+            over_factor, norm = ops.lookup(account.again, *place)
+            factors.append(1.0 / over_factor)
+            if account.rest is not None:
+                at_o, at_i = (
+                    ops.lookup(account.rest, ops.inset(end, account.rest.shape[0]), *place)[0] for end in ends
+                )
+                rests.append(at_o * at_i * ops.safe_div(1.0, norm))
+        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else 0.0 * a
+        return ops.of_channels(a, factors), rest
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -182,8 +183,8 @@ class Coat(BSDF):
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """(probability of what is under the top, of a cosine among it): that finds the separable lobe, and what the base
-        sends back totally, whose samples fail."""
+        """(probability of what is under the top, of a cosine among it): that finds the separable lobe, and what the
+        base sends back totally, whose samples fail."""
         reflected, even, _, beyond = self._at(wo)
         _, smooth = microfacet.widths(self.alpha)
         cos = ops.abs(wo.z)
