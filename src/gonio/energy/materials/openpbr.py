@@ -103,6 +103,7 @@ class Between(NamedTuple):
     filmed       by how much the film changes F at `PLACES`; empty without one
     extra        the mean of that
     facets       factor of facets under the coat, by nodes of the cosine; empty without one
+    returned     what those of a dielectric return less than white ones would, averaged: the body below gets it
     metal        what single scattering misses at F = 1
     metal_again  colour of what a metal gives back
     sheet_again  colours of what a thin sheet gives back, reflected and transmitted
@@ -122,6 +123,7 @@ class Between(NamedTuple):
     filmed: tuple[Spectrum, ...]
     extra: Scalar
     facets: tuple[Scalar, ...]
+    returned: Scalar
     metal: MissingEnergy
     metal_again: Spectrum
     sheet_again: tuple[Spectrum, Spectrum] | None
@@ -373,6 +375,11 @@ class OpenPBR(BSDF):
         under = self._kept_at_nodes(rough, ratio, filmed)
         over = [1.0 - E for E in tables.reflected_at_nodes(self.coat_roughness, self.coat_ior, self._masking)]
         over_hats, over = over[:HATS], over[HATS:]
+        facets: tuple[Scalar, ...] = ()
+        returned = 0.0 * rough
+        if self._has("coat_weight"):
+            facets = self._balanced(rough, over_hats)
+            returned = self._returned_less(rough, ratio, over_hats, facets)
         total = sum(weights)
         sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
         both = [one * other for one, other in zip(under, over, strict=True)]
@@ -409,11 +416,12 @@ class OpenPBR(BSDF):
             eta=eta,
             medium=medium,
             sheer=sheer,
-            joint=joint / sheer,
+            joint=(joint + returned) / sheer,
             bent=bent,  # type: ignore[arg-type]
             filmed=filmed,
             extra=extra,
-            facets=self._balanced(rough, over_hats) if self._has("coat_weight") else (),
+            facets=facets,
+            returned=returned,
             metal=metal,
             metal_again=_again(f_metal, metal.average),
             sheet_again=sheet,
@@ -494,6 +502,16 @@ class OpenPBR(BSDF):
             met = [_sum([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
             w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
         return tuple(w)
+
+    def _returned_less(self, rough: Scalar, ratio: Scalar, kept: list[Scalar], facets: tuple[Scalar, ...]) -> Scalar:
+        """The mean of E (1 - E_coat - w <w>), see `_spared`."""
+        E_of = tables.reflected_at_nodes(rough, ratio, self._masking)[:HATS]
+        rows = tables.scattered_at_nodes(rough, self._masking)
+        less = []
+        for n, (E, one, w, row) in enumerate(zip(E_of, kept, facets, rows, strict=True)):
+            cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
+            less.append(E * (one - w * _seen_by(cos, ratio, row, facets)) * tables.MEANS[n])
+        return _sum(less)
 
     # ------------------------------------------------------------------ reflectances
 
@@ -610,9 +628,10 @@ class OpenPBR(BSDF):
         E_b = _mix(f0 + (1.0 - f0) * body, metal, self.base_metalness)
         return _mix(1.0, (1.0 - K) / (1.0 - E_b * K), self.coat_darkening)
 
-    def _under(self, cos: Scalar) -> tuple[Scalar, Spectrum, Scalar]:
+    def _under(self, cos: Scalar) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
         """At a direction outside: what the coat's surface lets through, what its colour leaves of one crossing with
-        the root of the darkening, and the factor of a lobe of facets.
+        the root of the darkening, the factor of a lobe of facets, and what those of a dielectric, for all that they
+        reflect, send out less than white ones: they reflect most where light grazes, and the coat covers most there.
 
         A last step of the iteration (`_balanced`): of a mirror the root of 1 - E, as exact as that itself.
         """
@@ -621,23 +640,28 @@ class OpenPBR(BSDF):
         tint = _power(self.coat_color, 0.5 / self._inside(cos)) * sqrt(self._darkened(cos))
         place = sqrt(maximum(cos, 0.0)) * (HATS - 1.0)
         here = _sum([maximum(1.0 - abs(place - float(n)), 0.0) * w for n, w in enumerate(b.facets)])
-        met = _sum([p * w for p, w in zip(tables.scattered(cos, b.rough, self._masking), b.facets, strict=True)])
-        return kept, tint, sqrt(here * kept / maximum(met, 1e-4))
+        row = tables.scattered(cos, b.rough, self._masking)
+        met = _sum([p * w for p, w in zip(row, b.facets, strict=True)])
+        facets = sqrt(here * kept / maximum(met, 1e-4))
+        return kept, tint, facets, kept - facets * _seen_by(cos, b.ratio, row, b.facets)
 
-    def _through_coat(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
-        """Factors of the base's facets and of its diffuse lobe; 1 where there is no coat on their side."""
+    def _through_coat(self, pair: _Pair, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
+        """Factors of the base's facets and of its diffuse lobe, of which those let in so much from both directions; 1
+        where there is no coat on their side."""
         C = self.coat_weight
-        kept_o, tint_o, facet_o = self._under(pair.wo.z)
+        kept_o, tint_o, facet_o, less_o = self._under(pair.wo.z)
         if self.layering == "albedo":
             coated = _mix(1.0, self._darkened(pair.wo.z), C)
             tint = _power(self.coat_color, 0.5 / self._inside(pair.wo.z) + 0.5 / self._inside(pair.wi.z))
             both = coated * ((1.0 - C) + tint * (kept_o * C))
             both = where(pair.above, both, 1.0)
             return both, both
-        kept_i, tint_i, facet_i = self._under(pair.wi.z)
+        kept_i, tint_i, facet_i, less_i = self._under(pair.wi.z)
         tint = tint_o * tint_i
         facets = (1.0 - C) + tint * (facet_o * facet_i * C)
-        both = kept_o * kept_i / self.derived.joint
+        both = 1.0 / self.derived.joint
+        for kept, less, let in ((kept_o, less_o, let_in[0]), (kept_i, less_i, let_in[1])):
+            both = both * (kept + less * (1.0 - let) / maximum(let, 1e-3))
         if self._bends:
             for w in (pair.wo, pair.wi):
                 both = both * (self._even(w, True) / self._even(w, False))
@@ -648,7 +672,7 @@ class OpenPBR(BSDF):
         """What coat and fuzz leave of light that passes them once, on its way in or out."""
         left = 1.0 + 0.0 * self.base_color
         if self._has("coat_weight"):
-            kept, tint, _ = self._under(cos)
+            kept, tint, _, _ = self._under(cos)
             left = _mix(1.0, tint * kept, self.coat_weight) * left
         if self._has("fuzz_weight"):
             left = left * (1.0 - self.fuzz_weight * self._fuzz()._lobe(_at(cos)).R)
@@ -680,7 +704,7 @@ class OpenPBR(BSDF):
         o, i = upper(wo), where(wi.z < 0.0, -wi, wi)
         return _Pair(where(valid, o, frame.upright(o)), where(valid, i, frame.upright(i)), near & valid, above)
 
-    def _diffuse(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
+    def _diffuse(self, pair: _Pair, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
         """What the body under the dielectric reflects and, of a thin wall, lets through, times cos theta_i."""
         b = self.derived
         white = 1.0 + 0.0 * self.base_color
@@ -688,7 +712,7 @@ class OpenPBR(BSDF):
         base = (
             binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
         )
-        dimmed = self._let_in(pair.wo) * self._let_in(pair.wi) / b.sheer
+        dimmed = let_in[0] * let_in[1] / b.sheer
         dimmed = dimmed * ((1.0 - self.base_metalness) * (1.0 - self.transmission_weight))
         if self._bends:
             dimmed = dimmed * (self._even(pair.wo, False) * self._even(pair.wi, False))
@@ -770,9 +794,10 @@ class OpenPBR(BSDF):
         if self._has("base_metalness"):
             metal = self._metal(cos, b.eta, b.medium) * facets + b.metal_again * again
             base = base + metal * M
-        body, passed = (_lobe(one, None, ideal) for one in self._diffuse(pair))
+        let_in = self._let_in(pair.wo), self._let_in(pair.wi)
+        body, passed = (_lobe(one, None, ideal) for one in self._diffuse(pair, let_in))
         if self._has("coat_weight"):
-            by_facets, by_body = self._through_coat(pair)
+            by_facets, by_body = self._through_coat(pair, let_in)
             coat = self._coat(o, i, h, cos, ideal) * self.coat_weight
             base = base * by_facets + where(pair.above, coat, 0.0)
             body, passed = body * by_body, passed * by_body
@@ -1067,6 +1092,19 @@ def _sum(terms: list[Array]) -> Array:
     for term in terms[1:]:
         total = total + term
     return total
+
+
+def _seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
+    """<w>: the mean of the factor of facets, of what those of a dielectric reflect that are seen under a cosine. As they
+    reflect most where light grazes, its shares of the light are white facets' times F of the facet half way between."""
+    sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
+    met, total = 0.0 * cos, 0.0 * cos
+    for n, (share, w) in enumerate(zip(row, facets, strict=True)):
+        other = (n / (HATS - 1.0)) ** 2
+        half = safe_sqrt(0.5 + 0.5 * (other * cos - math.sqrt(1.0 - other * other) * sin))
+        one = share * schlick(half, r0)
+        met, total = met + one * w, total + one
+    return met / maximum(total, 1e-9)
 
 
 def _covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
