@@ -1095,8 +1095,8 @@ def _sum(terms: list[Array]) -> Array:
 
 
 def _seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
-    """<w>: the mean of the factor of facets, of what those of a dielectric reflect that are seen under a cosine. As they
-    reflect most where light grazes, its shares of the light are white facets' times F of the facet half way between."""
+    """<w>: the mean factor of facets over what those of a dielectric send to a direction of a cosine. They reflect most
+    where light grazes: shares of the light are white facets' times F of the facet half way between."""
     sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
     met, total = 0.0 * cos, 0.0 * cos
     for n, (share, w) in enumerate(zip(row, facets, strict=True)):
