@@ -76,8 +76,9 @@ def colour_place(a: Array) -> Array:
 
 
 def left_place(u: Array) -> Array:
-    """Where what one crossing leaves stands: closer near 1, where light that bounces often fades at once."""
-    return u / (3.0 - 2.0 * u)
+    """Where what one crossing leaves stands: closer near 1, where light that bounces often fades at once. 1 is the last
+    node but one, so that a clear coat has a derivative by its absorption."""
+    return u / (3.0 - 2.0 * u) * ((LEFT - 2.0) / (LEFT - 1.0))
 
 
 class Coated(Protocol):
@@ -147,17 +148,17 @@ def find(coat: Coated) -> Account:
         return Account(Table("coat", np.stack(columns, -1)), None, once)
     seen = _drawn(coat.base, index)
     totally = (seen.weight * (seen.position <= 0.0)).sum(1) / np.maximum(seen.weight.sum(1), LEAST)
-    t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT)
+    t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
     colours = np.maximum(2.0 * t / (1.0 + t), 1e-4)
     sums = [_series(seen, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), LEAST_LEFT)]
-    rest, factor, norm = (np.stack([one[n] for one in sums], -1) for n in range(3))
+    rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
     # what is sampled by a cosine: what the base's own samples lose totally, and the rest
     share = np.maximum(1.7 * np.interp(np.sqrt(outside), seen.place, totally), 0.7 * sums[-1].share)
     columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
     return Account(
         Table("coat", np.stack(columns, -1)),
         Table("coat_rest", rest[..., None]) if rest.any() else None,
-        Table("coat_again", np.stack([1.0 / factor, norm], -1)),
+        Table("coat_again", np.stack([over_factor, norm], -1)),
     )
 
 
@@ -316,7 +317,7 @@ class _Sum(NamedTuple):
     """The series at one u, for each colour: see `Account`; and the share of the rest in what leaves a white base."""
 
     rest: Floats
-    factor: Floats
+    over_factor: Floats
     norm: Floats
     share: Floats
 
@@ -369,9 +370,14 @@ def _series(seen: _Seen, colours: Floats, u: float, face: _Interface, index: flo
         norm = 2.0 * np.pi * float(area @ rest)
         some_rest = norm > 1e-7  # less is roundings
         rests.append(rest * some_rest)
-        factors.append(factor)
+        factors.append(1.0 / factor)
         norms.append(norm * some_rest)
     return _Sum(np.stack(rests, -1), np.array(factors), np.array(norms), share)
+
+
+def _continued(values: list[Floats]) -> Floats:
+    """Values at each u, last, and one more, in a straight line."""
+    return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
 
 
 def _onto(weight: Floats, position: Floats, n: int) -> Floats:

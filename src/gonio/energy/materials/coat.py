@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Mapping
+from typing import ClassVar, Self
 
 from ... import ops
 from ...errors import InputError
 from ...models import (
     BSDF,
+    Breach,
     Colour,
     Number,
     Sample,
@@ -56,6 +58,13 @@ class Coat(BSDF):
     other value may, and derivatives leave the change of the tables out.
     """
 
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "what a rough top reflects and lets through is met to so much, by draws of rough glass",
+            lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
+            certain=False,
+        ),
+    }
     base: BSDF = bsdf("the material under the coat; it must not transmit")
     index: Number = number(default=1.5, doc="index of the coat over the outside's", low=1.0, high=3.0)
     alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
