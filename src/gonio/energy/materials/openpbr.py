@@ -55,6 +55,7 @@ from ...optics.fresnel.schlick import schlick
 from ...optics.ndf import distribution
 from ...optics.special import gauss
 from ...optics.warp import square_to_cosine_hemisphere
+from ..compensation.curves import widths_along
 from ..compensation.glass import Glass
 from ..compensation.lobe import NOTHING, MissingEnergy
 from ..compensation.missing import missing_energy
@@ -458,7 +459,7 @@ class OpenPBR(BSDF):
         shares = tables.spared_on_average(rough, eta, self._masking)
         count = len(few)
         thin, dense = (
-            maximum(_over_pi(side.scale) + _sum([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
+            maximum(_over_pi(side.whole) + _sum([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
             for side, part in ((glass.thin, shares[:count]), (glass.dense, shares[count:]))
         )
         enters = (1.0 - reflected) / (thin + dense)
@@ -565,15 +566,11 @@ class OpenPBR(BSDF):
         return f + rest * f * t, rest
 
     def _let_in(self, w: Direction) -> Spectrum:
-        """1 - E of the base's dielectric surface; of two widths that of the one seen along w."""
+        """1 - E of the base's dielectric surface; of two widths that of the one that stands for them along w."""
         b = self.derived
         rough = b.rough
         if self._two_widths:
-            along2, across2 = sqr(b.alpha.x * w.x), sqr(b.alpha.y * w.y)
-            sin2 = frame.sin2(w)
-            turned = sin2 > 1e-12
-            seen2 = where(turned, (along2 + across2) / maximum(sin2, 1e-12), sqr(b.alpha.x))
-            rough = where(turned, minimum(sqrt(sqrt(seen2)), 1.0), rough)
+            rough = sqrt(widths_along(w, b.alpha, sqrt(fresnel.r0_dielectric(b.ratio)))[0])
         return self._kept_below(w.z, rough, b.ratio, b.filmed)
 
     def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
