@@ -658,7 +658,7 @@ class OpenPBR(BSDF):
         facets = (1.0 - C) + tint * (facet_o * facet_i * C)
         both = 1.0 / self.derived.joint
         for kept, less, let in ((kept_o, less_o, let_in[0]), (kept_i, less_i, let_in[1])):
-            both = both * (kept + less * (1.0 - let) / maximum(let, 1e-3))
+            both = both * _covered_less(kept, less, let)
         if self._bends:
             for w in (pair.wo, pair.wi):
                 both = both * (self._even(w, True) / self._even(w, False))
@@ -669,8 +669,10 @@ class OpenPBR(BSDF):
         """What coat and fuzz leave of light that passes them once, on its way in or out."""
         left = 1.0 + 0.0 * self.base_color
         if self._has("coat_weight"):
-            kept, tint, _, _ = self._under(cos)
-            left = _mix(1.0, tint * kept, self.coat_weight) * left
+            kept, tint, _, less = self._under(cos)
+            b = self.derived
+            let_in = self._kept_below(cos, b.rough, b.ratio, b.filmed)
+            left = _mix(1.0, tint * _covered_less(kept, less, let_in), self.coat_weight) * left
         if self._has("fuzz_weight"):
             left = left * (1.0 - self.fuzz_weight * self._fuzz()._lobe(_at(cos)).R)
         return left
@@ -1102,6 +1104,11 @@ def _seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[
         one = share * schlick(half, r0)
         met, total = met + one * w, total + one
     return met / maximum(total, 1e-9)
+
+
+def _covered_less(kept: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
+    """What a coat leaves of light that facets let in: its own, and what they send out less than white ones."""
+    return kept + less * (1.0 - let_in) / maximum(let_in, 1e-3)
 
 
 def _covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
