@@ -37,7 +37,7 @@ def _row(roughness: Scalar) -> Scalar:
 
 def _root_of(eta: Scalar) -> Scalar:
     """Where an index stands in the tables: nodes get closer toward 1, where F changes fastest at grazing angles."""
-    return sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * LARGEST))
+    return sqrt(maximum(eta - 1.0, 1e-12) / ((eta + 1.0) * LARGEST))
 
 
 def _rows(count: int) -> np.ndarray:

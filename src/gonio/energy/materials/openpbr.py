@@ -1088,7 +1088,7 @@ def _mix(a: Array, b: Array, share: Scalar) -> Array:
 def _modulated(ratio: Scalar, weight: Scalar) -> Scalar:
     """The index whose F0 is that of `ratio` times a weight, held at index 5."""
     root = (ratio - 1.0) / (ratio + 1.0)
-    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-12)), LARGEST), root)
+    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), LARGEST), root)
     return (1.0 + epsilon) / (1.0 - epsilon)
 
 
