@@ -213,7 +213,7 @@ def furnace() -> None:
         found = []
         for roughness in (0.05, 0.2, 0.4, 0.7, 1.0):
             model = go.OpenPBR(base_color=1.0, specular_roughness=roughness, **values)
-            found.append(go.albedo(model, mu=FURNACE_MU, method="sampling", samples=1 << 16).value)
+            found.append(go.albedo(model, mu=FURNACE_MU, method="sampling", samples=1 << 18).value)
         print(f"{name:28} {np.min(found):.4f} {np.max(found):.4f}", flush=True)
 
 

@@ -86,7 +86,9 @@ def test_what_cannot_be_coated_is_one_clear_error(make: object, what: str) -> No
         make()  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("name", ["lambert", "eon", "gold, alpha .3", "gold, alpha .05"])
+@pytest.mark.parametrize(
+    "name", ["lambert", "eon", "gold, alpha .05", "gold, alpha .05; coloured", "gold, alpha .05; coat alpha .2"]
+)
 def test_its_albedo_is_that_of_a_random_walk_within_two_percent(name: str) -> None:
     coat = referee.cases()[name]
     for mu in (0.3, 0.95):

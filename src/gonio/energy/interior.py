@@ -4,36 +4,42 @@ Light that the base scatters along w leaves the coat by the share T(w) t(w), and
 t(w)^2, mirrored: T is the interface's transmittance from inside, t what is left of the light after one crossing. With B
 the base, all that leaves is the series B + B k B + B k B k B + ...
 
-Its sum is found for the *white* base (`BSDF.white`), averaged over azimuth, on 33 directions: rows of a matrix P are
-drawn by the base's own `sample`, k stands inside the sum, and X = (1 - P)^-1 E1 solves the series, E1 being what leaves
-after the first bounce. A smooth interface sends light in along one direction; of a rough one, glass whose lost light
-Kulla and Conty give back, samples say where light goes in and how much comes out. What leaves, B(o), is then shared
-between two terms whose sum is exactly that:
+Its sum is found on 33 directions, averaged over azimuth: rows of a matrix P are drawn by the `sample` of the base's
+white twin (`BSDF.white`), k stands inside the sum, and X = (1 - P)^-1 E1 solves the series, E1 being what leaves after
+the first bounce. A smooth interface sends light in along one direction; of a rough one, glass whose lost light Kulla
+and Conty give back, samples say where light goes in and how much comes out.
 
-    lobe       the base's own, refracted: as much of it as fits under B at every o. Over Lambert that is all there is
-               (Saunderson1942), and nearly all of a narrow lobe under a smooth coat
-    rest(o)    what is left, as a separable lobe rest(o) rest(i), reciprocal like Kulla-Conty's
+A base's own Fresnel reflectance is known for its channels, by what each makes of the white twin's draws when every
+share of light is 1; of any other colour it is taken between theirs, and black's and white's. So the series holds for
+every channel of a metal, with the rise of its reflectance where light grazes, and for any colour over which the rest
+of the base varies.
 
-Light returns to the base several times, so a colour a of the base enters the lobe as a / (1 - a k), and the rest as
-phi(a) = a (1 - b) + b a^2 (1 - p) / (1 - a p), which is 1 at a = 1: b of it bounces twice at least, and p is found from
-the series of a grey base.
+What leaves, B(o), is then shared between two terms whose sum is exactly that:
+
+    lobe         the base's own, refracted, times a factor: as much of it as fits under B at every o. Over Lambert that
+                 is all there is (Saunderson1942), and nearly all of a narrow lobe under a smooth coat
+    rest(o)      what is left, as a separable lobe rest(o) rest(i) / norm, reciprocal like Kulla-Conty's
+
+Both are tables over the colour a and over u, what one crossing straight down leaves.
 """
 
 from __future__ import annotations
 
-import math
+import functools
 from collections import OrderedDict
 from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import ops
 from ..errors import InputError
 from ..models import BSDF, guide_search, tree
 from ..models.dielectric import Dielectric
 from ..models.microfacet import SMOOTH
 from ..models.parameters import pair_of
-from ..ops import Table, backend
+from ..ops import Direction, Spectrum, Table, backend
+from ..ops.backend import Array
 from .albedo.directional import albedo
 from .materials.kulla_conty import KullaConty
 
@@ -43,24 +49,36 @@ HALF = 16  # steps of the directions that leave, and of those that cannot
 POINTS = 1 << 13  # directions drawn at each node
 NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R bends like it at grazing angles
 ROUGH = 33  # of those at which a rough interface is drawn from
-LEFT = (0.1, 0.4, 0.7, 0.9, 1.0)  # of the light after one crossing: a polynomial through these
+COLOURS, LEFT = 13, 13  # steps of the colour and of what one crossing leaves, see `colour_place` and `left_place`
+LEAST_LEFT = 0.03  # of the light after a crossing, the first step of that
 KEPT = 32  # accounts in memory
 LEAST = 1e-9
 
 
 class Account(NamedTuple):
-    """What a coat must know of its inside, as tables. A polynomial has coefficients of 1 to u^4, u being what one
-    crossing leaves straight down: it holds for every channel of a colour.
+    """What a coat must know of its inside, as tables.
 
-    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's light that is
-           reflected totally, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
-    rest   likewise: the separable lobe, a polynomial in u^4, then its b and p, parabolas in u
-    again  one texel: k, b, p and the lobe's factor, polynomials
+    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's samples that a
+           cosine should replace, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
+    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None where there is none
+    again  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
     """
 
     coat: Table
-    rest: Table
+    rest: Table | None
     again: Table
+
+
+def colour_place(a: Array) -> Array:
+    """Where a colour stands on the tables' axis: in a / (2 - a) a series 1 / (1 - a k) is nearly straight, of k = 1 / 2
+    exactly."""
+    return a / (2.0 - a)
+
+
+def left_place(u: Array) -> Array:
+    """Where what one crossing leaves stands: closer near 1, where light that bounces often fades at once. 1 is the last
+    node but one, so that a clear coat has a derivative by its absorption."""
+    return u / (3.0 - 2.0 * u) * ((LEFT - 2.0) / (LEFT - 1.0))
 
 
 class Coated(Protocol):
@@ -80,7 +98,7 @@ def account_of(coat: BSDF) -> Account:
     """The account of a coat as it was made, found once and kept; InputError while Dr.Jit records a loop."""
     own = vars(coat).get("_account")
     if own is None:
-        key = tree.replace(guide_search.plain_values(coat.white()), {"depth": 1.0})  # the rest changes no table
+        key = _bright(guide_search.plain_values(coat))
         if key not in _kept:
             if backend.drjit().flag(backend.drjit().JitFlag.SymbolicScope):
                 what = f"what lies under {type(coat).__name__} cannot be found inside a loop"
@@ -93,33 +111,54 @@ def account_of(coat: BSDF) -> Account:
     return found
 
 
+def _bright(coat: BSDF) -> BSDF:
+    """The coat without what changes no table: its own colour, and every share of light in the base, which is 1."""
+    values: dict[str, object] = {"absorption": 0.0, "depth": 1.0, "bounces": "coloured"}
+    for leaf in tree.leaves(coat):
+        if leaf.parameter.numeric and leaf.parameter.white is not None and leaf.value is not None:
+            values[leaf.path] = leaf.parameter.white
+    return tree.replace(coat, values)
+
+
+def colour_of(base: BSDF, up: Direction) -> Spectrum:
+    """a: the tint of a bound base seen straight down, over that of its white twin; of a base that is its own white twin
+    over its brightest channel."""
+    tint = base.tint(up)
+    white = base.white()
+    if white is base:
+        return ops.safe_div(tint, functools.reduce(ops.maximum, ops.channels(tint)))
+    return ops.safe_div(tint, white.tint(up))
+
+
+def _colours(base: BSDF) -> Floats:
+    """The same as three numbers."""
+    kind = backend.types("float64")
+    up = ops.vec3(kind.float(0.0), kind.float(0.0), kind.float(1.0))
+    return backend.to_numpy(kind.vec3(1.0) * colour_of(base.bind(kind), up), 1)[0]
+
+
 def find(coat: Coated) -> Account:
-    """The account of a white coat, one value each."""
+    """The account of a coat whose shares of light are 1, one value each."""
     index = float(coat.index)  # type: ignore[arg-type]
     outside = np.linspace(0.0, 1.0, NODES) ** 2
     face = _interface(coat, index)
     if coat.base.delta == "always":
         columns = [face.reflected(outside), 0.0 * outside, 1.0 - face.reflected(outside), face.beyond(outside)]
-        count = len(LEFT)
-        none = Table("coat_rest", np.zeros((NODES, count + 6)))
-        return Account(Table("coat", np.stack(columns, -1)), none, Table("coat_again", np.zeros((1, 4 * count))))
+        once = Table("coat_again", np.array([1.0, 0.0]).reshape(1, 1, 2))
+        return Account(Table("coat", np.stack(columns, -1)), None, once)
     seen = _drawn(coat.base, index)
     totally = (seen.weight * (seen.position <= 0.0)).sum(1) / np.maximum(seen.weight.sum(1), LEAST)
-    sums = [_series(seen, u, face, index) for u in LEFT]
-    columns = [
-        face.reflected(outside),
-        np.interp(outside, seen.place, totally),
-        face.lobe(outside),
-        face.beyond(outside),
-    ]
-    some = [1, 3, 4]  # of `LEFT`: a parabola in u
-    powers = np.array(LEFT)[some][:, None] ** np.arange(3)
-    bounces = np.tensordot(np.linalg.inv(powers), np.array([sums[n].bounces for n in some]), 1)
-    bounces = np.moveaxis(bounces, 0, -1).reshape(NODES, 6)
-    rest = np.concatenate([_positive(np.array([one.rest for one in sums])), bounces], axis=-1)
-    again = _polynomial(np.array([[one.k, *one.mean, one.lobe] for one in sums]))
+    t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
+    colours = np.maximum(2.0 * t / (1.0 + t), 1e-4)
+    sums = [_series(seen, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), LEAST_LEFT)]
+    rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
+    # what is sampled by a cosine: what the base's own samples lose totally, and the rest
+    share = np.maximum(1.7 * np.interp(np.sqrt(outside), seen.place, totally), 0.7 * sums[-1].share)
+    columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
     return Account(
-        Table("coat", np.stack(columns, -1)), Table("coat_rest", rest), Table("coat_again", again.reshape(1, -1))
+        Table("coat", np.stack(columns, -1)),
+        Table("coat_rest", rest[..., None]) if rest.any() else None,
+        Table("coat_again", np.stack([over_factor, norm], -1)),
     )
 
 
@@ -131,19 +170,21 @@ class _Interface(NamedTuple):
     """The coat's surface.
 
     reflected  R seen from outside, by the cosine outside
-    out        T from inside, by the place (`_Seen.place`)
+    out        T from inside, by the place (`_places`)
     beyond     square root, normalized, of what R is beyond the facets' first reflection
     entering   None of a smooth one; else, for `ROUGH` places outside, weights, cosines and places of draws inside
+    returning  likewise for the places inside: where it sends back what does not leave
     """
 
     reflected: _Curve
     out: _Curve
     beyond: _Curve
     entering: tuple[Floats, Floats, Floats] | None
+    returning: tuple[Floats, Floats, Floats] | None
 
     def lobe(self, x: Floats) -> Floats:
         """The crossing that the base's lobe makes at each end: a narrow one makes T(o) going in and T(i) coming out."""
-        found: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.maximum(x, LEAST)))
+        found: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, LEAST))))
         return found
 
 
@@ -160,7 +201,9 @@ def _interface(coat: Coated, index: float) -> _Interface:
             found: Floats = 0.5 * (r_s**2 + r_p**2)
             return found
 
-        return _Interface(fresnel, lambda p: np.where(p > 0.0, 1.0 - fresnel(p), 0.0), lambda x: 0.0 * x, None)
+        return _Interface(
+            fresnel, lambda p: np.where(p > 0.0, 1.0 - fresnel(p * p), 0.0), lambda x: 0.0 * x, None, None
+        )
     surface = KullaConty(glass)
     root = np.linspace(0.0, 1.0, ROUGH)
     lattice = _lattice(POINTS)
@@ -175,7 +218,10 @@ def _interface(coat: Coated, index: float) -> _Interface:
     place, mu = _places(index)
     down = surface.sample(-_directions(mu, lattice), np.tile(lattice[:, :3], (len(mu), 1)), "importance", "float64")
     weight = np.where(down.pdf > 0.0, down.weight.mean(1), 0.0).reshape(len(mu), POINTS)
-    leaves = (weight * (down.wi[:, 2] > 0.0).reshape(len(mu), POINTS)).sum(1) / weight.sum(1)
+    weight /= weight.sum(1, keepdims=True)
+    cosine = down.wi[:, 2].reshape(len(mu), POINTS)
+    leaves = (weight * (cosine > 0.0)).sum(1)
+    stays, again = np.where(cosine < 0.0, weight, 0.0), np.clip(-cosine, 1e-4, 1.0)
     # R is that of one reflection, by quadrature, and what is beyond it
     single = tree.replace(glass, {"transmission": False})
     angles = (0.0,) if x_width == y_width else (0.0, 0.25 * np.pi, 0.5 * np.pi)
@@ -189,6 +235,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
         lambda p: np.interp(p, place, leaves),
         lambda cos: np.interp(np.sqrt(cos), fine, more * scale),
         (goes_in, inside, _place_of(inside, index)),
+        (stays, again, _place_of(again, index)),
     )
 
 
@@ -204,10 +251,11 @@ def _directions(mu: Floats, lattice: Floats) -> Floats:
 
 
 def _places(index: float) -> tuple[Floats, Floats]:
-    """(places, cosines inside) of the nodes: the cosine outside where light leaves, -1 to 0 where it cannot."""
+    """(places, cosines inside) of the nodes: 0 to 1 the root of the cosine outside where light leaves, as what leaves
+    changes fast where it grazes; -1 to 0 where it cannot."""
     place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
-    mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**2) / index**2), critical * (1.0 + place))
+    mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
     return place, np.clip(mu, 1e-4, 1.0)
 
 
@@ -215,8 +263,9 @@ def _place_of(cosine: Floats, index: float) -> Floats:
     """The place of directions inside, by their cosines."""
     outside2 = 1.0 - index**2 * (1.0 - cosine**2)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
-    place = np.where(outside2 > 0.0, np.sqrt(np.maximum(outside2, 0.0)), cosine / max(critical, LEAST) - 1.0)
-    return np.clip(place, -1.0, 1.0)
+    beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, LEAST), 0.0))
+    found: Floats = np.clip(np.where(outside2 > 0.0, np.maximum(outside2, 0.0) ** 0.25, beyond), -1.0, 1.0)
+    return found
 
 
 class _Seen(NamedTuple):
@@ -225,6 +274,7 @@ class _Seen(NamedTuple):
     place, mu           of the nodes
     weight              of each draw at each node (nodes, POINTS)
     cosine, position    of the directions drawn, and their places
+    colours, share      of black, the base's channels and white, rising; by what each multiplies a draw of the others
     """
 
     place: Floats
@@ -232,105 +282,115 @@ class _Seen(NamedTuple):
     weight: Floats
     cosine: Floats
     position: Floats
+    colours: Floats
+    share: Floats
 
 
-def _drawn(white: BSDF, index: float) -> _Seen:
-    """Draws of the base's own sampling from the nodes, over all azimuths."""
+def _drawn(base: BSDF, index: float) -> _Seen:
+    """Draws of the white base's own sampling from the nodes, over all azimuths. Of a base that is its own white twin
+    the brightest channel is met."""
+    white = base.white()
     place, mu = _places(index)
     lattice = _lattice(POINTS)
-    drawn = white.sample(_directions(mu, lattice), np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
-    weight = np.where(drawn.pdf > 0.0, drawn.weight.mean(1), 0.0).reshape(len(mu), POINTS) / POINTS
+    wo = _directions(mu, lattice)
+    drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
+    channels = drawn.weight
+    colours, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
+    tints = _colours(base)
+    if white is base:
+        channels = channels[:, np.argmax(tints)][:, None]
+    else:
+        own, full = (np.asarray(one.eval(wo, drawn.wi, precision="float64"), float) for one in (base, white))
+        known, first = np.unique(np.round(tints, 3), return_index=True)
+        known, first = known[known < 1.0], first[known < 1.0]
+        ratio = np.where(full > 0.0, own / np.where(full > 0.0, full, 1.0), tints)[:, first].T
+        colours = np.concatenate([[0.0], known, [1.0]])
+        share = np.concatenate([share[:1], np.clip(ratio, 0.0, 1.0), share[1:]])
+    weight = np.where(drawn.pdf > 0.0, channels.mean(1), 0.0).reshape(len(mu), POINTS) / POINTS
     weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # a base that gains light would do so without end
     cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
-    return _Seen(place, mu, weight, cosine, _place_of(cosine, index))
+    share = share.reshape(-1, len(mu), POINTS)
+    return _Seen(place, mu, weight, cosine, _place_of(cosine, index), colours, share)
 
 
 class _Sum(NamedTuple):
-    """The series at one u: see `Account`; the rest, and its (b, p), at the tables' nodes."""
+    """The series at one u, for each colour: see `Account`; and the share of the rest in what leaves a white base."""
 
-    k: float
-    mean: tuple[float, float]
-    lobe: float
     rest: Floats
-    bounces: Floats
+    over_factor: Floats
+    norm: Floats
+    share: Floats
 
 
-def _series(seen: _Seen, u: float, face: _Interface, index: float) -> _Sum:
+def _series(seen: _Seen, colours: Floats, u: float, face: _Interface, index: float) -> _Sum:
     """The series, summed and shared out."""
     n = len(seen.place)
     out, t = face.out(seen.position), u ** (1.0 / seen.cosine)
     out = np.where((seen.position <= 0.0) & (face.entering is None), 0.0, out)
-    down = seen.weight * (1.0 - out) * t**2
-    first = (seen.weight * out * t).sum(1)
-    scaled = (seen.position + 1.0) * HALF
-    cell = np.minimum(scaled, n - 1 - LEAST).astype(int)
-    part, row = scaled - cell, np.arange(n)[:, None] * n
-    P = np.bincount((row + cell).ravel(), (down * (1.0 - part)).ravel(), n * n)
-    P += np.bincount((row + cell + 1).ravel(), (down * part).ravel(), n * n)
-    # a perfect mirror keeps forever what it reflects totally, though nothing gets there
-    every, half = (a * np.linalg.solve(np.eye(n) - a * P.reshape(n, n) * (1.0 - LEAST), first) for a in (1.0, GREY))
-
-    # what leaves in all, of a grey base, and after one bounce, by the cosine outside
     x = np.linspace(0.0, 1.0, NODES) ** 2
-    through = u ** (1.0 / np.interp(x, seen.place, seen.mu))
+    root = np.sqrt(x)
+    through = u ** (1.0 / np.interp(root, seen.place, seen.mu))
+    crossing = np.where(seen.position > 0.0, face.lobe(np.maximum(seen.position, 0.0) ** 2), 0.0)
+    back = None
+    if face.returning is not None:
+        weight, cosine, place = face.returning
+        back = _onto(weight * u ** (1.0 / cosine), place, n)
+    kinds = []
+    for share in seen.share[1:]:  # of black nothing comes
+        weight = seen.weight * share
+        # a smooth interface sends light back as a mirror does
+        P = (
+            _onto(weight * (1.0 - out) * t**2, seen.position, n)
+            if back is None
+            else _onto(weight * t, seen.position, n) @ back
+        )
+        lobe = face.lobe(x) * through * np.interp(root, seen.place, (weight * crossing * t).sum(1))
+        kinds.append((P, (weight * out * t).sum(1), lobe))
     if face.entering is None:
-        kinds = [(1.0 - face.reflected(x)) * through * np.interp(x, seen.place, v) for v in (every, half, first)]
+        enters = _at_nodes(root, seen.place) * ((1.0 - face.reflected(x)) * through)[:, None]
     else:
         weight, cosine, place = face.entering
-        left = weight * u ** (1.0 / cosine)
-        drawn = [(left * np.interp(place, seen.place, v)).sum(1) for v in (every, half, first)]
-        kinds = [np.interp(np.sqrt(x), np.linspace(0.0, 1.0, ROUGH), one) for one in drawn]
-    leaves, grey, once = kinds
-
-    # the base's own lobe, refracted
-    open_ = np.maximum(seen.position, 0.0)
-    lobe = (seen.weight * np.where(seen.position > 0.0, face.lobe(open_), 0.0) * t).sum(1)
-    lobe = face.lobe(x) * through * np.interp(x, seen.place, lobe)
-    judged = (x > 1e-3) & (lobe > 1e-6)  # at the horizon both vanish
-    factor = float(np.min((leaves / np.maximum(lobe, LEAST))[judged], initial=1e3))
-    lone = min(float(np.min((once / np.maximum(lobe, LEAST))[judged], initial=1.0 + 1e3)), factor)  # of a smooth coat 1
-    k = 1.0 - lone / max(factor, LEAST)
-    rest = np.maximum(leaves - factor * lobe, 0.0)
-    root = np.linspace(0.0, 1.0, NODES)
+        rows = _onto(weight * u ** (1.0 / cosine), place, n)
+        enters = _at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ rows
     area = np.gradient(root) * 2.0 * root**3  # x dx
-    norm = 2.0 * np.pi * float(area @ rest)
-    if norm < 1e-7:
-        return _Sum(k, (0.0, 0.0), lone, 0.0 * rest, np.zeros((NODES, 2)))
-    left_grey = np.maximum(grey - lone * lobe * GREY / (1.0 - GREY * k), 0.0)
-    blurred = np.maximum(once - lone * lobe, 0.0)
-    mean = _bounces(area @ rest, area @ left_grey, area @ blurred)
-    each = _bounces(np.maximum(rest, 1e-6), left_grey, blurred)
-    return _Sum(k, (float(mean[0]), float(mean[1])), lone, rest / np.sqrt(norm), np.stack(each, -1))
+    judged = x > 1e-3  # at the horizon both vanish
+    rests, factors, norms, share = [], [], [], 0.0 * x
+    for a in colours:
+        mixed = [float(np.interp(a, seen.colours, one)) for one in np.eye(len(seen.colours))[1:]]
+        P, first, lobe = (
+            sum(m * one for m, one in zip(mixed, parts, strict=True)) for parts in zip(*kinds, strict=True)
+        )
+        # a perfect mirror keeps forever what it reflects totally, though nothing gets there
+        leaves = enters @ np.linalg.solve(np.eye(n) - P * (1.0 - LEAST), first)
+        some = judged & (lobe > 1e-6 * a)
+        factor = float(np.min((leaves / np.maximum(lobe, LEAST * a))[some], initial=1e3))
+        rest = np.maximum(leaves - factor * lobe, 0.0)
+        share = rest / np.maximum(leaves, LEAST)
+        rest = rest / (a * u * u)
+        norm = 2.0 * np.pi * float(area @ rest)
+        some_rest = norm > 1e-7  # less is roundings
+        rests.append(rest * some_rest)
+        factors.append(1.0 / factor)
+        norms.append(norm * some_rest)
+    return _Sum(np.stack(rests, -1), np.array(factors), np.array(norms), share)
 
 
-GREY = 0.8  # the albedo at which colours are met
+def _continued(values: list[Floats]) -> Floats:
+    """Values at each u, last, and one more, in a straight line."""
+    return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
 
 
-def _bounces(rest: Floats, grey: Floats, once: Floats) -> tuple[Floats, Floats]:
-    """(b, p) of the rest, from its value at a = 1, at `GREY`, and what of it bounced once."""
-    b = 1.0 - np.clip(once / rest, 0.0, 1.0)
-    ratio = np.clip((grey / rest - GREY * (1.0 - b)) / np.maximum(b * GREY**2, 1e-3), 0.02, 1.0)
-    return b, np.clip((1.0 - ratio) / (1.0 - GREY * ratio), 0.0, 0.99)
+def _onto(weight: Floats, position: Floats, n: int) -> Floats:
+    """Draws of each row shared out among the nodes on both sides of their places -1 to 1, (rows, n)."""
+    scaled = (position + 1.0) * (0.5 * (n - 1))
+    cell = np.minimum(scaled, n - 1 - LEAST).astype(int)
+    part, row = scaled - cell, np.arange(len(weight))[:, None] * n
+    size = n * len(weight)
+    found = np.bincount((row + cell).ravel(), (weight * (1.0 - part)).ravel(), size)
+    found += np.bincount((row + cell + 1).ravel(), (weight * part).ravel(), size)
+    return np.asarray(found, float).reshape(len(weight), n)
 
 
-def _positive(values: Floats) -> Floats:
-    """As `_polynomial`, in u^4, as light that bounces often fades fast with u, and by Bernstein's polynomials with no
-    coefficient below 0: no light is negative between the nodes."""
-    degree, u = len(LEFT) - 1, np.array(LEFT) ** 4
-    n = np.arange(degree + 1)
-    basis = u[:, None] ** n * (1.0 - u[:, None]) ** (degree - n)
-    sure = np.where(u == 1.0, 1e3, 1.0)  # without absorption nothing may be lost
-    from scipy.optimize import nnls  # late: a picture whose tables are there shall not wait for it
-
-    weights = np.array([nnls(basis * sure[:, None], column * sure)[0] for column in values.T])
-    to_powers = np.zeros((degree + 1, degree + 1))
-    for k in range(degree + 1):
-        for j in range(degree - k + 1):
-            to_powers[k, k + j] = (-1) ** j * math.comb(degree - k, j)
-    return weights @ to_powers
-
-
-def _polynomial(values: Floats) -> Floats:
-    """Coefficients of 1 to u^4, last, through values at `LEFT`, first."""
-    powers = np.array(LEFT)[:, None] ** np.arange(len(LEFT))
-    return np.moveaxis(np.tensordot(np.linalg.inv(powers), values, 1), 0, -1)
+def _at_nodes(x: Floats, nodes: Floats) -> Floats:
+    """The matrix that interpolates linearly between values at nodes."""
+    return np.stack([np.interp(x, nodes, one) for one in np.eye(len(nodes))], -1)

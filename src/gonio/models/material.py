@@ -238,6 +238,12 @@ class BSDF(Material):
         return all(_alike(*pair_of(leaf.value)) for leaf in tree.leaves(self.plain) if leaf.parameter.kind == "alpha")
 
     @property
+    def leans(self) -> bool:
+        """Whether its normal, or that of an inner material, may be another than the surface's own: it has no mirror of
+        the surface's then."""
+        return any(inner.leans for inner in tree.children(self).values())
+
+    @property
     def two_sided(self) -> bool:
         """Whether a surface that does not transmit looks from below as from above."""
         return False

@@ -140,7 +140,7 @@ class NormalMap(BSDF):
     def leans(self) -> bool:
         """Whether its normal is another than the surface's, as far as plain numbers tell."""
         values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
-        return not all(isinstance(value, int | float) and value == 0 for value in values)
+        return self.base.leans or not all(isinstance(value, int | float) and value == 0 for value in values)
 
     @property
     def transmits(self) -> bool:

@@ -67,7 +67,7 @@ class Subject:
     @property
     def leans(self) -> bool:
         """Whether its mirror is another than the surface."""
-        return bool(getattr(self.model, "leans", False))
+        return self.model.leans
 
     @property
     def stochastic(self) -> bool:

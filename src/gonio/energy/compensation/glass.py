@@ -7,6 +7,9 @@ From side a a share T_a of what is missing goes to side b, the rest back to a (p
 so that a's albedo is made whole whatever T_a is. Reciprocity, f_ab / n_b^2 = f_ba / n_a^2, asks for
 T_a / (n_b^2 M_avg,b) = T_b / (n_a^2 M_avg,a). As (1 - F_avg,a) n_a^2 = (1 - F_avg,b) n_b^2, it is met by
 T_a = (1 - F_avg,a) M_avg,b / (M_avg,a + M_avg,b)  (Kulla2017, p. 30).
+
+Of two widths M is that of one which changes with the direction (`curves.widths_along`); the lobe is sampled as that of
+their mean.
 """
 
 from __future__ import annotations
@@ -15,25 +18,53 @@ from typing import NamedTuple
 
 from ...models import BSDF, Microsurface
 from ...models.microfacet import widths
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, inset, inv_pi, lookup, maximum, sqr, sqrt, vec3, where
+from ...ops import (
+    Direction,
+    Mask,
+    Mode,
+    Pair,
+    Scalar,
+    Spectrum,
+    abs,
+    inset,
+    inv_pi,
+    lookup,
+    maximum,
+    minimum,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
 from ...ops.backend import Array
+from ...optics import frame
 from ..bend import form_of, knee
 from . import curves, lobe
+from .reflecting import has_two_widths
 
 
 class Side(NamedTuple):
     """One side of the surface.
 
-    c         coefficients of M
+    c         coefficients of M; of two widths, at their mean
     bend      the cosine about which masking sets in
-    scale     1 / (pi M_avg), 0 where nothing is missing
+    scale     1 / (pi M_avg) of that, 0 where nothing is missing
+    whole     1 / (pi M_avg) of M itself; the same with one width
     through   T, the share of what is missing here that goes to the other side
     """
 
     c: tuple[Scalar, ...]
     bend: Scalar
     scale: Scalar
+    whole: Scalar
     through: Scalar
+
+
+class TwoWidths(NamedTuple):
+    """Two widths, and the base's rotation."""
+
+    alpha: Pair
+    rotation: Pair | None
 
 
 class Glass(NamedTuple):
@@ -44,6 +75,7 @@ class Glass(NamedTuple):
     place    where the tables of the lobes' inverses are read: index, width
     inside   index inside over index outside
     names    ndf, masking and Fresnel
+    two      of two widths that differ
     """
 
     thin: Side
@@ -53,6 +85,7 @@ class Glass(NamedTuple):
     place: tuple[Scalar, Scalar]
     inside: Scalar
     names: tuple[str, str, str]
+    two: TwoWidths | None
 
     @property
     def factor(self) -> float:
@@ -65,15 +98,30 @@ class Glass(NamedTuple):
 
     def at(self, w: Direction) -> Scalar:
         """M at a direction, from its own side."""
-        ndf, masking, _ = self.names
-        of_sides = []
-        for name, side in zip(curves.SIDES, (self.thin, self.dense), strict=True):
-            form = form_of(ndf, masking, name)
-            of_sides.append(curves.missing(form, side.c, side.bend, abs(w.z)))
+        if self.two is None:
+            return self.of_mean_width(w)
+        eta = maximum(self.inside, 1.0 / self.inside)
+        width = curves.widths_along(frame.rotate(w, self.two.rotation), self.two.alpha, (eta - 1.0) / (eta + 1.0))
+        tables = curves.glass(*self.names)
+        found, bends = [], []
+        for name, one in zip(curves.SIDES, width, strict=True):
+            found.append(lookup(tables[name], self.place[0], inset(sqrt(one), curves.GLASS_ROWS))[:-1])
+            bends.append(knee(form_of(*self.names[:2], name), self.names[1], one))
+        return self._missing(w, found, bends)
+
+    def of_mean_width(self, w: Direction) -> Scalar:
+        """M of the width that stands for both: what is sampled."""
+        return self._missing(w, [self.thin.c, self.dense.c], [self.thin.bend, self.dense.bend])
+
+    def _missing(self, w: Direction, coefficients: list[tuple[Scalar, ...]], bends: list[Scalar]) -> Scalar:
+        of_sides = [
+            curves.missing(form_of(*self.names[:2], name), c, bend, abs(w.z))
+            for name, c, bend in zip(curves.SIDES, coefficients, bends, strict=True)
+        ]
         return where(self.is_thin(w), of_sides[0], of_sides[1])
 
     def over_average(self, w: Direction) -> Scalar:
-        return where(self.is_thin(w), self.thin.scale, self.dense.scale)
+        return where(self.is_thin(w), self.thin.whole, self.dense.whole)
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
         """1 - T of wo's side in reflection, T in transmission; nothing leaves along the surface."""
@@ -91,11 +139,12 @@ class Glass(NamedTuple):
         return where(wo.z * wi.z > 0.0, 1.0, 1.0 / sqr(self.eta(wo, wi)))
 
     def given(self, wo: Direction) -> Scalar:
-        return where(self.thin.scale > 0.0, self.at(wo), 0.0)
+        return where(self.thin.scale > 0.0, self.of_mean_width(wo), 0.0)
 
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """M(mu_i) mu_i / (pi M_avg) of wi's side, times the share of that side."""
-        return self.at(wi) * abs(wi.z) * self.over_average(wi) * self.share(wo, wi)
+        """M(mu_i) mu_i / (pi M_avg) of wi's side and the mean width, times the share of that side."""
+        scale = where(self.is_thin(wi), self.thin.scale, self.dense.scale)
+        return self.of_mean_width(wi) * abs(wi.z) * scale * self.share(wo, wi)
 
     def sample(self, wo: Direction, u: Direction) -> Direction:
         """A side by u1, then a direction of that density."""
@@ -119,7 +168,8 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     assert index is not None, "what transmits has an index"
     names = surface.ndf, surface.masking, surface.fresnel
     alpha, _ = widths(surface.alpha)
-    width = sqrt(alpha.x * alpha.y)
+    two = has_two_widths(base.plain)
+    width = sqrt(0.5 * (sqr(alpha.x) + sqr(alpha.y))) if two else alpha.x
     eta = maximum(index, 1.0 / index)
     place = (
         inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.LARGEST_ROOT)), curves.GLASS_ETAS),
@@ -127,23 +177,28 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     )
     tables = curves.glass(*names)
     thin, dense = (lookup(tables[side], *place) for side in curves.SIDES)
-    m_thin, m_dense = maximum(thin[-1], 0.0), maximum(dense[-1], 0.0)
+    m_thin, m_dense = mean_thin, mean_dense = maximum(thin[-1], 0.0), maximum(dense[-1], 0.0)
+    if two:
+        larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
+        aspect = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
+        m_thin, m_dense = (maximum(m, 0.0) for m in lookup(curves.glass_of_two(*names), place[0], *aspect))
     both = maximum(m_thin + m_dense, 2.0 * lobe.NOTHING)
     some = (m_thin > lobe.NOTHING) & (m_dense > lobe.NOTHING) & (abs(index - 1.0) > 1e-4)
     reflected: Array = base.mean_reflectance()  # a number, of glass
     enters = 1.0 - reflected
 
-    def side(name: str, found: tuple[Scalar, ...], average: Scalar, through: Scalar) -> Side:
+    def side(name: str, found: tuple[Scalar, ...], of_mean: Scalar, average: Scalar, through: Scalar) -> Side:
         bend = knee(form_of(*names[:2], name), surface.masking, width)
-        scale = where(some, inv_pi / maximum(average, lobe.NOTHING), 0.0)
-        return Side(found[:-1], bend, scale, through)
+        scale, whole = (where(some, inv_pi / maximum(m, lobe.NOTHING), 0.0) for m in (of_mean, average))
+        return Side(found[:-1], bend, scale, whole, through)
 
     return Glass(
-        thin=side("thin", thin, m_thin, enters * m_dense / both),
-        dense=side("dense", dense, m_dense, enters / sqr(eta) * m_thin / both),
+        thin=side("thin", thin, mean_thin, m_thin, enters * m_dense / both),
+        dense=side("dense", dense, mean_dense, m_dense, enters / sqr(eta) * m_thin / both),
         average=0.5 * (m_thin + m_dense),
         F_avg=surface.albedo,
         place=place,
         inside=index,
         names=names,
+        two=TwoWidths(alpha, surface.rotation) if two else None,
     )

@@ -24,7 +24,7 @@ from .kulla_conty import KullaConty
 
 SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror, whatever it is
 LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
-INDICES, ROUGHNESSES, COSINES = 25, 33, 49
+INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # at grazing angles F is met to 2e-3 whatever the index, else to 5e-4
 DRAWS = 1 << 12  # of each direction
 HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
 NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means of what two layers let through: 1e-3 at F0 = .05
@@ -33,6 +33,11 @@ NODES = [float(x) for x in gauss(6)[0]]  # roots of cosines for means of what tw
 def _row(roughness: Scalar) -> Scalar:
     """Where a roughness stands on the tables' axes."""
     return maximum(roughness - SHARP, 0.0) * (1.0 / (1.0 - SHARP))
+
+
+def _root_of(eta: Scalar) -> Scalar:
+    """Where an index stands in the tables: nodes get closer toward 1, where F changes fastest at grazing angles."""
+    return sqrt(maximum(eta - 1.0, 1e-12) / ((eta + 1.0) * LARGEST))
 
 
 def _rows(count: int) -> np.ndarray:
@@ -44,17 +49,17 @@ def _rows(count: int) -> np.ndarray:
 def reflected(cos: Scalar, roughness: Scalar, index: Scalar, masking: str) -> Scalar:
     """E of GGX facets of a dielectric of an index of 1 to 5, what they reflect at once."""
     table = _albedos(masking)
-    f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
-    at = [inset(x, count) for x, count in zip((f0, _row(roughness), sqrt(maximum(cos, 0.0))), table.shape, strict=True)]
+    places = _root_of(index), _row(roughness), sqrt(maximum(cos, 0.0))
+    at = [inset(x, count) for x, count in zip(places, table.shape, strict=True)]
     return clamp(lookup(table, *at)[0], 0.0, 1.0)
 
 
 @lru_cache
 def _albedos(masking: str) -> Table:
-    """E over (root of F0, roughness, root of the cosine)."""
+    """E over (root of sqrt(F0), roughness, root of the cosine)."""
 
     def build() -> np.ndarray:
-        root = np.linspace(0.0, LARGEST, INDICES)[:, None, None]
+        root = np.linspace(0.0, 1.0, INDICES)[:, None, None] ** 2 * LARGEST
         alpha = _rows(ROUGHNESSES)[None, :, None] ** 2
         mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
         eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
@@ -67,8 +72,7 @@ def _albedos(masking: str) -> Table:
 def reflected_at_nodes(roughness: Scalar, index: Scalar, masking: str) -> tuple[Scalar, ...]:
     """`reflected` at the cosines of `HATS`, then at those of `NODES`: one look at a table instead of eighteen."""
     table = _at_nodes(masking).reflected
-    f0 = (index - 1.0) / (index + 1.0) * (1.0 / LARGEST)
-    return lookup(table, *[inset(x, n) for x, n in zip((f0, _row(roughness)), table.shape, strict=True)])
+    return lookup(table, *[inset(x, n) for x, n in zip((_root_of(index), _row(roughness)), table.shape, strict=True)])
 
 
 def scattered_at_nodes(roughness: Scalar, masking: str) -> list[tuple[Scalar, ...]]:
@@ -140,10 +144,19 @@ def _scattering(masking: str) -> Table:
 
 
 def _hats(x: np.ndarray) -> np.ndarray:
-    """Shares of places among the nodes on both sides of them, (N, HATS)."""
-    shares: np.ndarray = np.maximum(1.0 - np.abs(x[:, None] * (HATS - 1) - np.arange(HATS)), 0.0)
-    return shares
+    """By how much values at the nodes count at places between them, (N, HATS): cubic (Catmull and Rom), as of straight
+    lines what layers let through, which is bent, is too small in the mean; beyond the ends it goes straight on."""
+    d = np.abs(x[:, None] * (HATS - 1) - np.arange(-1, HATS + 1))
+    near, far = 1.0 + d * d * (1.5 * d - 2.5), 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)
+    found: np.ndarray = np.where(d < 1.0, near, np.where(d < 2.0, far, 0.0))
+    for ghost, end, next_one in ((0, 1, 2), (HATS + 1, HATS, HATS - 1)):
+        found[:, end] += 2.0 * found[:, ghost]
+        found[:, next_one] -= found[:, ghost]
+    return found[:, 1:-1]
 
+
+# means with the cosine of what is known at those nodes
+MEANS: list[float] = _hats(((np.arange(4096) + 0.5) / 4096) ** 0.25).mean(0).tolist()
 
 # --------------------------------------------------------------------------- any reflectance
 
@@ -215,11 +228,6 @@ def spared_on_average(roughness: Scalar, eta: Scalar, masking: str) -> tuple[Sca
     """The mean of `spared` with the cosine."""
     table = _spared(masking)[1]
     return lookup(table, *[inset(x, n) for x, n in zip((_root_of(eta), _row(roughness)), table.shape, strict=True)])
-
-
-def _root_of(eta: Scalar) -> Scalar:
-    """Where an index stands in the tables of `spared`, whose nodes get closer toward 1."""
-    return sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * LARGEST))
 
 
 @lru_cache

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Mapping
+from typing import ClassVar, Self
 
 from ... import ops
 from ...errors import InputError
 from ...models import (
     BSDF,
+    Breach,
     Colour,
     Number,
     Sample,
@@ -27,7 +29,7 @@ from ...models.material import Delta
 from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
 from ...optics import frame, fresnel
 from ...optics.warp import square_to_cosine_hemisphere
-from ..interior import Account, account_of
+from ..interior import Account, account_of, colour_of, colour_place, left_place
 
 BOUNCES = {
     "coloured": "the base's, once more with each bounce: deeper and darker than the base alone",
@@ -40,23 +42,29 @@ class Coat(BSDF):
     """A dielectric layer over a base: light is reflected at the top, or refracted, dimmed on its slant way through the
     layer, scattered by the base, and bounced between the two until it leaves.
 
-    f = f_top + T(o) T(i) t(o') t(i') / eta^2 [f_base(o', i') (1 + a k / (1 - a k)) + rest]
+    f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
 
     T = 1 - R is what the top lets through, o' and i' the refracted directions, t = exp(-absorption depth / cos) Beer's
-    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, and a
-    separable rest (`energy/interior.py` says how): over Lambert exact, over any base exact in albedo where nothing
-    is absorbed. a is the base's colour, its tint over that of its white twin. Reciprocal; white on white keeps all
-    light.
+    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, g of
+    it, and a separable rest (`energy/interior.py` says how): over Lambert exact, over a metal exact in albedo, channel
+    by channel. Reciprocal; white on white keeps all light.
 
-    With `bounces="white"` a = 1 in that series: what is seen is R, and 1 - R of the base's colour, neither darker nor
-    deeper.
+    With `bounces="white"` g and rest are a white base's: what is seen is R, and 1 - R of the base's colour, neither
+    darker nor deeper.
 
     The base stands in the coat: an index of its own is over the coat's. A rough top reflects as rough glass does, by an
-    albedo R; refracted light is not blurred. k and the rest are tables found when the material is first asked. Colours
-    of the base may vary over the surface, and so may the coat's own colour and depth, as the tables hold polynomials in
-    u = exp(-absorption depth); no other value may, and derivatives leave the change of the tables out.
+    albedo R; refracted light is not blurred. g and the rest are tables found when the material is first asked. Colours
+    of the base may vary over the surface, and so may the coat's own colour and depth, over which the tables run; no
+    other value may, and derivatives leave the change of the tables out.
     """
 
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "what a rough top reflects and lets through is met to so much, by draws of rough glass",
+            lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
+            certain=False,
+        ),
+    }
     base: BSDF = bsdf("the material under the coat; it must not transmit")
     index: Number = number(default=1.5, doc="index of the coat over the outside's", low=1.0, high=3.0)
     alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
@@ -145,39 +153,29 @@ class Coat(BSDF):
         """t: what a crossing along a direction inside leaves."""
         return exp(self.absorption * (-self.depth / maximum(inner.z, 1e-4)))
 
-    @function
-    def _rest(self, w: Direction, a: Spectrum) -> Spectrum:
-        """The separable lobe at a direction outside, over a base of colour a there."""
-        table = self._account.rest
-        at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
-        values, u = ops.lookup(table, at), self._crossed()
-        b, p = _polynomial(u, values[-6:-3]), _polynomial(u, values[-3:])
-        return _polynomial(sqr(sqr(u)), values[:-6]) * self._returned(a, b, p)
+    def _colour(self, w: Direction) -> Spectrum:
+        """a: what colours the base's light, with each bounce."""
+        white = 1.0 + 0.0 * self.absorption
+        up = ops.vec3(0.0 * w.z, 0.0 * w.z, 1.0 + 0.0 * w.z)
+        return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
 
-    def _again_by(self, a: Spectrum) -> Spectrum:
-        """By what a base of colour a multiplies light that it meets again."""
-        return 1.0 + 0.0 * a if self.bounces == "white" else a
-
-    def _returned(self, a: Spectrum, b: Spectrum, p: Spectrum) -> Spectrum:
-        """phi(a) = a (1 - b) + b a^2 (1 - p) / (1 - a p): what a colour a of the base leaves of the rest."""
-        if self.bounces == "white":
-            return a
-        return a * (1.0 - b + b * a * (1.0 - p) / (1.0 - a * p))
-
-    def _again(self, like: Direction) -> tuple[Spectrum, ...]:
-        """k, b and p of the rest, the lobe's factor."""
-        values = ops.fetch(self._account.again, 0.0 * like.z)
-        count, u = len(values) // 4, self._crossed()
-        return tuple(_polynomial(u, values[n * count : (n + 1) * count]) for n in range(4))
-
-    def _colour(self, inner: Direction) -> Spectrum:
-        """a: the base's colour along a direction inside, its tint over that of the white base; of a base that is its
-        own white twin, over the mean of its channels."""
-        tint = self.base.tint(inner) * (1.0 + 0.0 * self.absorption)
-        white = self.base.white()
-        if white is self.base:
-            return ops.safe_div(tint, mean(tint))
-        return ops.safe_div(tint, white.tint(inner) * (1.0 + 0.0 * self.absorption))
+    def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
+        """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
+        met = 1.0 + 0.0 * a if self.bounces == "white" else a
+        u = self._crossed() + 0.0 * a
+        account, ends = self._account, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
+        factors, rests = [], []
+        for colour, left in zip(ops.channels(colour_place(met)), ops.channels(left_place(u)), strict=True):
+            place = [ops.inset(x, n) for x, n in zip((colour, left), account.again.shape, strict=True)]
+            over_factor, norm = ops.lookup(account.again, *place)
+            factors.append(1.0 / over_factor)
+            if account.rest is not None:
+                at_o, at_i = (
+                    ops.lookup(account.rest, ops.inset(end, account.rest.shape[0]), *place)[0] for end in ends
+                )
+                rests.append(at_o * at_i * ops.safe_div(1.0, norm))
+        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else 0.0 * a
+        return ops.of_channels(a, factors), rest
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -187,20 +185,16 @@ class Coat(BSDF):
         above = (wo.z > 0.0) & (wi.z > 0.0)
         top = self._top.eval(wo, wi, mode) + self._at(wo)[3] * self._at(wi)[3] * wi.z
         o, i = self._inside(wo), self._inside(wi)
-        a_o, a_i = self._colour(o), self._colour(i)
-        a = 0.5 * (a_o + a_i)
-        k, b, p, factor = self._again(wo)
+        factor, rest = self._bounced_again(self._colour(wo), wo, wi)
         crossed = self._left(o) * self._left(i) * (self._through(wo) * self._through(wi) / sqr(self.index))
         lobe = self.base.eval(o, i, mode) * (wi.z / maximum(i.z, frame.TINY))
-        lobe = lobe * crossed * (factor / maximum(1.0 - self._again_by(a) * k, 0.01))
-        rest = self._rest(wo, a_o) * self._rest(wi, a_i) * (wi.z / maximum(self._returned(a, b, p), 1e-4))
-        return where(above, top + lobe + rest, 0.0)
+        return where(above, top + lobe * crossed * factor + rest * wi.z, 0.0)
 
     @function
     def _shares(self, wo: Direction) -> Pair:
-        """(probability of what is under the top, of a cosine among it): that finds what the base sends back totally,
-        whose samples fail."""
-        reflected, total, _, beyond = self._at(wo)
+        """(probability of what is under the top, of a cosine among it): that finds the separable lobe, and what the
+        base sends back totally, whose samples fail."""
+        reflected, even, _, beyond = self._at(wo)
         _, smooth = microfacet.widths(self.alpha)
         cos = ops.abs(wo.z)
         sharp = fresnel.kind("exact").dielectric(cos, fresnel.cos_transmitted(cos, self.index), self.index)
@@ -210,7 +204,7 @@ class Coat(BSDF):
         tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
         below = through * mean(self._left(inner) * tint) + 2.0 * beyond
         under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
-        cosine = 0.0 * total if self._mirror else clamp(1.7 * total, 0.05, 0.95)
+        cosine = 0.0 * even if self._mirror else even
         return ops.vec2(under, cosine)
 
     @method
@@ -265,7 +259,8 @@ class Coat(BSDF):
         """T^2 t^2 / (1 - a k) of a mirror, k = (1 - T) t^2."""
         through, left2 = self._through(wo), sqr(self._left(inner))
         k = (1.0 - through) * left2
-        return sqr(through) * left2 / (1.0 - k * self._again_by(self.base.tint(inner)))
+        tint = self.base.tint(inner)
+        return sqr(through) * left2 / (1.0 - (k if self.bounces == "white" else k * tint))
 
     def white(self) -> Self:
         """Over the white base, and without absorption."""
@@ -288,11 +283,3 @@ class Coat(BSDF):
     def delta(self) -> Delta:
         top = microfacet.delta_of(self.plain.alpha)
         return "always" if self._mirror else "never" if top == "never" else "maybe"
-
-
-def _polynomial(u: Spectrum, coefficients: tuple[Scalar, ...]) -> Spectrum:
-    """c_0 + c_1 u + c_2 u^2 + ..."""
-    value = 0.0 * u + coefficients[-1]
-    for c in reversed(coefficients[:-1]):
-        value = value * u + c
-    return value

@@ -43,9 +43,12 @@ def returned(lost: MissingEnergy, color: str) -> Spectrum:
 
 def _off(model: KullaConty) -> float:
     """How far a white furnace is off at most: measured over 21 indices from .2 to 5, eight widths and 18 views. Within
-    6 % of the same index on both sides the lobe is narrower than the table's steps."""
+    6 % of the same index on both sides the lobe is narrower than the table's steps. Glass of two widths is met by the
+    tables of one (`curves.widths_along`)."""
     if not model.base.transmits:
         return 0.008 if model.two_widths else 0.0
+    if model.two_widths:
+        return 0.15  # .02 seen from outside where one width is up to four times the other
     surface = model.base.microsurface
     near = (
         surface is not None
@@ -125,6 +128,8 @@ class KullaConty(_Compensated):
     @property
     def lossless(self) -> float:  # type: ignore[override]
         """What a white furnace may miss: the error of polynomials or of the measurement, see docs/energy.md."""
+        if self.base.transmits and self.two_widths:
+            return 0.2
         if self.base.transmits:
             return 0.015  # near eta = 1.02; 4e-3 from 1.1 on, 2e-3 from 1.3 on
         return 0.01 if self.two_widths else 1e-3

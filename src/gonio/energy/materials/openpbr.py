@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from ... import ops
 from ...errors import GonioWarning, InputError
 from ...models import BSDF, Breach, Colour, Number, Sample, binding, choice, flag, method, number, spectrum
-from ...models.conductor import Conductor
 from ...models.dielectric import Dielectric
-from ...models.eon import AVERAGE as MEAN_LOSS
-from ...models.eon import GRAZING as GRAZING_LOSS
 from ...models.eon import Eon
 from ...models.glossy import facet
 from ...models.material import Delta, Interior
 from ...models.microfacet import SMOOTH, upper
-from ...models.mix import ALMOST_ONE
 from ...models.sheen import Sheen
 from ...ops import (
     Direction,
@@ -37,9 +32,7 @@ from ...ops import (
     inv_pi,
     log,
     maximum,
-    mean,
     minimum,
-    safe_div,
     safe_sqrt,
     sqr,
     sqrt,
@@ -47,111 +40,26 @@ from ...ops import (
     vec3,
     where,
 )
-from ...ops.backend import Array
 from ...optics import frame, fresnel, masking
 from ...optics.fresnel import exact, film
 from ...optics.fresnel.f82 import GRAZING, f82
 from ...optics.fresnel.schlick import schlick
 from ...optics.ndf import distribution
-from ...optics.special import gauss
-from ...optics.warp import square_to_cosine_hemisphere
-from ..compensation.glass import Glass
-from ..compensation.lobe import NOTHING, MissingEnergy
-from ..compensation.missing import missing_energy
+from . import _openpbr_derived as derived
+from . import _openpbr_layers as layers
+from . import _openpbr_sampling as sampling
 from . import _openpbr_tables as tables
-from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, LARGEST, NODES, PLACES
+from ._openpbr_derived import Between
+from ._openpbr_formulas import covered, direction_at, lobe_value, mix, modulated, power, rough_along, total_of
+from ._openpbr_layers import Sides
 
 NARROWEST = 1e-3  # of two widths
 NEAREST = 1.001  # index of refraction over the outside's: below it no facet can be told that refracts
 MOST_RAYS = 1 << 18  # for which what is derived is kept, a hundred numbers each: it halves what is compiled
-STEPS = 4  # of the iteration in `_balanced`
-WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of means with the cosine
 LAYERINGS = {
     "reciprocal": "a layer dims what lies under it at both ends, so that light may be turned round",
     "albedo": "by one minus its albedo seen from wo, as the specification's reduction to lobes",
 }
-
-
-class Other(NamedTuple):
-    """What facets of glass miss that reflects otherwise than bare glass: under a film, or under a coat, by whose index
-    it reflects, while light is bent as by both. Missing are M + sum of less D (`spared`), M that of bare glass.
-
-    less         by how much F differs at `FEW_PLACES`
-    thin, dense  the mean of what is missing, from outside and from inside
-    into, out    the share of it that passes to the other side (`compensation.glass`)
-    """
-
-    less: tuple[Spectrum, ...]
-    thin: Spectrum
-    dense: Spectrum
-    into: Spectrum
-    out: Spectrum
-
-
-class Between(NamedTuple):
-    """What follows from the parameters alone.
-
-    alpha        of the base, roughened by the coat, along x and y
-    rough        its roughness; the root of alpha with one width
-    coat_alpha   of the coat
-    ratio        index by which the base reflects, over what lies above it, 1 and more
-    eta          index by which it refracts, over the outside's
-    medium       index of what lies above the base, over the outside's
-    sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
-    joint        the same seen through the coat's
-    bent         by nodes of the cosine, how far that is off its mean; both of them
-    filmed       by how much the film changes F at `PLACES`; empty without one
-    extra        the mean of that
-    facets       factor of facets under the coat, by nodes of the cosine; empty without one
-    metal        what single scattering misses at F = 1
-    metal_again  colour of what a metal gives back
-    sheet_again  colours of what a thin sheet gives back, reflected and transmitted
-    glass        what it misses of bare glass; None where nothing is transmitted
-    other        what it misses more or less, as glass reflects otherwise there; None where it is bare
-    """
-
-    alpha: Pair
-    rough: Scalar
-    coat_alpha: Pair
-    ratio: Scalar
-    eta: Scalar
-    medium: Scalar
-    sheer: Spectrum
-    joint: Spectrum
-    bent: tuple[tuple[Scalar, ...], tuple[Scalar, ...]]
-    filmed: tuple[Spectrum, ...]
-    extra: Scalar
-    facets: tuple[Scalar, ...]
-    metal: MissingEnergy
-    metal_again: Spectrum
-    sheet_again: tuple[Spectrum, Spectrum] | None
-    glass: Glass | None
-    other: Other | None
-
-
-class _Pair(NamedTuple):
-    """A pair of directions, both turned up.
-
-    wo, wi   above the surface; the normal where a pair is not to be evaluated
-    near     whether wi lies on wo's side
-    above    whether coat and fuzz lie on that side
-    """
-
-    wo: Direction
-    wi: Direction
-    near: Mask
-    above: Mask
-
-
-class Shares(NamedTuple):
-    """Probabilities of the lobes: fuzz, coat, facets that mirror and that refract, cosines on both sides."""
-
-    fuzz: Scalar
-    coat: Scalar
-    mirrored: Scalar
-    refracted: Scalar
-    near: Scalar
-    far: Scalar
 
 
 class OpenPBR(BSDF):
@@ -262,8 +170,8 @@ class OpenPBR(BSDF):
             certain=False,
         ),
         "energy": Breach(
-            "tables of what layers let through are interpolated, which gains some thousandths where light grazes",
-            0.01,
+            "tables of what layers let through are interpolated, and are of one width, which stands for two",
+            lambda model: 0.15 if model._drawn_out else 0.01,
             certain=False,
         ),
         "linearity": Breach(
@@ -304,7 +212,14 @@ class OpenPBR(BSDF):
     @property
     def _two_widths(self) -> bool:
         """Whether the base has, or may have, two widths; never for what is only recorded."""
-        value = self.plain.specular_roughness_anisotropy
+        return self._is_drawn_out("specular_roughness_anisotropy")
+
+    @property
+    def _drawn_out(self) -> bool:
+        return self._two_widths or (self._has("coat_weight") and self._is_drawn_out("coat_roughness_anisotropy"))
+
+    def _is_drawn_out(self, name: str) -> bool:
+        value = getattr(self.plain, name)
         return backend.is_drjit(value) or bool(np.any(np.asarray(value, float) != 0.0))
 
     def _has_holes(self) -> bool:
@@ -350,7 +265,7 @@ class OpenPBR(BSDF):
         """Roughness of the base, whose facets are seen through a rough coat."""
         own, over = sqr(sqr(self.specular_roughness)), sqr(sqr(self.coat_roughness))
         under = sqrt(sqrt(clamp(own + 2.0 * over, 1e-12, 1.0)))
-        return _mix(self.specular_roughness, under, self.coat_weight)
+        return mix(self.specular_roughness, under, self.coat_weight)
 
     @function
     def _indices(self) -> tuple[Scalar, Scalar, Scalar]:
@@ -361,110 +276,15 @@ class OpenPBR(BSDF):
         """
         base, coat = self.specular_ior, self.coat_ior
         ratio = base / coat
-        met = _mix(base, maximum(ratio, 1.0 / ratio), self.coat_weight)
-        below = _mix(base, ratio, self.coat_weight)
+        met = mix(base, maximum(ratio, 1.0 / ratio), self.coat_weight)
+        below = mix(base, ratio, self.coat_weight)
         medium = base / below
-        eta = maximum(medium * _modulated(below, self.specular_weight), NEAREST)
-        return _modulated(met, self.specular_weight), eta, medium
+        eta = maximum(medium * modulated(below, self.specular_weight), NEAREST)
+        return modulated(met, self.specular_weight), eta, medium
 
     def derive(self) -> Between:
         """Widths and indices, means over the hemisphere, and what facets scatter twice."""
-        rough = self._roughened()
-        alpha = self._widths(rough, self.specular_roughness_anisotropy)
-        coat_alpha = self._widths(self.coat_roughness, self.coat_roughness_anisotropy)
-        ratio, eta, medium = self._indices()
-        zero, white = 0.0 * self.base_color, 1.0 + 0.0 * self.base_color
-        two = self._two_widths
-        kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=self._masking)
-        values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
-        metal = missing_energy(binding.bound_copy(kind, values))
-        bare, filmed, extra = self._at_places(ratio, eta, medium)
-        weights = [4.0 * w * x**3 for x, w in zip(NODES, gauss(len(NODES))[1].tolist(), strict=True)]
-        under = self._kept_at_nodes(rough, ratio, filmed)
-        over = [1.0 - E for E in tables.reflected_at_nodes(self.coat_roughness, self.coat_ior, self._masking)]
-        over_hats, over = over[:HATS], over[HATS:]
-        total = sum(weights)
-        sheer = _sum([one * (w / total) for one, w in zip(under, weights, strict=True)])
-        both = [one * other for one, other in zip(under, over, strict=True)]
-        joint = _sum([one * (w / total) for one, w in zip(both, weights, strict=True)])
-        bent = tuple(
-            tuple(mean(one / level - 1.0) * w for one, w in zip(parts, weights, strict=True))
-            for parts, level in ((under, sheer), (both, joint))
-        )
-        f_metal = white
-        if self._has("base_metalness"):
-            places = FEW_PLACES if filmed else PLACES
-            f_metal = _averaged([self._metal(x + 0.0 * rough, eta, medium) for x in places])
-        sheet = None
-        if self.geometry_thin_walled:
-            f = [white * one for one in bare]
-            if filmed:
-                f = [one + more for one, more in zip(f, filmed, strict=True)]
-            both_ways = [self._sheet(x + 0.0 * rough, one, eta) for x, one in zip(PLACES, f, strict=True)]
-            sheet = _averaged([back for back, _ in both_ways]), _averaged([on for _, on in both_ways])
-        glass, other = None, None
-        if self._refracts:
-            kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=self._masking)
-            clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
-            found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
-            assert isinstance(found, Glass), "a dielectric's"
-            glass = found
-            if filmed or self._has("coat_weight"):
-                other = self._misses_otherwise(glass, bare, filmed, rough, eta)
-        return Between(
-            alpha=alpha,
-            rough=rough,
-            coat_alpha=coat_alpha,
-            ratio=ratio,
-            eta=eta,
-            medium=medium,
-            sheer=sheer,
-            joint=joint / sheer,
-            bent=bent,  # type: ignore[arg-type]
-            filmed=filmed,
-            extra=extra,
-            facets=self._balanced(rough, over_hats) if self._has("coat_weight") else (),
-            metal=metal,
-            metal_again=_again(f_metal, metal.average),
-            sheet_again=sheet,
-            glass=glass,
-            other=other,
-        )
-
-    def _at_places(
-        self, ratio: Scalar, eta: Scalar, medium: Scalar
-    ) -> tuple[list[Scalar], tuple[Spectrum, ...], Scalar]:
-        """F of the bare dielectric at `PLACES`, what a film adds there, and the mean of that."""
-        cosines = [x + 0.0 * ratio for x in PLACES]
-        bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
-        if not self._has("thin_film_weight"):
-            return bare, (), 0.0 * ratio
-        filmed = tuple(
-            (self._clear_film(cos, eta, medium) - one) * self.thin_film_weight
-            for cos, one in zip(cosines, bare, strict=True)
-        )
-        return bare, filmed, mean(_averaged(list(filmed)))
-
-    def _misses_otherwise(
-        self, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
-    ) -> Other:
-        """What that glass misses more or less than bare glass of index eta."""
-        white = 1.0 + 0.0 * self.base_color
-        less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
-        for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
-            cos = x + 0.0 * eta
-            known = exact.dielectric(cos, fresnel.cos_transmitted(cos, eta), eta)
-            less.append(white * (one - known) + filmed[n] if filmed else white * (one - known))
-            reflected = reflected + less[-1] * weight
-        few = tuple(_sum([one * share for one, share in zip(less, row, strict=True)]) for row in FROM_PLACES)
-        shares = tables.spared_on_average(rough, eta, self._masking)
-        count = len(few)
-        thin, dense = (
-            maximum(_over_pi(side.scale) + _sum([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
-            for side, part in ((glass.thin, shares[:count]), (glass.dense, shares[count:]))
-        )
-        enters = (1.0 - reflected) / (thin + dense)
-        return Other(few, thin, dense, enters * dense, enters * thin / sqr(eta))
+        return derived.derive(self)
 
     def _settled(self) -> Self:
         """A copy that holds what is derived, where that differs from ray to ray: it is asked for in many places."""
@@ -476,34 +296,6 @@ class OpenPBR(BSDF):
     def prepare(self) -> None:
         """Find the tables, before a loop is recorded."""
         tables.prepare(self._masking)
-
-    def _kept_at_nodes(self, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
-        """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
-        found = []
-        E_of = tables.reflected_at_nodes(rough, ratio, self._masking)[HATS:]
-        faced = tables.faced_at_nodes(rough, self._masking) if filmed else [()] * len(E_of)
-        for E, shares in zip(E_of, faced, strict=True):
-            found.append(1.0 - _covered(E + 0.0 * self.base_color, filmed, shares))
-        return found
-
-    def _balanced(self, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar, ...]:
-        """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
-
-        A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
-        light all over and the rest on, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
-
-        kept  1 - E_coat at the nodes
-        """
-        rows, w = tables.scattered_at_nodes(rough, self._masking), []
-        q = sqrt(kept[round(0.67 * (HATS - 1))])  # where most light is
-        for n, one in enumerate(kept):
-            cos = (n / (HATS - 1.0)) ** 2
-            b = sqr(rough) / (sqr(rough) + cos + 1e-3)
-            w.append(2.0 * one / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * one + 1e-12)))
-        for _ in range(STEPS):
-            met = [_sum([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
-            w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
-        return tuple(w)
 
     # ------------------------------------------------------------------ reflectances
 
@@ -527,7 +319,7 @@ class OpenPBR(BSDF):
         bare = (1.0 + 0.0 * self.base_color) * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
         if not self._has("thin_film_weight"):
             return bare
-        return _mix(bare, self._clear_film(cos, eta, medium), self.thin_film_weight)
+        return mix(bare, self._clear_film(cos, eta, medium), self.thin_film_weight)
 
     @function
     def _bare_metal(self, cos: Scalar) -> Spectrum:
@@ -547,122 +339,33 @@ class OpenPBR(BSDF):
         n = self.specular_color * least + (1.0 - self.specular_color) * ((1.0 + root) / (1.0 - root))
         k = safe_sqrt((r * sqr(n + 1.0) - sqr(n - 1.0)) / (1.0 - r))
         filmed = self._film(cos, n, k, medium) * minimum(self.specular_weight, 1.0)
-        return _mix(bare, filmed, self.thin_film_weight)
+        return mix(bare, filmed, self.thin_film_weight)
 
     def _sheet(self, cos: Scalar, f: Spectrum, eta: Scalar) -> tuple[Spectrum, Spectrum]:
         """What a thin sheet whose faces reflect f sends back and lets through, all bounces between them together."""
         inner = safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(eta))
-        t = _power(self.transmission_color, 1.0 / maximum(inner, 0.05))
+        t = power(self.transmission_color, 1.0 / maximum(inner, 0.05))
         rest = sqr(1.0 - f) * t / maximum(1.0 - sqr(f * t), 1e-6)
         return f + rest * f * t, rest
 
     def _let_in(self, w: Direction) -> Spectrum:
-        """1 - E of the base's dielectric surface; of two widths that of the one seen along w."""
+        """1 - E of the base's dielectric surface; of two widths that of the one that stands for them along w."""
         b = self.derived
         rough = b.rough
         if self._two_widths:
-            along2, across2 = sqr(b.alpha.x * w.x), sqr(b.alpha.y * w.y)
-            sin2 = frame.sin2(w)
-            turned = sin2 > 1e-12
-            seen2 = where(turned, (along2 + across2) / maximum(sin2, 1e-12), sqr(b.alpha.x))
-            rough = where(turned, minimum(sqrt(sqrt(seen2)), 1.0), rough)
+            rough = rough_along(w, b.alpha, b.ratio)
         return self._kept_below(w.z, rough, b.ratio, b.filmed)
 
     def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
         """The same by what follows from the parameters."""
         E = tables.reflected(cos, rough, ratio, self._masking) + 0.0 * self.base_color
-        return 1.0 - _covered(E, filmed, tables.faced(cos, rough, self._masking) if filmed else ())
-
-    def _even(self, w: Direction, coated: bool) -> Scalar:
-        """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
-
-        The lobe sends more light to some cosines than Lambert's, and those surfaces let less through there. Its mean
-        over azimuth is known: the factor makes a white base whole to second order.
-        """
-        rough = self.base_diffuse_roughness
-        lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": 1.0 + 0.0 * self.base_color, "roughness": rough})
-        sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), 0.0 * w.z
-        nodes = [x * x for x in NODES]
-        for node, off in zip(nodes, self.derived.bent[coated], strict=True):
-            slant = sin * (math.sqrt(1.0 - node * node) * inv_pi) * (1.0 / maximum(w.z, node) - 1.0)
-            twice = lost * (lobe._lost(_at(node + 0.0 * w.z)) / (GRAZING_LOSS - MEAN_LOSS))
-            total = total + off * (slant + twice)
-        return 1.0 / (1.0 + lobe._single() * rough * total)
+        return 1.0 - covered(E, filmed, tables.faced(cos, rough, self._masking) if filmed else ())
 
     @property
     def _bends(self) -> bool:
         return self.layering == "reciprocal" and self._has("base_diffuse_roughness")
 
-    @function
-    def _coat_kept(self, cos: Scalar) -> Scalar:
-        """1 - E of the coat's surface."""
-        return 1.0 - tables.reflected(cos, self.coat_roughness, self.coat_ior, self._masking)
-
     # ------------------------------------------------------------------ layers
-
-    @function
-    def _inside(self, cos: Scalar) -> Scalar:
-        """The cosine in the coat."""
-        return maximum(safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(self.coat_ior)), 0.05)
-
-    @function
-    def _darkened(self, cos: Scalar) -> Spectrum:
-        """(1 - K) / (1 - E_b K), K what the coat sends back down, E_b the base's albedo from above."""
-        b = self.derived
-        outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, self.coat_ior), self.coat_ior)
-        broad = 1.0 - (1.0 - fresnel.kind("exact").dielectric_average(self.coat_ior)) / sqr(self.coat_ior)
-        f0 = fresnel.r0_dielectric(b.ratio)
-        rough = _mix(1.0, self.specular_roughness, f0)
-        K = _mix(outer, broad, _mix(rough, self.specular_roughness, self.base_metalness))
-        body = _mix(self.base_color * self.base_weight, self.subsurface_color, self.subsurface_weight)
-        body = _mix(body, 1.0 + 0.0 * body, self.transmission_weight)
-        metal = self.base_color * (self.base_weight * minimum(self.specular_weight, 1.0))
-        E_b = _mix(f0 + (1.0 - f0) * body, metal, self.base_metalness)
-        return _mix(1.0, (1.0 - K) / (1.0 - E_b * K), self.coat_darkening)
-
-    def _under(self, cos: Scalar) -> tuple[Scalar, Spectrum, Scalar]:
-        """At a direction outside: what the coat's surface lets through, what its colour leaves of one crossing with
-        the root of the darkening, and the factor of a lobe of facets.
-
-        A last step of the iteration (`_balanced`): of a mirror the root of 1 - E, as exact as that itself.
-        """
-        b = self.derived
-        kept = self._coat_kept(cos)
-        tint = _power(self.coat_color, 0.5 / self._inside(cos)) * sqrt(self._darkened(cos))
-        place = sqrt(maximum(cos, 0.0)) * (HATS - 1.0)
-        here = _sum([maximum(1.0 - abs(place - float(n)), 0.0) * w for n, w in enumerate(b.facets)])
-        met = _sum([p * w for p, w in zip(tables.scattered(cos, b.rough, self._masking), b.facets, strict=True)])
-        return kept, tint, sqrt(here * kept / maximum(met, 1e-4))
-
-    def _through_coat(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
-        """Factors of the base's facets and of its diffuse lobe; 1 where there is no coat on their side."""
-        C = self.coat_weight
-        kept_o, tint_o, facet_o = self._under(pair.wo.z)
-        if self.layering == "albedo":
-            coated = _mix(1.0, self._darkened(pair.wo.z), C)
-            tint = _power(self.coat_color, 0.5 / self._inside(pair.wo.z) + 0.5 / self._inside(pair.wi.z))
-            both = coated * ((1.0 - C) + tint * (kept_o * C))
-            both = where(pair.above, both, 1.0)
-            return both, both
-        kept_i, tint_i, facet_i = self._under(pair.wi.z)
-        tint = tint_o * tint_i
-        facets = (1.0 - C) + tint * (facet_o * facet_i * C)
-        both = kept_o * kept_i / self.derived.joint
-        if self._bends:
-            for w in (pair.wo, pair.wi):
-                both = both * (self._even(w, True) / self._even(w, False))
-        diffuse = (1.0 - C) + tint * (both * C)
-        return where(pair.above, facets, 1.0), where(pair.above, diffuse, 1.0)
-
-    def _past_layers(self, cos: Scalar) -> Spectrum:
-        """What coat and fuzz leave of light that passes them once, on its way in or out."""
-        left = 1.0 + 0.0 * self.base_color
-        if self._has("coat_weight"):
-            kept, tint, _ = self._under(cos)
-            left = _mix(1.0, tint * kept, self.coat_weight) * left
-        if self._has("fuzz_weight"):
-            left = left * (1.0 - self.fuzz_weight * self._fuzz()._lobe(_at(cos)).R)
-        return left
 
     # ------------------------------------------------------------------ lobes
 
@@ -676,7 +379,7 @@ class OpenPBR(BSDF):
         clear = {"rotation": None, "albedo": 1.0 + zero, "absorption": zero, "priority": 0.0 * b.eta}
         return binding.bound_copy(kind, {"eta": b.eta, "alpha": b.alpha, **clear})
 
-    def _pair(self, wo: Direction, wi: Direction) -> _Pair:
+    def _pair(self, wo: Direction, wi: Direction) -> Sides:
         """Both turned up; a thin wall looks alike from both sides."""
         near = wo.z * wi.z > 0.0
         above = wo.z > 0.0
@@ -688,9 +391,9 @@ class OpenPBR(BSDF):
         elif not self._two_faced:
             valid = near = near & above
         o, i = upper(wo), where(wi.z < 0.0, -wi, wi)
-        return _Pair(where(valid, o, frame.upright(o)), where(valid, i, frame.upright(i)), near & valid, above)
+        return Sides(where(valid, o, frame.upright(o)), where(valid, i, frame.upright(i)), near & valid, above)
 
-    def _diffuse(self, pair: _Pair) -> tuple[Spectrum, Spectrum]:
+    def _diffuse(self, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
         """What the body under the dielectric reflects and, of a thin wall, lets through, times cos theta_i."""
         b = self.derived
         white = 1.0 + 0.0 * self.base_color
@@ -698,16 +401,16 @@ class OpenPBR(BSDF):
         base = (
             binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
         )
-        dimmed = self._let_in(pair.wo) * self._let_in(pair.wi) / b.sheer
+        dimmed = let_in[0] * let_in[1] / b.sheer
         dimmed = dimmed * ((1.0 - self.base_metalness) * (1.0 - self.transmission_weight))
         if self._bends:
-            dimmed = dimmed * (self._even(pair.wo, False) * self._even(pair.wi, False))
+            dimmed = dimmed * (layers.even(self, pair.wo, False) * layers.even(self, pair.wi, False))
         if not self._has("subsurface_weight"):
             return base * dimmed, 0.0 * white
         S = self.subsurface_weight
         if not self.geometry_thin_walled:
             below = binding.bound_copy(Eon(), {**values, "albedo": self.subsurface_color}).eval(pair.wo, pair.wi)
-            return _mix(base, below, S) * dimmed, 0.0 * white
+            return mix(base, below, S) * dimmed, 0.0 * white
         even = binding.bound_copy(Eon(), {**values, "albedo": white}).eval(pair.wo, pair.wi)
         half, g = even * self.subsurface_color * (0.5 * S), self.subsurface_scatter_anisotropy
         return (base * (1.0 - S) + half * (1.0 - g)) * dimmed, half * (1.0 + g) * dimmed
@@ -740,7 +443,7 @@ class OpenPBR(BSDF):
             one * where(w.z > 0.0, thin, dense)
             for one, thin, dense in zip(b.other.less, shares[:count], shares[count:], strict=True)
         ]
-        return maximum(b.glass.at(w) + _sum(more), 0.0)
+        return maximum(b.glass.at(w) + total_of(more), 0.0)
 
     # ------------------------------------------------------------------ values
 
@@ -762,8 +465,8 @@ class OpenPBR(BSDF):
         zero = 0.0 * self.base_color * o.z
         h, cos = facet(o, i)
         smooth = self._smooth(b.alpha, "specular_roughness")
-        facets = _lobe(self._facets(o, i, h, b.alpha), smooth, ideal)
-        again = _lobe(self._returned(o, i), None, ideal)
+        facets = lobe_value(self._facets(o, i, h, b.alpha), smooth, ideal)
+        again = lobe_value(self._returned(o, i), None, ideal)
         through = zero
         if self._refracts:
             glossy, dielectric, through = self._glass(wo, wi, pair, cos, mode, facets, smooth, ideal)
@@ -774,15 +477,16 @@ class OpenPBR(BSDF):
             assert b.sheet_again is not None, "derived where walls are thin"
             back, on = self._sheet(cos, glossy, b.eta)
             sheet = (back * facets + b.sheet_again[0] * again) * self.specular_color
-            dielectric = _mix(dielectric, sheet, T)
+            dielectric = mix(dielectric, sheet, T)
             through = (on * facets + b.sheet_again[1] * again) * ((1.0 - M) * T)
         base = dielectric * (1.0 - M)
         if self._has("base_metalness"):
             metal = self._metal(cos, b.eta, b.medium) * facets + b.metal_again * again
             base = base + metal * M
-        body, passed = (_lobe(one, None, ideal) for one in self._diffuse(pair))
+        let_in = self._let_in(pair.wo), self._let_in(pair.wi)
+        body, passed = (lobe_value(one, None, ideal) for one in self._diffuse(pair, let_in))
         if self._has("coat_weight"):
-            by_facets, by_body = self._through_coat(pair)
+            by_facets, by_body = layers.through_coat(self, pair, let_in)
             coat = self._coat(o, i, h, cos, ideal) * self.coat_weight
             base = base * by_facets + where(pair.above, coat, 0.0)
             body, passed = body * by_body, passed * by_body
@@ -794,7 +498,7 @@ class OpenPBR(BSDF):
         if self._has("fuzz_weight"):
             fuzz = self._fuzz()
             left = 1.0 - self.fuzz_weight * fuzz._lobe(o).R
-            over = _lobe(fuzz.eval(o, i), None, ideal) * self.fuzz_weight
+            over = lobe_value(fuzz.eval(o, i), None, ideal) * self.fuzz_weight
             total = where(pair.above, total * left + over, total)
             if self.geometry_thin_walled:
                 through = through * left
@@ -812,13 +516,13 @@ class OpenPBR(BSDF):
         """The coat's own lobe, times cos theta_i."""
         alpha = self.derived.coat_alpha
         f = exact.dielectric(cos, fresnel.cos_transmitted(cos, self.coat_ior), self.coat_ior)
-        return f * _lobe(self._facets(o, i, h, alpha), self._smooth(alpha, "coat_roughness"), ideal)
+        return f * lobe_value(self._facets(o, i, h, alpha), self._smooth(alpha, "coat_roughness"), ideal)
 
     def _glass(
         self,
         wo: Direction,
         wi: Direction,
-        pair: _Pair,
+        pair: Sides,
         cos: Scalar,
         mode: Mode,
         facets: Scalar,
@@ -832,186 +536,39 @@ class OpenPBR(BSDF):
         at = glass._facet(wo, wi, eta)
         # F is a matter of the cosine outside, wherever light comes from
         cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
-        joined, outside = where(above, abs(at.dot_o), abs(at.dot_i)), where(above, pair.wo.z, pair.wi.z)
-        crosses = joined if ideal is None else where(ideal, outside, joined)
+        joined, outside = where(above, abs(at.dot_o), abs(at.dot_i)), where(above, pair.wo, pair.wi)
+        crosses = joined if ideal is None else where(ideal, outside.z, joined)
         outer = where(pair.near, where(above, cos, maximum(cos_t, 1e-4)), crosses)
         f = self._glossy(outer, b.ratio, b.eta, b.medium)
         # from inside, what coat and fuzz would send back comes back with what the base reflects
         inner = where(cos_t > 0.0, f, white)
-        inner = 1.0 - (1.0 - inner) * self._past_layers(maximum(cos_t, 1e-4))
-        twice = _lobe(self._twice(wo, wi, mode), None, ideal)
+        inner = 1.0 - (1.0 - inner) * layers.past_layers(self, direction_at(maximum(cos_t, 1e-4)))
+        twice = lobe_value(self._twice(wo, wi, mode), None, ideal)
         # what is no glass looks from below as from above
         opaque = self._glossy(cos, b.ratio, b.eta, b.medium)
-        mirrored = where(above, f * self.specular_color, _mix(opaque, inner, T))
+        mirrored = where(above, f * self.specular_color, mix(opaque, inner, T))
         tint = where(above, self.specular_color, white)
         reflected = mirrored * facets + tint * (twice * T)
-        spread = _lobe(where(at.reflects, 0.0, glass._value(at)), smooth, ideal, 1.0 / sqr(eta))
+        spread = lobe_value(where(at.reflects, 0.0, glass._value(at)), smooth, ideal, 1.0 / sqr(eta))
         spread = spread * sqr(eta) if mode == "importance" else spread
         colour = where(self.transmission_depth > 0.0, white, self.transmission_color)
-        left = self._past_layers(outside) * colour
+        left = layers.past_layers(self, outside) * colour
         through = ((1.0 - f) * spread + twice) * left * ((1.0 - self.base_metalness) * T)
         return f, reflected, through
 
     # ------------------------------------------------------------------ sampling
 
-    def _shares(self, wo: Direction) -> Shares:
-        """Of each lobe about what it reflects or lets through, with a little of all, so that no weight grows."""
-        b = self.derived
-        o = upper(wo)
-        cos = maximum(o.z, 1e-4)
-        zero, M, T = 0.0 * cos, self.base_metalness, self.transmission_weight
-        above = wo.z != 0.0 if self.geometry_thin_walled else wo.z > 0.0
-        fuzz, coat, left = zero, zero, 1.0 + zero
-        if self._has("fuzz_weight"):
-            fuzz = where(above, self.fuzz_weight * self._fuzz()._lobe(o).R, 0.0)
-            left = left - fuzz
-        if self._has("coat_weight"):
-            coat = where(above, self.coat_weight * (1.0 - self._coat_kept(cos)), 0.0) * left
-            left = left - coat
-        # a film's part by its mean: its colours would double the work, for probabilities
-        glossy = clamp(exact.dielectric(cos, fresnel.cos_transmitted(cos, b.ratio), b.ratio) + b.extra, 0.0, 1.0)
-        body = self.base_color * self.base_weight
-        thin = self.geometry_thin_walled and self._has("subsurface_weight")
-        S = self.subsurface_weight
-        even = mean(_mix(body, self.subsurface_color, S)) * (1.0 - M) * (1.0 - T) * (1.0 - glossy)
-        passed = zero
-        if thin:
-            passed = mean(self.subsurface_color) * S * (0.5 + 0.5 * self.subsurface_scatter_anisotropy)
-            passed = passed * (1.0 - M) * (1.0 - T) * (1.0 - glossy)
-        even = maximum(even - passed, 0.0)
-        lost = b.metal.at(o)
-        metal = mean(self._bare_metal(cos)) + abs(b.extra) if self._has("base_metalness") else zero
-        refracted, back = zero, glossy
-        near, far = lost * metal * M, zero
-        if self.geometry_thin_walled and self._has("transmission_weight"):
-            on = self._sheet(cos, glossy + 0.0 * self.base_color, b.eta)
-            back = _mix(glossy, mean(on[0]), T)
-            refracted = mean(on[1]) * (1.0 - M) * T
-            near, far = near + lost * T * mean(on[0]), lost * T * mean(on[1])
-        elif self._refracts:
-            assert b.glass is not None, "derived where light is transmitted"
-            cos_t = fresnel.cos_transmitted(cos, 1.0 / b.eta)
-            inner = exact.dielectric(cos_t, fresnel.cos_transmitted(cos_t, b.ratio), b.ratio) + b.extra
-            inner = clamp(where(cos_t > 0.0, inner, 1.0), 0.02, 0.98)
-            here = where(wo.z > 0.0, clamp(glossy, 0.02, 1.0), inner)
-            back = _mix(glossy, here, T)
-            refracted = (1.0 - here) * ((1.0 - M) * T)
-            twice = b.glass.at(wo) * (1.0 - M) * T
-            near, far = near + 0.5 * twice, 0.5 * twice
-        mirrored = metal * M + back * (1.0 - M) * mean(self.specular_color) + 0.01
-        near, far = even + near + 0.01, far + passed
-        if self._two_faced:
-            far = far + 0.01 * (1.0 - M)
-        mirrored, refracted, near, far = (left * share for share in (mirrored, refracted, near, far))
-        total = 1.0 / (fuzz + coat + mirrored + refracted + near + far)
-        return Shares(*(share * total for share in (fuzz, coat, mirrored, refracted, near, far)))
-
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The mixture of the lobes' densities."""
         model = self._settled()
-        density = model._density(model._shares(wo), wo, wi)
+        density = sampling.density_of(model, sampling.shares_at(model, wo), wo, wi)
         return density * self.geometry_opacity if self._has_holes() else density
-
-    def _density(self, shares: Shares, wo: Direction, wi: Direction) -> Scalar:
-        b = self.derived
-        pair = self._pair(wo, wi)
-        o, i = pair.wo, pair.wi
-        h, _ = facet(o, i)
-        ndf = distribution("ggx")
-        smooth = self._smooth(b.alpha, "specular_roughness")
-        mirrored = _lobe(0.25 * ndf.visible_per_cosine(o, h, b.alpha), smooth, None)
-        cosine = i.z * inv_pi
-        density = shares.mirrored * mirrored + shares.near * cosine
-        if self._has("coat_weight"):
-            coat = 0.25 * ndf.visible_per_cosine(o, h, b.coat_alpha)
-            density = density + shares.coat * _lobe(coat, self._smooth(b.coat_alpha, "coat_roughness"), None)
-        if self._has("fuzz_weight"):
-            density = density + shares.fuzz * self._fuzz().pdf(o, i)
-        if not self._two_faced:
-            return where(pair.near, density, 0.0)
-        if self.geometry_thin_walled:
-            through = shares.refracted * mirrored
-        else:
-            glass = self._interface()
-            eta = glass._relative_eta(wo)
-            at = glass._facet(wo, wi, eta)
-            through = shares.refracted * _lobe(where(at.reflects, 0.0, glass._density(at, eta)), smooth, None)
-        through = through + shares.far * cosine
-        return where(pair.near, density, where((wo.z != 0.0) & (wi.z != 0.0), through, 0.0))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the lobe."""
-        return self._settled()._drawn(wo, u, mode)
-
-    def _drawn(self, wo: Direction, u: Direction, mode: Mode) -> Sample:
-        b, shares = self.derived, self._shares(wo)
-        pick = u.x
-        if self._has_holes():
-            covered = u.x < self.geometry_opacity
-            pick = minimum(safe_div(u.x, self.geometry_opacity), ALMOST_ONE)
-        o = upper(wo) if self._two_faced else wo
-        o = where(o.z > 0.0, o, frame.upright(o))
-        ends = [shares.fuzz]
-        for share in shares[1:]:
-            ends.append(ends[-1] + share)
-        on_fuzz, on_coat = pick < ends[0], (pick >= ends[0]) & (pick < ends[1])
-        on_facets, on_refracted = (pick >= ends[1]) & (pick < ends[2]), (pick >= ends[2]) & (pick < ends[3])
-        on_near = (pick >= ends[3]) & (pick < ends[4])
-        alpha = vec2(where(on_coat, b.coat_alpha.x, b.alpha.x), where(on_coat, b.coat_alpha.y, b.alpha.y))
-        m = distribution("ggx").sample_visible(o, u.y, u.z, alpha)
-        smooth = self._smooth(b.alpha, "specular_roughness")
-        smooth_coat = self._smooth(b.coat_alpha, "coat_roughness") if self._has("coat_weight") else None
-        ideal, found = None, 0.0 * pick  # rays on smooth facets, and the probability of their direction
-        for mirror, here, joins, share in (
-            (smooth_coat, on_coat, on_coat | on_facets, shares.coat),
-            (smooth, on_facets, on_coat | on_facets, shares.mirrored),
-            (smooth, on_refracted, on_refracted, shares.refracted),
-        ):
-            if mirror is not None:
-                ideal = here & mirror if ideal is None else ideal | (here & mirror)
-                found = found + where(joins & mirror, share, 0.0)
-        if ideal is not None:
-            m = where(ideal, frame.upright(o), m)
-        mirrored = frame.reflect(o, m)
-        cosine = square_to_cosine_hemisphere(u.y, u.z)
-        wi = where(on_coat | on_facets, mirrored, cosine)
-        valid = wi.z > 0.0
-        if self._has("fuzz_weight"):
-            wi = where(on_fuzz, self._fuzz().sample(o, u, mode).wi, wi)
-            valid = wi.z > 0.0
-        if self._two_faced:
-            far = ~on_fuzz & ~on_coat & ~on_facets & ~on_near
-            if self.geometry_thin_walled:
-                bent, passes = mirrored, mirrored.z > 0.0
-                bent = vec3(bent.x, bent.y, -bent.z)
-            else:
-                eta = where(wo.z >= 0.0, b.eta, 1.0 / b.eta)
-                cos_m = ops.dot(o, m)
-                cos_t = fresnel.cos_transmitted(cos_m, eta)
-                bent = frame.refract(o, m, cos_t, eta)
-                passes = (cos_t > 0.0) & (bent.z < 0.0)
-            below = vec3(wi.x, wi.y, -wi.z)
-            wi = where(on_refracted, bent, where(far, below, wi))
-            valid = where(on_refracted, passes, where(far, wi.z < 0.0, valid))
-            wi = where(wo.z < 0.0, -wi, wi)
-        density = self._density(shares, wo, wi)
-        if ideal is not None:
-            density = where(ideal, found, density)
-        density = where(valid, density, 0.0)
-        weight = self._surface(wo, wi, mode, ideal) * safe_div(1.0, density)
-        one = 1.0 + 0.0 * density
-        eta = one
-        if self._refracts:
-            eta = where(wo.z * wi.z > 0.0, one, where(wo.z >= 0.0, b.eta, 1.0 / b.eta))
-        delta = density != density if ideal is None else ideal & valid
-        if self._has_holes():
-            through = 1.0 - self.geometry_opacity
-            wi, weight = where(covered, wi, -wo), where(covered, weight, one)
-            density = where(covered, density * self.geometry_opacity, through)
-            eta, delta = where(covered, eta, one), ~covered | delta
-        return Sample(wi, weight, density, delta, eta)
+        return sampling.drawn(self._settled(), wo, u, mode)
 
     # ------------------------------------------------------------------ facts
 
@@ -1050,73 +607,10 @@ class OpenPBR(BSDF):
         b = self.derived
         cos = abs(wo.z)
         f = self._glossy(cos, b.ratio, b.eta, b.medium)
-        body = _mix(self.base_color * self.base_weight, self.subsurface_color, self.subsurface_weight)
-        body = _mix(body, self.transmission_color, self.transmission_weight)
+        body = mix(self.base_color * self.base_weight, self.subsurface_color, self.subsurface_weight)
+        body = mix(body, self.transmission_color, self.transmission_weight)
         dielectric = f * self.specular_color + (1.0 - f) * body
-        return _mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
+        return mix(dielectric, self._metal(cos, b.eta, b.medium), self.base_metalness)
 
 
 # --------------------------------------------------------------------------- small formulas
-
-
-def _mix(a: Array, b: Array, share: Scalar) -> Array:
-    """a at share 0, b at share 1."""
-    return a * (1.0 - share) + b * share
-
-
-@function
-def _modulated(ratio: Scalar, weight: Scalar) -> Scalar:
-    """The index whose F0 is that of `ratio` times a weight, held at index 5."""
-    root = (ratio - 1.0) / (ratio + 1.0)
-    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-12)), LARGEST), root)
-    return (1.0 + epsilon) / (1.0 - epsilon)
-
-
-def _sum(terms: list[Array]) -> Array:
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
-
-
-def _covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
-    """The albedo of facets under a film: what it changes at `PLACES`, by how much these count."""
-    if not filmed:
-        return E
-    return clamp(E + _sum([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
-
-
-def _averaged(values: list[Array]) -> Array:
-    """2 int F mu dmu of what F is at `PLACES`, or at `FEW_PLACES`."""
-    x, w = gauss(len(values))
-    return _sum([value * weight for value, weight in zip(values, (2.0 * w * x).tolist(), strict=True)])
-
-
-@function
-def _over_pi(scale: Scalar) -> Scalar:
-    """The mean whose inverse over pi that is; 0 of 0."""
-    return safe_div(inv_pi, scale)
-
-
-def _again(f: Spectrum, lost: Scalar) -> Spectrum:
-    """Colour of light that facets scatter twice or more: F^2 E_avg / (1 - F (1 - E_avg))."""
-    return sqr(f) * (1.0 - lost) / (1.0 - f * lost)
-
-
-@function
-def _power(colour: Spectrum, exponent: Scalar) -> Spectrum:
-    """A colour to a power; black stays black."""
-    return ops.exp(log(maximum(colour, 1e-6)) * exponent)
-
-
-def _at(cos: Scalar) -> Direction:
-    """A direction of a cosine."""
-    return vec3(safe_sqrt(1.0 - sqr(cos)), 0.0 * cos, cos)
-
-
-def _lobe(value: Array, smooth: Mask | None, ideal: Mask | None, mirror: Scalar | float = 1.0) -> Array:
-    """A lobe's value; 0 where its facets are smooth, and of what is ideal `mirror` of smooth ones alone."""
-    if ideal is None:
-        return value if smooth is None else where(smooth, 0.0, value)
-    rough = where(ideal, 0.0, value)
-    return rough if smooth is None else where(smooth, where(ideal, mirror, 0.0), rough)

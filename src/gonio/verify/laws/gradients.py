@@ -102,7 +102,8 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter without derivative changes nearly all values when it is moved by a third."""
+    """Whether a parameter without derivative changes nearly all values when it is moved by a third, and has no
+    derivative there either: with one, it is only held at an end of what it can do."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -115,7 +116,10 @@ def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi
         return False
     lit = before.max(1) > 0.0
     changed = np.abs(after - before).max(1) > 1e-3 * before.max(1)
-    return bool(lit.any() and np.mean(changed[lit]) > 0.9)
+    if not (lit.any() and np.mean(changed[lit]) > 0.9):
+        return False
+    exact, _, _, least = _derivatives(subject.replace(**{path: moved}).model, [path], wo, wi)[path]
+    return bool(np.max(np.abs(exact)) < least)
 
 
 def _numeric(model: BSDF) -> list[tuple[str, Parameter]]:

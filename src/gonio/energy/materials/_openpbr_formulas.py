@@ -1,0 +1,124 @@
+"""Small formulas of OpenPBR's slabs."""
+
+from __future__ import annotations
+
+import math
+
+from ... import ops
+from ...ops import (
+    Direction,
+    Mask,
+    Pair,
+    Scalar,
+    Spectrum,
+    abs,
+    clamp,
+    function,
+    inv_pi,
+    log,
+    maximum,
+    minimum,
+    safe_div,
+    safe_sqrt,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
+from ...ops.backend import Array
+from ...optics import frame, fresnel
+from ...optics.fresnel.schlick import schlick
+from ...optics.special import gauss
+from ._openpbr_tables import HATS, LARGEST
+
+
+def mix(a: Array, b: Array, share: Scalar) -> Array:
+    """a at share 0, b at share 1."""
+    return a * (1.0 - share) + b * share
+
+
+@function
+def modulated(ratio: Scalar, weight: Scalar) -> Scalar:
+    """The index whose F0 is that of `ratio` times a weight, held at index 5."""
+    root = (ratio - 1.0) / (ratio + 1.0)
+    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), LARGEST), root)
+    return (1.0 + epsilon) / (1.0 - epsilon)
+
+
+def total_of(terms: list[Array]) -> Array:
+    total = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[Scalar, ...]) -> Scalar:
+    """<w>: the mean factor of facets over what those of a dielectric send to a direction of a cosine. They reflect most
+    where light grazes: shares of the light are white facets' times F of the facet half way between."""
+    sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
+    met, total = 0.0 * cos, 0.0 * cos
+    for n, (share, w) in enumerate(zip(row, facets, strict=True)):
+        other = (n / (HATS - 1.0)) ** 2
+        half = safe_sqrt(0.5 + 0.5 * (other * cos - math.sqrt(1.0 - other * other) * sin))
+        one = share * schlick(half, r0)
+        met, total = met + one * w, total + one
+    return met / maximum(total, 1e-9)
+
+
+@function
+def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
+    """The roughness of which a dielectric of one width reflects about as much as of two, seen along a direction:
+    straight down by the root of their mean square, where light grazes by the one seen. Met to .02 at a ratio of 3."""
+    total, sin2 = 0.5 * (sqr(alpha.x) + sqr(alpha.y)), frame.sin2(w)
+    seen2 = (sqr(alpha.x * w.x) + sqr(alpha.y * w.y) + 1e-6 * total) / (sin2 + 1e-6)
+    share = (1.0 - w.z) * (1.2 - (index - 1.0) / (index + 1.0))
+    return minimum(sqrt(sqrt(total * ops.exp(share * log(seen2 / total)))), 1.0)
+
+
+def covered_less(kept: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
+    """What a coat leaves of light that facets let in: its own, and what they send out less than white ones."""
+    return kept + less * (1.0 - let_in) / maximum(let_in, 1e-3)
+
+
+def covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:
+    """The albedo of facets under a film: what it changes at `PLACES`, by how much these count."""
+    if not filmed:
+        return E
+    return clamp(E + total_of([one * share for one, share in zip(filmed, shares, strict=True)]), 0.0, 1.0)
+
+
+def averaged(values: list[Array]) -> Array:
+    """2 int F mu dmu of what F is at `PLACES`, or at `FEW_PLACES`."""
+    x, w = gauss(len(values))
+    return total_of([value * weight for value, weight in zip(values, (2.0 * w * x).tolist(), strict=True)])
+
+
+@function
+def over_pi(scale: Scalar) -> Scalar:
+    """The mean whose inverse over pi that is; 0 of 0."""
+    return safe_div(inv_pi, scale)
+
+
+def colour_again(f: Spectrum, lost: Scalar) -> Spectrum:
+    """Colour of light that facets scatter twice or more: F^2 E_avg / (1 - F (1 - E_avg))."""
+    return sqr(f) * (1.0 - lost) / (1.0 - f * lost)
+
+
+@function
+def power(colour: Spectrum, exponent: Scalar) -> Spectrum:
+    """A colour to a power; black stays black."""
+    return ops.exp(log(maximum(colour, 1e-6)) * exponent)
+
+
+def direction_at(cos: Scalar) -> Direction:
+    """A direction of a cosine, half way between the axes of two widths."""
+    sin = math.sqrt(0.5) * safe_sqrt(1.0 - sqr(cos))
+    return vec3(sin, sin, cos)
+
+
+def lobe_value(value: Array, smooth: Mask | None, ideal: Mask | None, mirror: Scalar | float = 1.0) -> Array:
+    """A lobe's value; 0 where its facets are smooth, and of what is ideal `mirror` of smooth ones alone."""
+    if ideal is None:
+        return value if smooth is None else where(smooth, 0.0, value)
+    rough = where(ideal, 0.0, value)
+    return rough if smooth is None else where(smooth, where(ideal, mirror, 0.0), rough)
