@@ -12,7 +12,7 @@ import pytest
 from gonio.errors import InputError
 from gonio.ops import backend
 
-from materials import SMALL
+from materials import ALL, COMPOSED, SMALL
 from sphere import at, random_directions, random_numbers
 
 N = 7
@@ -234,6 +234,12 @@ class Velvet(go.BSDF):
 
         above = (wo.z > 0.0) & (wi.z > 0.0)
         return self.albedo * ops.where(above, (ops.sqr(wi.x) + ops.sqr(wi.y)) * wi.z, 0.0)
+
+
+@pytest.mark.parametrize("material", {**ALL, **COMPOSED}.values(), ids={**ALL, **COMPOSED})
+def test_every_declared_breach_has_a_size_and_a_reason(material: go.BSDF) -> None:
+    for law, breach in material.breaches().items():
+        assert breach.reason and breach.size > 0.0, law  # infinite where there is no bound
 
 
 def test_material_with_eval_alone_can_be_sampled() -> None:

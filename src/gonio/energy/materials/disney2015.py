@@ -83,7 +83,11 @@ class DisneyBSDF(BSDF):
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
-        "energy": OpenPBR.breaks["energy"],
+        "energy": Breach(
+            OpenPBR.breaks["energy"].reason,
+            lambda model: 0.15 if _some(model.anisotropic) else 0.01,
+            certain=False,
+        ),
         "linearity": Breach("tints are ratios of the base colour, and glass takes its root", 10.0, certain=False),
     }
 
