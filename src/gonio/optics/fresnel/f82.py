@@ -39,4 +39,4 @@ def f82(cos_i: Scalar | float, r0: R, edge: R) -> R:
     above 0, where a dark edge over a dark r0 would pull it."""
     x = minimum(maximum(cos_i, 0.0), 1.0)
     dip = x * sqr(1.0 - x) * sqr(sqr(1.0 - x)) * (1.0 / GREATEST)
-    return maximum(schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip, 0.0)
+    return maximum(0.0, schlick(x, r0) - (schlick(GRAZING, r0) - edge) * dip)  # in this order black has a slope

@@ -423,15 +423,20 @@ def _slopes(subject: Subject, wo: np.ndarray, seen: Lobes, power: Lobes, seed: i
             exact, lit = slope({leaf.path: own[leaf.path]})
         size = float(np.max(np.abs(np.asarray(leaf.value, float)))) or 1.0
         step = 1e-4 * size
-        ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0)]
+        ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0, 0.0)]
         shown = [np.broadcast_to(backend.to_numpy(v, len(many)), (len(many), 3)) for v, _ in ends]
         there = np.all(
             [np.broadcast_to(backend.to_numpy(m, len(many)), (len(many),)) for m in [lit, *(m for _, m in ends)]],
             axis=0,
         )
         wide, narrow = ((shown[3] - shown[0]) / (2.0 * step), (shown[2] - shown[1]) / step)
+        before, after = (shown[4] - shown[1]) / (0.5 * step), (shown[2] - shown[4]) / (0.5 * step)
         smooth = there & np.all(np.abs(wide - narrow) <= 1e-3 * np.abs(narrow) + 1e-7 / size, axis=1)
         differences = narrow + (narrow - wide) / 3.0
+        # a kink at the very value, such as where black is held above 0: any slope between those of its sides is right
+        kink = np.abs(after - before) > 0.01 * (np.abs(after) + np.abs(before))
+        between = np.clip(exact, np.minimum(before, after), np.maximum(before, after))
+        differences = np.where(kink, between, differences)
         floor = max(1e-3 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-6 / size)
         off = (np.abs(exact - differences) / np.maximum(np.abs(differences), floor)).max(1) * smooth
         off = np.where(off > SLOPES, off, 0.0)
