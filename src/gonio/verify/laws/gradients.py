@@ -167,9 +167,9 @@ class _Derivatives(NamedTuple):
 def _derivatives(
     model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, step: float = STEP
 ) -> dict[str, _Derivatives]:
-    """The derivatives by parameters at some paths, by steps of a share of their sizes. All are asked for at once, each on
-    its own rays, where the others are moved by 0: one kernel serves them all. Where another has no derivative, which 0
-    times does not mend, one is moved alone."""
+    """The derivatives by parameters at some paths, by steps of a share of their sizes. All are asked for at once, each
+    on its own rays, where the others are moved by 0: one kernel serves them all. Where another has no derivative, which
+    0 times does not mend, one is moved alone."""
     found: dict[str, _Derivatives] = {}
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):
