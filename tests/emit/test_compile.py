@@ -17,6 +17,7 @@ from parity import GLSL_HEAD
 from variants import EVERY, FEW
 
 import browser
+import materials
 
 GLSL = """(texts) => {
   const gl = document.createElement('canvas').getContext('webgl2');
@@ -85,7 +86,11 @@ def _glslang(text: str, folder: Path) -> str:
     return "" if done.returncode == 0 else f"exit {done.returncode}: {done.stdout}{done.stderr}"
 
 
-@pytest.mark.parametrize("name", EVERY)
+# of the long ones one at once: they differ in what the other languages' compilers see too
+LONG = set(materials.COMPOSED) - {"openpbr"}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in LONG else ()) for n in EVERY])
 def test_hlsl_compiles(name: str, tmp_path: Path) -> None:
     text = bundle(EVERY[name], "hlsl").text
     if GLSLANG is None:

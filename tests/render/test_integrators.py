@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.render import engine, lights
-from gonio.render.integrators import Integrator, Render, Settings, progressive
+from gonio.render.integrators import Integrator, Render, Settings, progressive, transport
 from gonio.render.integrators.base import SAMPLERS
 
 mi = engine.load()
@@ -315,6 +315,19 @@ def test_changed_values_recompile_nothing() -> None:
         last = images[0]
     assert launched(lambda: picture(scene, 3, seed=77)) == 0
     assert launched(lambda: picture(scene, 17, max_depth=7)) == 0
+
+
+def test_an_interrupt_while_a_loop_is_recorded_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    scene = mi.load_dict(scene_dict())
+    before = picture(scene, 2)
+    with monkeypatch.context() as patch:
+        patch.setattr(transport.Transport, "extend", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            picture(scene, 2)
+    assert np.array_equal(picture(scene, 2), before)
 
 
 def placed(offset: int, count: int) -> np.ndarray:

@@ -151,6 +151,20 @@ def file_threads() -> Iterator[None]:
         dr.set_thread_count(count)
 
 
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Inside, Ctrl-C stays a KeyboardInterrupt: Dr.Jit makes a RuntimeError of it where it is recording a loop."""
+    try:
+        yield
+    except RuntimeError as error:
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__cause__ or cause.__context__
+        if cause is None:
+            raise
+        raise KeyboardInterrupt from error
+
+
 def own(kind: OfVariant, values: NDArray[Any]) -> OfVariant:
     """An array of Dr.Jit's with these values, in memory of its own.
 

@@ -97,7 +97,7 @@ class Render:
         if count < 1:
             raise InputError(f"{count} samples asked for", "advance", "1 or more")
         mi = self.mi
-        with dr.suspend_grad(), garbage.kept():
+        with dr.suspend_grad(), garbage.kept(), engine.interruptible():
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
