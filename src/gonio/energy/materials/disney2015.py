@@ -106,7 +106,7 @@ class DisneyBSDF(BSDF):
             return 0.0 if open_ else float(np.min(np.asarray(value, float)))
 
         return _Slabs(
-            base_diffuse_roughness=at("roughness"),
+            base_diffuse_roughness=0.5,  # roughness is no weight: what is recorded of 0 holds for others too
             base_metalness=at("metallic"),
             specular_roughness=rough("roughness"),
             specular_roughness_anisotropy=0.5 if _some(plain.anisotropic) else 0.0,
