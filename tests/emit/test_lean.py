@@ -6,19 +6,8 @@ import gonio as go
 import pytest
 from gonio.emit import bundle
 from gonio.models.recording import switched_off
-from gonio.ops import exp, inv_pi, log, maximum
 
-
-class Varnished(go.BSDF):
-    """Lambert under a lobe of powers of the normal's cosine."""
-
-    albedo: go.Colour = go.spectrum(0.5, "of the body", high=1.0)
-    varnish: go.Number = go.number(0.0, "weight of the lobe", low=0.0, high=1.0, off=0.0)
-    power: go.Number = go.number(5.0, "of the lobe", low=1.0, high=9.0)
-
-    def eval(self, wo, wi, mode="radiance"):
-        lobe = self.varnish * exp(self.power * log(maximum(wi.z, 1e-3)))
-        return (self.albedo * ((1.0 - self.varnish) * inv_pi) + lobe) * maximum(wi.z, 0.0)
+from varnished import Varnished
 
 
 def fields(made: object) -> list[str]:
