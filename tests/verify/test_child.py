@@ -122,7 +122,10 @@ def judged(file: Path, name: str, **more: object) -> Report:
         ("KillsItsThread", "KeyboardInterrupt in sample"),
     ],
 )
-def test_what_brings_the_process_down_fails_the_laws_that_need_it(file: Path, name: str, words: str) -> None:
+def test_what_brings_the_process_down_fails_the_laws_that_need_it(
+    file: Path, name: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # or words are never lost
     # the laws that hold must be done by then on a slow machine, and so must what takes memory before it takes time
     report = judged(file, name, limit=6.0 if "no end" in words else 60.0, memory=1.0)
     statuses = {verdict.law: verdict.status for verdict in report.cards[0].verdicts}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import mmap
 import os
 import pickle
@@ -128,6 +129,8 @@ class _Printed:
         for stream in (1, 2):
             os.dup2(file, stream)
         os.close(file)
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(line_buffering=True)  # else the last words of a process that aborts die with it
 
     def size(self) -> int:
         """Bytes so far."""
