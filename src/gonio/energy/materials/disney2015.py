@@ -10,7 +10,7 @@ import numpy as np
 from ... import ops
 from ...models import BSDF, Breach, Colour, Number, Sample, binding, flag, method, number, spectrum
 from ...models.material import Delta, Interior
-from ...models.microfacet import rotation_angle
+from ...models.microfacet import SMOOTH, rotation_angle
 from ...models.parameters import Angle
 from ...ops import Direction, Mode, Node, Scalar, Spectrum, backend, clamp, max_component, sqrt, where
 from ...optics import frame
@@ -30,6 +30,16 @@ class _Slabs(OpenPBR):
     if TYPE_CHECKING:  # OpenPBR's, which mypy forgets to be declared parameters
         specular_roughness: Number = number(0.3)
         specular_ior: Number = number(1.5)
+
+    # What there is of the slabs is known from the dials (`DisneyBSDF._kind`), whether those are recorded or not.
+    def _has(self, name: str) -> bool:
+        return bool(getattr(self.plain, name) != 0.0)
+
+    def _has_holes(self) -> bool:
+        return False
+
+    def _may_be_smooth(self, name: str) -> bool:
+        return bool(getattr(self.plain, name) ** 2 < SMOOTH)
 
     def _roughened(self) -> Scalar:
         return self.specular_roughness
