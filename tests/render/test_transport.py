@@ -98,6 +98,18 @@ def test_particles_make_the_picture_of_paths(lamp: str) -> None:
     assert sigmas(pictures(drawn, "path", 64), pictures(drawn, "light", 256)) < 6
 
 
+def test_particles_leave_a_sphere_that_is_turned_from_its_surface() -> None:
+    turned = T().translate([1, 2, 1]).rotate([0.6, 0, 0.8], 100).scale(0.3)
+    drawn = scene({"lamp": {"type": "sphere", "to_world": turned, "emitter": AREA}}, GREY, size=8)
+    render = Render(drawn, Settings("light"))
+    particles = render._integrator.particles
+    left, _ = particles.leave(particles.key(mi.UInt32(0)), dr.arange(mi.UInt32, 1024), mi.Bool(True))
+    outward = (np.array(left.origin).T - [1, 2, 1]) / 0.3
+    assert np.sum(np.array(left.direction).T * outward, axis=1).min() > -1e-5
+    # each carries the power pi L A that all have together
+    assert np.array(left.flux)[0] == pytest.approx(np.full(1024, 8 * np.pi * 4 * np.pi * 0.09), rel=1e-3)
+
+
 @pytest.mark.slow
 def test_particles_see_bent_normals_and_rough_glass_as_paths_do() -> None:
     rough = {"type": "roughdielectric", "alpha": 0.5, "distribution": "ggx"}
@@ -136,6 +148,36 @@ def test_caustics_of_a_point_which_no_path_finds_are_those_of_particles() -> Non
     shadow = floor & (path < 0.1)  # of the ball, as a path sees it
     assert light[shadow].mean() > 2 * path[shadow].mean(), "no caustic stands in the shadow"
     assert caustics[shadow].mean() == pytest.approx(light[shadow].mean(), rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore:a small lamp")
+def test_caustics_by_wavelength_are_those_of_particles() -> None:
+    """A ball of SF11, whose index depends on the wavelength, under a small lamp."""
+    size, where = (48, 30), EXAMPLES / "glass-caustic"
+
+    def picture(integrator: str, spp: int) -> np.ndarray:
+        found = [go.render(where, size=size, spp=spp, integrator=integrator, spectral=True, seed=s) for s in (1, 2)]
+        return np.mean(found, axis=0)
+
+    floor = (abs(go.render(where, size=size, spp=16, integrator="normal") - [0.5, 1.0, 0.5]) < 1e-4).all(-1)
+    light, caustics, path = picture("light", 512), picture("caustics", 64), picture("path", 16)
+    seen = go.render(where, size=size, spp=64, integrator="caustics").mean(-1)
+    focus = floor & (seen > 2 * np.median(seen[floor]))
+    assert focus.sum() > 5, "no focus"
+    for where_ in (floor, focus):
+        assert caustics[where_].mean(0) == pytest.approx(light[where_].mean(0), rel=0.05)
+    assert path[focus].mean() != pytest.approx(light[focus].mean(), rel=0.05), "paths would do"
+
+
+def test_caustics_by_wavelength_cut_into_passes_change_no_bit() -> None:
+    with engine.using("llvm_ad_spectral"):
+        drawn = scene({"lamp": LAMP}, GLASS, size=16)
+        whole, cut = (Render(drawn, Settings("caustics", 6, seed=5)) for _ in range(2))
+        whole.advance(11)
+        for count in (3, 1, 7):
+            cut.advance(count)
+        assert whole.image().mean() > 0.01
+        assert np.array_equal(whole.image(), cut.image())
 
 
 @pytest.mark.parametrize("name", [pytest.param("light", marks=pytest.mark.slow), "caustics"])
@@ -219,8 +261,6 @@ def test_what_particles_cannot_do_is_one_clear_error() -> None:
     drawn = scene({"lamp": LAMP}, GREY, size=8)
     with pytest.raises(InputError, match="no features for the denoiser"):
         Render(drawn, Settings("light"), aovs=True)
-    with pytest.raises(InputError, match="light by wavelength"):
-        go.render(EXAMPLES / "ring-caustic", spp=1, size=(8, 8), integrator="caustics", spectral=True)
 
 
 def test_path_says_where_it_starves_and_what_does_not() -> None:

@@ -151,12 +151,17 @@ class Integrator:
         column = pixel - row * self.width
         x, y = self.pair(key, index, PIXEL)
         position = mi.Point2f((mi.Float(column) + x) * self.inverse_size[0], (mi.Float(row) + y) * self.inverse_size[1])
-        wavelength, time = self.pair(key, index, TIME)
+        own, time = self.pair(key, index, TIME)
+        wavelength = self.hue(index, own)
         aperture = mi.Point2f(0.5)
         if self.sensor.needs_aperture_sample():
             aperture = mi.Point2f(*self.pair(key, index, APERTURE))
         time = self.sensor.shutter_open() + time * self.sensor.shutter_open_time()
         return self.sensor.sample_ray(time, wavelength, position, aperture)
+
+    def hue(self, index: UInt, own: Float) -> Float:
+        """The number in [0, 1) that chooses a sample's wavelengths; `own` is one that no other sample has."""
+        return own
 
     def advice(self) -> str:
         """What to tell a person who chose it for this scene; "" is nothing."""

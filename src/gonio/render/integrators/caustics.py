@@ -10,8 +10,7 @@ from typing import ClassVar
 import drjit as dr
 import numpy as np
 
-from ...errors import InputError
-from .. import engine
+from .. import engine, sampler
 from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
 from ..types import Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
@@ -26,6 +25,8 @@ FEWEST, MOST = 1 << 14, 1 << 19  # but so many at least, and at most
 FOOTPRINT = 1.5  # first radius of a search, in pixels as they are seen on the scene on the median
 SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
 CROWD = 4.0  # radii wide: the cubes in which particles are counted
+COLOURS = 4  # wavelengths of a sample in spectral variants
+HUES = 0x48554553  # key of the sequence that maps take them from
 PROBED = 48  # rays each way, to measure a pixel
 
 
@@ -67,9 +68,6 @@ class Caustics(Path):
         self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         if not self.merging:
             return
-        if mi.is_spectral:
-            what = "light by wavelength, of which a particle has others than the paths around it"
-            raise InputError(what, "integrator caustics", "leave out --spectral, or use path")
         self.particles = Particles(self, Targets(mi, self.smooth))
         size = sensor.film().crop_size()
         self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
@@ -120,7 +118,11 @@ class Caustics(Path):
         lane = dr.arange(mi.UInt32, self.count)
         begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
         low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
-        particle, flight = particles.leave(key, low, mi.Bool(True))
+        # Each of a map's wavelengths goes on alone, where they part, with a share of the particles: of neighbours in
+        # the sequence, which are even by themselves.
+        turn = lane * COLOURS // dr.opaque(mi.UInt32, self.count)
+        hue = self._hue(dr.opaque(mi.UInt32, number), turn) if mi.is_spectral else None
+        particle, flight = particles.leave(key, low, mi.Bool(True), hue)
         none = Photon(
             mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False)
         )
@@ -141,7 +143,7 @@ class Caustics(Path):
                 si.p,
                 mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, -flight.ray.d)),
                 mi.Vector3f(-flight.ray.d),
-                flight.flux * flight.share / self._total,
+                self._turned(flight.flux * flight.share, COLOURS - turn) / self._total,
                 way.density * dr.square(flight.eta),
                 flight.depth,
                 way.kept,
@@ -178,10 +180,35 @@ class Caustics(Path):
         radius = self.radius * (number + 1) ** SHRINKING
         return PhotonMap(self.mi, [way.first, way.second], [way.kept, way.kept_again], radius)
 
+    def _hue(self, number: UInt, turn: UInt) -> Float:
+        """The number that chooses the wavelengths of a map, whose particles have no others than the paths that look
+        at it, with another one of them as the first.
+
+        Wavelengths are one number and it shifted by 1/4, 2/4, 3/4 of the range: multiples of the golden ratio spread
+        all of them evenly over a quarter, and those of the root of 2 say which of them comes first.
+        """
+        assert self.particles is not None
+        key = sampler.pixel_key(self.mi.UInt32(HUES), self.particles.seed)
+        place, first = (
+            sampler.unit(key + number * 0x9E3779B9),
+            sampler.unit(sampler.mix(key, key) + number * 0x6A09E667),
+        )
+        return (place + self.mi.Float((self.mi.UInt32(COLOURS * first) + turn) % COLOURS)) / COLOURS
+
+    def _turned(self, flux: Radiance, by: UInt) -> Radiance:
+        """The flux by wavelengths in the order of those that many turns on."""
+        found = list(flux)
+        for step in range(1, COLOURS if self.mi.is_spectral else 1):
+            found = [dr.select(by % COLOURS == step, flux[(i + step) % COLOURS], v) for i, v in enumerate(found)]
+        return type(flux)(*found)
+
     def _coin(self, key: UInt, low: UInt, at: UInt) -> Float:
         return self.pair(key, low, at + 2)[0]
 
     # ------------------------------------------------------------------ paths
+
+    def hue(self, index: UInt, own: Float) -> Float:
+        return self._hue(index // SHARED, index) if self.merging and self.mi.is_spectral else own
 
     def merged(
         self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
@@ -205,7 +232,8 @@ class Caustics(Path):
             cosine = dr.maximum(abs(dr.dot(photon.direction, si.n)), 1e-6)
             share = 1 - self._by_path(pdf / cosine, photon.density, photons)
             share *= dr.select(photon.again, 1, counts)
-            return dr.select(here, value * photon.flux * (weight * share / cosine), 0)
+            flux = self._turned(photon.flux, path.index)
+            return dr.select(here, value * flux * (weight * share / cosine), 0)
 
         return photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active), counts
 

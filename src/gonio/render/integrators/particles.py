@@ -67,12 +67,16 @@ class Particles:
     def key(self, high: UInt) -> UInt:
         return sampler.pixel_key(high, self.seed)
 
-    def leave(self, key: UInt, low: UInt, active: Mask) -> tuple[Particle, Flight]:
-        """Particle `low` as it leaves its lamp, and on the way to what it meets first."""
+    def leave(self, key: UInt, low: UInt, active: Mask, hue: Float | None = None) -> tuple[Particle, Flight]:
+        """Particle `low` as it leaves its lamp, and on the way to what it meets first.
+
+        hue  chooses its wavelengths, for which it stands; None: it has some of its own, and stands for all
+        """
         mi, of = self.mi, self.of
         pick, colour = of.pair(key, low, PICK)
         place, way = mi.Point2f(*of.pair(key, low, PLACE)), mi.Point2f(*of.direction_pair(key, low, WAY))
-        wavelengths, weight = self.sources.wavelengths(colour)
+        wavelengths, weight = self.sources.wavelengths(colour if hue is None else hue)
+        weight = weight if hue is None else mi.Spectrum(1)
         particle = self.sources.sample(pick, place, of.pair(key, low, AIM)[0], way, wavelengths)
         particle.flux *= weight
         particle.seen *= weight
