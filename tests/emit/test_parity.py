@@ -14,7 +14,7 @@ import parity
 import pytest
 from gonio.emit import bundle
 from gonio.models.recording import switched_off
-from variants import EVERY, FEW, LEAN
+from variants import ALIKE, EVERY, FEW, LEAN
 
 import browser
 import materials
@@ -62,9 +62,10 @@ def _check(page: Any, lang: str, name: str, side: int, lean: bool = False) -> No
         assert v.share <= share, f"{text}; {v.share:.2g} of the draws"
 
 
-@pytest.mark.parametrize("name", FEW)
+@pytest.mark.parametrize("name", materials.each(FEW, set(FEW) - set(ALIKE)))
 def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
-    _check(page, "glsl", name, 64)
+    # the waves of a film take long in float64, as often as each of the inputs is moved
+    _check(page, "glsl", name, 32 if name.startswith("film") else 64)
 
 
 @pytest.mark.parametrize("name", ["metal-bounded-turned", "glass-turned", "mix-with-mirror", "phong", "kulla-conty"])

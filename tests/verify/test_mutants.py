@@ -32,7 +32,6 @@ FEW = (
     "fourth.plugins.RegularizedForGood",
     "second.sound.CornerCube",
     "second.sound.Grating",
-    "first.sound.Checker",
 )
 
 
