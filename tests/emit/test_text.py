@@ -19,7 +19,7 @@ from gonio.emit.syntax import literal
 from gonio.emit.textures import pixels
 from gonio.energy.compensation import curves
 from gonio.ops import Table, lookup
-from variants import COMPENSATED, EVERY, FEW, GOLD, SHAPES, written
+from variants import COMPENSATED, FEW, GOLD, SHAPES, written
 
 LANGS = tuple(languages())
 
