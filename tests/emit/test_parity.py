@@ -64,8 +64,7 @@ def _check(page: Any, lang: str, name: str, side: int, lean: bool = False) -> No
 
 @pytest.mark.parametrize("name", materials.each(FEW, set(FEW) - set(ALIKE)))
 def test_glsl_gives_the_values_of_python(page: Any, name: str) -> None:
-    # the waves of a film take long in float64, as often as each of the inputs is moved
-    _check(page, "glsl", name, 32 if name.startswith("film") else 64)
+    _check(page, "glsl", name, 64)
 
 
 @pytest.mark.parametrize("name", ["metal-bounded-turned", "glass-turned", "mix-with-mirror", "phong", "kulla-conty"])
