@@ -59,6 +59,12 @@ HALVES = pytest.mark.parametrize(
 )  # fmt: skip
 
 
+def test_the_quick_run_compiles_every_model() -> None:
+    # random walks are refused; the others take materials or files: pages of them are written in tests/viewer
+    elsewhere = {"bump", "measured", "random-walk", "sum"}
+    assert {EVERY[name].name for name in SHAPES} == set(go.models()) - elsewhere
+
+
 @HALVES
 def test_glsl_of_every_model_compiles_in_webgl2(page: Any, names: list[str]) -> None:
     end = "\nout vec4 color;\nvoid main() { color = vec4(0.0); }\n"

@@ -22,7 +22,6 @@ MISSES = {
 # one of each kind, whose law is fast
 FEW = (
     "first.smooth.MatteCosineTwice",
-    "first.corners.CoatAtOne",
     "first.plugins.EvalPdfBare",
     "second.delta.MirrorDeclaredNever",
     "second.plugins.GlassOneComponent",
