@@ -3,12 +3,17 @@
 `SMALL` has each kind once, of the historic models some, `ALL` every distribution with every masking, both Fresnel
 forms, every way of sampling, widths from .01 to 1, two widths with a rotation, and glass thin and dense. `COMPENSATED`
 has every way to give lost light back that can be recorded, and `COMPOSED` models of many layers with all of them on:
-energy's own tests judge them, recording and shaders look at them too.
+energy's own tests judge them, recording and shaders look at them too. Of `ALL` the quick run takes `EACH`: every model,
+distribution, masking, Fresnel form and way of sampling once, and the extreme widths (`each`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
+from typing import Any
+
 import gonio as go
+import pytest
 
 NDFS = ("ggx", "beckmann", "student-t")
 MASKINGS = ("smith-correlated", "smith-separable", "smith-separable-exact", "schlick-direct", "schlick-ibl", "v-groove")
@@ -144,3 +149,25 @@ SMALL = {
         for ndf in NDFS
     },
 }
+
+EACH = {
+    **SMALL,
+    **{n: m for n, m in HISTORIC.items() if n not in ("ward-duer", "ashikhmin-shirley-coupled")},
+    # of what shapes the code of rough metal and glass each once, of either the half
+    **{
+        name: ROUGH[name]
+        for name in (
+            "glass-ggx-smith-separable", "metal-beckmann-smith-separable-exact", "metal-ggx-schlick-direct",
+            "glass-beckmann-schlick-ibl", "metal-student-t-v-groove", "glass-ggx-v-groove",
+            "metal-ggx-alpha-0.01", "glass-ggx-alpha-0.01", "metal-beckmann-alpha-1.0", "glass-student-t-alpha-1.0",
+            "metal-ggx-bounded", "glass-ggx-bounded", "metal-beckmann-normals", "glass-ggx-normals",
+            "metal-ggx-schlick", "glass-ggx-schlick", "metal-student-t-one", "metal-ggx-f82", "glass-f82",
+            "glass-reflects-only", "glass-tinted",
+        )
+    },
+}  # fmt: skip
+
+
+def each(names: Iterable[str], quick: Collection[str] = EACH) -> list[Any]:
+    """The names as cases of a test, all but the quick ones marked slow."""
+    return [pytest.param(name, marks=() if name in quick else pytest.mark.slow) for name in names]

@@ -176,7 +176,19 @@ def _finds_llvm_alone() -> bool:
     return _python("import drjit as dr; assert dr.has_backend(dr.JitBackend.LLVM)").returncode == 0
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(_IMPORTS)), ids=" ".join)
+# whichever comes first, and whichever follows it
+_QUICK = {(first, *order) for first in _IMPORTS for others in [[n for n in _IMPORTS if n != first]]
+          for order in (others, others[::-1])}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        pytest.param(order, marks=() if order in _QUICK else pytest.mark.slow)
+        for order in itertools.permutations(_IMPORTS)
+    ],
+    ids=" ".join,
+)
 def test_every_order_of_imports_works(order: tuple[str, ...]) -> None:
     got = _python("; ".join(_IMPORTS[name] for name in order) + _WORK)
     if order[0] in ("gonio", "gonio.mitsuba") or _finds_llvm_alone():

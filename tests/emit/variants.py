@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import functools
+from typing import Any
+
 import gonio as go
+from gonio.emit import bundle
 
 import materials
 
@@ -42,6 +46,18 @@ FEW = {
     **COATED,
     **NESTED,
 }
+# those whose code says the same as another's but for one function that a third has
+ALIKE = (
+    "kulla-conty-imageworks", "kulla-conty-coat", "mix-compensated", "two-sided-compensated", "mix", "mix-of-mixes",
+    "coat-on-metal", "matched-glass", "metal-ggx-smith-correlated", "metal-beckmann-smith-correlated",
+    "glass-student-t-smith-correlated", "eon-fit",
+)  # fmt: skip
+# what the quick run compiles: every model
+SHAPES = {
+    **{name: material for name, material in FEW.items() if name not in ALIKE},
+    **{name: material for name, material in materials.EACH.items() if name in materials.HISTORIC},
+    **{name: materials.COMPOSED[name] for name in ("openpbr", "disney2015")},
+}
 # with few of their layers; of roughness 0, as what might be a mirror has code of its own
 SMOOTH = {"specular_roughness": 0.0, "coat_roughness": 0.0}
 LEAN = {
@@ -54,3 +70,9 @@ LEAN = {
     "disney2015": go.model("disney2015")(roughness=0.0),
     "disney2015-clearcoat": go.model("disney2015")(roughness=0.0, clearcoat=0.7),
 }
+
+
+@functools.cache
+def written(name: str, lang: str = "glsl") -> Any:
+    """The shader of one of `EVERY`, written once in a process."""
+    return bundle(EVERY[name], lang)

@@ -53,6 +53,7 @@ def test_bad_input_is_one_clear_error():
         go.albedo(go.OrenNayar(), 0.5, method="closed-form")
 
 
+@pytest.mark.slow  # in one width: test_cubature_foot
 def test_the_rim_of_a_narrow_lobe_is_not_missed():
     # a hundredth of this lobe lay in one large cell, between whose nodes it fell
     narrow = go.KullaConty(go.Conductor(alpha=(0.05, 0.02), fresnel="one", ndf="beckmann"))

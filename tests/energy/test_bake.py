@@ -117,6 +117,7 @@ def test_sampled_tables_of_two_widths_agree_with_the_quadrature():
     assert baked.manifest["error"]["E_avg"]["max"] < 2e-2
 
 
+@pytest.mark.slow  # of one width: the test above
 def test_a_stretched_layout_of_two_widths_interpolates_within_2e_3():
     baked = baking.bake("ggx", ["E"], size=32, aspect=0.25, layout="stretched")
     assert baked.manifest["error"]["E"]["max"] < 2e-5

@@ -32,8 +32,15 @@ def whole_albedo(model, mu):
     return total
 
 
-@pytest.mark.parametrize("masking", ["smith-correlated", "smith-separable"])
-@pytest.mark.parametrize("ndf", ["ggx", "beckmann"])
+@pytest.mark.parametrize(
+    ("ndf", "masking"),
+    [
+        ("ggx", "smith-correlated"),
+        pytest.param("ggx", "smith-separable", marks=pytest.mark.slow),
+        pytest.param("beckmann", "smith-correlated", marks=pytest.mark.slow),
+        ("beckmann", "smith-separable"),
+    ],
+)
 def test_white_furnace_of_metal_is_closed(ndf, masking):
     for roughness in (0.05, 0.13, 0.31, 0.55, 0.8, 1.0):
         metal = go.KullaConty(go.Conductor(alpha=roughness**2, ndf=ndf, masking=masking, fresnel="one"))
@@ -41,7 +48,7 @@ def test_white_furnace_of_metal_is_closed(ndf, masking):
             assert whole_albedo(metal, mu) == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("eta", [1.5, 1 / 1.5, 1.33])
+@pytest.mark.parametrize("eta", [1.5, 1 / 1.5, pytest.param(1.33, marks=pytest.mark.slow)])
 def test_white_furnace_of_glass_is_closed_on_both_sides(eta):
     for alpha in (0.05, 0.2, 0.5, 1.0):
         glass = go.KullaConty(go.Dielectric(eta, alpha))

@@ -97,7 +97,11 @@ def test_weight_is_eval_over_pdf_and_sampling_finds_the_albedo(name):
     assert np.all(np.abs(drawn.value - exact.value) < 6 * drawn.error + 5e-4)
 
 
-@pytest.mark.parametrize("base", [go.OrenNayar(0.8, 0.5), go.Phong(0.1, 0.4, 30.0)], ids=lambda m: m.name)
+@pytest.mark.parametrize(
+    "base",
+    [go.OrenNayar(0.8, 0.5), pytest.param(go.Phong(0.1, 0.4, 30.0), marks=pytest.mark.slow)],
+    ids=lambda m: m.name,
+)
 def test_every_law_holds_or_is_declared(base):
     # not gradients, for which the base is measured a dozen times: they are tested below
     laws = ["positivity", "reciprocity", "energy", "pdf", "weight", "isotropy", "precision", "calls"]

@@ -6,7 +6,7 @@ import gonio as go
 import numpy as np
 import pytest
 
-from materials import FINITE
+from materials import FINITE, each
 from sphere import random_directions
 
 COUNT = 20_000
@@ -25,7 +25,7 @@ def _index(material: go.BSDF, w: np.ndarray) -> np.ndarray:
 LAWFUL = {name: m for name, m in FINITE.items() if "reciprocity" not in m.breaches()}
 
 
-@pytest.mark.parametrize("name", LAWFUL)
+@pytest.mark.parametrize("name", each(LAWFUL))
 def test_scattering_is_reciprocal(name: str) -> None:
     material = LAWFUL[name]
     forth = material.f(WO, WI, precision="float64") / _index(material, WO)[:, None] ** 2
@@ -34,7 +34,9 @@ def test_scattering_is_reciprocal(name: str) -> None:
     np.testing.assert_allclose(forth, back, rtol=1e-8, atol=1e-10 * np.median(forth[forth > 0]))
 
 
-@pytest.mark.parametrize("name", [name for name, m in LAWFUL.items() if isinstance(m, go.Dielectric) and m.transmits])
+@pytest.mark.parametrize(
+    "name", each([name for name, m in LAWFUL.items() if isinstance(m, go.Dielectric) and m.transmits])
+)
 def test_importance_scatters_as_radiance_does_the_other_way(name: str) -> None:
     """The adjoint: f*(wo, wi) = f(wi, wo), so a light tracer and a path tracer see one surface (Veach1997, ch. 5)."""
     material = LAWFUL[name]

@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from materials import ALL, IDEAL
+from materials import ALL, EACH, IDEAL, each
 from sphere import random_directions, random_numbers
 
 COUNT = 20_000
 WO, U = random_directions(COUNT, 11), random_numbers(COUNT, 11)
 
 
-BOTH_MODES = [(name, "radiance") for name in ALL] + [(name, "importance") for name in ALL if ALL[name].transmits]
+BOTH_MODES = [
+    pytest.param(name, mode, marks=() if name in EACH else pytest.mark.slow)
+    for mode in ("radiance", "importance")
+    for name, material in ALL.items()
+    if mode == "radiance" or material.transmits
+]
 
 
 @pytest.mark.parametrize(("name", "mode"), BOTH_MODES)
@@ -28,7 +33,7 @@ def test_weight_is_eval_over_pdf_in_float64(name: str, mode: str) -> None:
     np.testing.assert_allclose(np.linalg.norm(s.wi, axis=1), 1.0, rtol=1e-10)
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", each(ALL))
 def test_failed_samples_have_neither_weight_nor_density(name: str) -> None:
     s = ALL[name].sample(WO, U)
     failed = s.pdf <= 0

@@ -82,7 +82,9 @@ def sigmas(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     ("material", "path", "values", "step"),
     [
         (GOLD, "shapes.0.material.alpha", (0.29, 0.31), 0.02),
-        (GOLD, "shapes.1.material.albedo", ([0.58, 0.48, 0.18], [0.62, 0.52, 0.22]), 0.04),
+        pytest.param(
+            GOLD, "shapes.1.material.albedo", ([0.58, 0.48, 0.18], [0.62, 0.52, 0.22]), 0.04, marks=pytest.mark.slow
+        ),
         pytest.param(
             GOLD, "shapes.0.material.eta", ([0.18, 0.88, 1.08], [0.22, 0.92, 1.12]), 0.04, marks=pytest.mark.slow
         ),

@@ -378,7 +378,7 @@ def endless(scene: Path) -> Path:
 )
 def test_a_signal_keeps_the_picture_so_far(endless: Path, tmp_path: Path, number: int, name: str) -> None:
     output = tmp_path / "a.exr"
-    for patience in (2, 8, 30):  # a busy machine may still be loading: then nothing is kept, and we wait longer
+    for patience in (4, 10, 30):  # a busy machine may still be loading: then nothing is kept, and we wait longer
         process = _start(endless, output)
         time.sleep(patience)
         process.send_signal(number)

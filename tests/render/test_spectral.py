@@ -103,7 +103,8 @@ def test_in_rgb_glass_has_the_index_of_sodium_light(tmp_path: Path) -> None:
     np.testing.assert_allclose(named, number, rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize("alpha", [0.0, 0.15])
+# smooth glass: the tests of Snell's window, of rainbows and of single wavelengths see it too
+@pytest.mark.parametrize("alpha", [pytest.param(0.0, marks=pytest.mark.slow), 0.15])
 def test_a_dispersing_ball_is_the_sum_of_its_single_wavelengths(tmp_path: Path, alpha: float) -> None:
     """Lamps of four lines, and glass whose index differs much between them: each line alone sees a plain index."""
     glass, peaks = "cauchy(1.2, 0.08)", [[450, 4, 1.0], [520, 4, 0.6], [580, 4, 0.8], [640, 4, 1.0]]

@@ -128,7 +128,8 @@ WIDE = rectangle((0.5, 2.0, 0.5), 0.6, 90, emitter=AREA)
 MIRROR = rectangle((0, 0.3, -1.2), 1.0, bsdf={"type": "conductor", "material": "Ag"})
 
 
-@pytest.mark.parametrize("lamp", ["wide", pytest.param("ball, point and sky", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("lamp", ["wide", "ball, point and sky"])
 def test_the_map_of_caustics_takes_nothing_and_adds_nothing(lamp: str) -> None:
     found = {"lamp": WIDE} if lamp == "wide" else {n: LAMPS[lamp][n] for n in ("lamp", "sky")}
     drawn = scene(found, GLASS, mirror=MIRROR)

@@ -113,7 +113,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
     ("name", "words"),
     [
         ("LoopsInPython", "no end after 6 s"),
-        ("IsDeaf", "no end after 6 s"),
+        pytest.param("IsDeaf", "no end after 6 s", marks=pytest.mark.slow),
         ("LoopsInAKernel", "no end after 6 s"),
         ("Allocates", "more than 1 GB of memory"),
         ("Aborts", "the process died: SIGABRT"),

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verify import correct
 
 MODELS = correct()
-FEW = ("oren-nayar", "phong", "conductor brushed", "dielectric", "mix with mirror")
+FEW = ("oren-nayar", "conductor brushed", "dielectric", "mix with mirror")
 
 
 def test_every_model_is_in_the_list() -> None:

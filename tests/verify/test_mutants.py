@@ -22,7 +22,6 @@ MISSES = {
 # one of each kind, whose law is fast
 FEW = (
     "first.smooth.MatteCosineTwice",
-    "first.corners.CoatAtOne",
     "first.plugins.EvalPdfBare",
     "second.delta.MirrorDeclaredNever",
     "second.plugins.GlassOneComponent",
@@ -32,7 +31,6 @@ FEW = (
     "fourth.plugins.RegularizedForGood",
     "second.sound.CornerCube",
     "second.sound.Grating",
-    "first.sound.Checker",
 )
 
 

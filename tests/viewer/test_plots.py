@@ -23,8 +23,20 @@ def _needed(name: str) -> tuple[list[str], str]:
     return inner + others, "Au" if any(p.kind == "spectrum" for p in required) else ""
 
 
-@pytest.mark.parametrize("kind", plots.KINDS)
-@pytest.mark.parametrize("name", list(models()))
+# each material drawn in one way, the ways in turn, and a few in all
+QUICK = {(name, plots.KINDS[i % len(plots.KINDS)]) for i, name in enumerate(models())}
+QUICK |= {(name, kind) for name in ("lambert", "conductor", "dielectric", "mix", "measured") for kind in plots.KINDS}
+QUICK = QUICK - {("disney2015", "lobe")} | {("disney2015", "slice")}  # nine seconds of one shape more
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        pytest.param(name, kind, marks=() if (name, kind) in QUICK else pytest.mark.slow)
+        for name in models()
+        for kind in plots.KINDS
+    ],
+)
 def test_every_material_can_be_plotted(name: str, kind: str, tmp_path: Path) -> None:
     assignments, preset = _needed(name)
     material = notation.named(name, assignments, preset)[0]

@@ -201,7 +201,10 @@ def test_under_a_black_environment_a_ball_is_black_and_not_gone() -> None:
     assert np.array_equal(dark[..., 3], lit[..., 3])
 
 
-@pytest.mark.parametrize("light", ["directional", "area", "environment"])
+@pytest.mark.parametrize(
+    "light",
+    [pytest.param("directional", marks=pytest.mark.slow), pytest.param("area", marks=pytest.mark.slow), "environment"],
+)
 def test_a_changed_value_compiles_nothing(light: str) -> None:
     command = [sys.executable, str(Path(__file__).with_name("kernels.py")), light]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)

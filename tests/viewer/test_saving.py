@@ -225,6 +225,7 @@ def test_saving_redraws_and_an_error_stands_over_the_last_good_picture(file: Pat
     with live(shown(file)) as (_, tab):
         tab.on("console", lambda m: problems.append(m.text) if m.type in ("error", "warning") else None)
         tab.on("pageerror", lambda error: problems.append(str(error)))
+        tab.set_viewport_size({"width": 800, "height": 420})  # its picture is awaited three times
         until = wait(tab)
         until("window.gonio?.frames > 0")
         brightness = """gonio.converge(16).then((p) => {

@@ -72,7 +72,10 @@ def light_parts(light: dict[str, Any], surface: np.ndarray) -> Iterator[tuple[np
 POINT = {"type": "point", "position": [3.0, 4.0, 5.0], "intensity": [120.0, 90.0, 60.0]}
 
 
-@pytest.mark.parametrize("light", [stage.SUN, POINT], ids=["directional", "point"])
+@pytest.mark.parametrize(
+    "light",
+    [pytest.param(stage.SUN, id="directional"), pytest.param(POINT, id="point", marks=pytest.mark.slow)],
+)
 def test_converged_picture_is_what_python_computes(page: Page, light: dict[str, Any]) -> None:
     page.set(f"s.lights = [{{ ...{json.dumps(light)}, on: true, name: 'only' }}]")
     raster = page.picture(256)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..energy.albedo import cubature
+from ..ops import Direction, Scalar, backend
 from . import directions
 
 if TYPE_CHECKING:
@@ -272,19 +273,27 @@ def estimates(subject: Subject, mode: Mode = "radiance") -> Estimates:
     bins = _bins(s.wi)
     apart = [_batched(w.mean(1, keepdims=True) * bins * good[:, None], n) for w in (weight, own.weight)]
 
-    def integrand(o: np.ndarray, i: np.ndarray) -> np.ndarray:
+    def answers(o: np.ndarray, i: np.ndarray) -> np.ndarray:
         value = np.nan_to_num(subject.eval(o, i, mode), posinf=0.0, neginf=0.0)
-        pdf = np.maximum(np.nan_to_num(subject.pdf(o, i), posinf=0.0, neginf=0.0), 0.0)[:, None]
-        split = value.mean(1, keepdims=True) * _bins(i)
-        return np.concatenate([value, value * (SPHERE / (pdf + SPHERE)), pdf, split], axis=1)
+        pdf = np.maximum(np.nan_to_num(subject.pdf(o, i), posinf=0.0, neginf=0.0), 0.0)
+        return np.concatenate([value, pdf[:, None]], axis=1)
+
+    asked = cubature.of_rows(answers)
+
+    def integrand(o: Direction, i: Direction) -> list[Scalar]:
+        *value, pdf = asked(o, i)
+        split = _split(sum(value[1:], start=value[0]) / len(value), i)
+        return [*value, *(channel * (SPHERE / (pdf + SPHERE)) for channel in value), pdf, *split]
 
     if not subject.has_density:
         integral = np.zeros((n, 2 * channels + 1 + BINS))
     elif subject.stochastic or not subject.steady:  # values are random: no cell would ever be good enough
         wi = directions.uniform(np.random.default_rng(43), len(many))
-        integral = integrand(many, wi).reshape(n, SAMPLES, -1).mean(1) / SPHERE
+        vectors = (backend.vector_of(w, 3, backend.types("float64")) for w in (many, wi))
+        columns = np.stack([backend.to_numpy(column, len(wi)) for column in integrand(*vectors)], axis=-1)
+        integral = columns.reshape(n, SAMPLES, -1).mean(1) / SPHERE
     else:
-        integral = cubature.integrate(_seeds(subject), cubature.of_rows(integrand), wo, ACCURACY).value
+        integral = cubature.integrate(_seeds(subject), integrand, wo, ACCURACY).value
     seen, claimed, split = np.split(integral, [2 * channels, 2 * channels + 1], axis=1)
     ideal = _deltas(s.wi, weight, s.pdf, s.delta, n)
     (sampled, spread), (part, other) = followed
@@ -329,6 +338,19 @@ def _bins(w: np.ndarray) -> np.ndarray:
     """1 in the column of the bin that a direction lies in, (N, BINS); edges are those of cubature's first cells."""
     number = (w[:, 0] > 0.0) + 2 * (w[:, 1] > 0.0) + 4 * (np.abs(w[:, 2]) > np.sqrt(0.5)) + 8 * (w[:, 2] > 0.0)
     return (number[:, None] == np.arange(BINS)).astype(float)
+
+
+def _split(value: Scalar, w: Direction) -> list[Scalar]:
+    """A value of Dr.Jit in its bin, 0 in the others: in the kernel that sums them, as sixteen columns of NumPy's take
+    longer than most models."""
+    dr = backend.drjit()
+    sides = (w.x > 0.0, w.y > 0.0, dr.abs(w.z) > np.sqrt(0.5), w.z > 0.0)
+    within = [[~side, side] for side in sides]
+    found = []
+    for number in range(BINS):
+        a, b, c, d = (choice[number >> bit & 1] for bit, choice in enumerate(within))
+        found.append(dr.select(a & b & c & d, value, 0.0))
+    return found
 
 
 class _Own(NamedTuple):
