@@ -113,13 +113,13 @@ class LowSmooth(_Glossy):
         return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(1.0 + 0.0 * wo.z))
 
 
-class _Rim(NamedTuple):
+class Rim(NamedTuple):
     ahead: Scalar
     behind: Scalar
 
 
 @function
-def _rim(wo: Direction, c: Scalar, s: Scalar) -> _Rim:
+def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
     """How far the rim of the unit disk is from the mirrored wo, ahead in the azimuth (c, s) and behind.
 
     The roots of |p + r d|^2 = 1, of which one would cancel; their product is -(n.o)^2.
@@ -128,7 +128,7 @@ def _rim(wo: Direction, c: Scalar, s: Scalar) -> _Rim:
     root = sqrt(sqr(along) + sqr(wo.z))
     longer = maximum(root + ops.abs(along), 1e-6)
     shorter = sqr(wo.z) / longer
-    return _Rim(where(along > 0.0, longer, shorter), where(along > 0.0, shorter, longer))
+    return Rim(where(along > 0.0, longer, shorter), where(along > 0.0, shorter, longer))
 
 
 @function
