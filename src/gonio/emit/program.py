@@ -52,7 +52,7 @@ class Program:
         functions_of = dict(zip((r.name for r in found), recorded.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in found}
         self.entries: dict[str, Routine] = {}
-        stem = type(model).__name__
+        stem = type(model).__name__.lstrip("_")
         for routine in found:
             for method in (*functions, "derive"):
                 if routine.name == f"{stem}_{method}":
@@ -72,7 +72,9 @@ class Program:
         fields = tuple(field_list(value))
         key = (type(value).__name__, fields)
         if key not in self._parameters:
-            name = graph.first_free(type(value).__name__, [s.record.name for s in self._parameters.values()])
+            name = graph.first_free(
+                type(value).__name__.lstrip("_"), [s.record.name for s in self._parameters.values()]
+            )
             doc = (type(value).__doc__ or "").strip().splitlines()[0]
             self._parameters[key] = Struct(name, list(fields), doc, dict(parameter_docs(value)))
         return self._parameters[key]
@@ -92,7 +94,7 @@ class Program:
                 if not key:
                     continue
                 if isinstance(value, BSDF):
-                    owner.setdefault(key, type(value).__name__)
+                    owner.setdefault(key, type(value).__name__.lstrip("_"))
                 used.setdefault(key, set())
                 for index in routine.used:
                     root, path, derived = place(routine.parameters[index].static)
@@ -102,7 +104,7 @@ class Program:
             fields = [(path, type_) for path, type_ in key if path in paths]
             if fields and key in owner:
                 name = graph.first_free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
-                by = f"{type(self.model).__name__}_derive"
+                by = f"{type(self.model).__name__.lstrip('_')}_derive"
                 doc = f"What follows from the parameters alone: {by} computes it, once a draw."
                 self._derived[key] = Struct(name, fields, doc)
         derive = self.entries.get("derive")
@@ -141,7 +143,7 @@ class Program:
                 wanted |= {v.static for v in routine.values() if v.op == "call"}
         for routine in found:
             unnamed = routine.record is None and not routine.single
-            if routine in wanted and unnamed and routine.name != f"{type(self.model).__name__}_derive":
+            if routine in wanted and unnamed and routine.name != f"{type(self.model).__name__.lstrip('_')}_derive":
                 self._name_result(routine)
         return [routine for routine in found if routine in wanted]
 

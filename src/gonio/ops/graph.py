@@ -376,7 +376,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
         stem = python_function.__name__.strip("_")
         owner = bound.arguments.get("self")
         if owner is not None:
-            stem = f"{type(owner).__name__}_{stem}"
+            stem = f"{type(owner).__name__.lstrip('_')}_{stem}"
         elif python_function.__qualname__.count(".") == 1:  # a static method
             stem = f"{python_function.__qualname__.split('.')[0]}_{stem}"
         name = first_free(stem, taken)

@@ -22,7 +22,7 @@ STRENGTH = 0.25  # of a coat of 1
 STRETCH = 0.9  # by how much an anisotropic of 1 stretches
 
 
-class Slabs(OpenPBR):
+class _Slabs(OpenPBR):
     """OpenPBR whose coat lies on its base without changing its index or its width: the base is seen as it is."""
 
     name: ClassVar[str] = ""
@@ -103,7 +103,7 @@ class DisneyBSDF(BSDF):
 
     # ------------------------------------------------------------------ as slabs
 
-    def _kind(self) -> Slabs:
+    def _kind(self) -> _Slabs:
         """Which parts of the slabs' code there are."""
         plain = self.plain
 
@@ -115,7 +115,7 @@ class DisneyBSDF(BSDF):
             open_ = isinstance(getattr(self, name), Node) or backend.is_drjit(value)
             return 0.0 if open_ else float(np.min(np.asarray(value, float)))
 
-        return Slabs(
+        return _Slabs(
             base_diffuse_roughness=0.5,  # roughness is no weight: what is recorded of 0 holds for others too
             base_metalness=at("metallic"),
             specular_roughness=rough("roughness"),
@@ -129,7 +129,7 @@ class DisneyBSDF(BSDF):
             geometry_thin_walled=self.thin,
         )
 
-    def _slabs(self) -> Slabs:
+    def _slabs(self) -> _Slabs:
         """The slabs that these dials stand for."""
         kind, colour = self._kind(), self.base_color
         one, white = 1.0 + 0.0 * self.roughness, 1.0 + 0.0 * colour
