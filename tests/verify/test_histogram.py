@@ -68,3 +68,20 @@ def test_p_values_over_a_hundred_seeds_are_uniform() -> None:
 def test_rounding_of_directions_counts_for_nothing_in_cells_of_their_steps() -> None:
     narrow = go.Conductor(alpha=2.5e-4, ndf="beckmann")
     assert verify(narrow, law="pdf", seed=1).passed
+
+
+@pytest.mark.parametrize("place", [0.03, 0.97])
+def test_a_step_beside_the_edges_of_a_ring_of_cells_is_found(place: float) -> None:
+    """The density of half of all directions is twice the others'; where it changes no cell's nodes lie beyond."""
+    rng = np.random.default_rng(1)
+    pilot = directions.on_side(directions.uniform(rng, 40_000), 1)
+    wo = np.array([[0.0, 0.0, 1.0]])
+    grid = histogram.place_around([pilot], wo, lambda _, wi: np.ones(len(wi)))
+    low, high = grid.rows[0, 0, 50:52].astype(float)
+    edge = low + place * (high - low)
+
+    def density(_: np.ndarray, wi: np.ndarray) -> np.ndarray:
+        return np.where(1.0 - np.abs(wi[:, 2]) < edge, 2.0, 1.0) / (2.0 * np.pi * (1.0 + edge)) * (wi[:, 2] > 0.0)
+
+    expected = histogram.expect(density, grid, 0.1 * 2.0**-10)
+    assert expected.total[0] == pytest.approx(1.0, abs=3e-5)

@@ -30,6 +30,7 @@ CELLS = (100, 200)  # rows and columns a side of the surface
 COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
 PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
 DEPTH = 9  # divisions of a cell; a step such as total reflection's divides those that it runs through to the last
+BESIDE = 1.1  # times: a step of a tenth next to the edges of a ring of cells is 1e-4 of all
 LARGEST = 400_000  # cells of one round, some 10 M directions
 LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
@@ -219,7 +220,7 @@ def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
         off = np.maximum(0.3 * np.abs(four - two.integral), rough)
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
         area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
-        aside = area * step_aside(seen, look(*place, *_RIM))
+        aside = area * step_aside(seen, look(*place, *_RIM), BESIDE)
         divide = (off > allowed) | (aside > allowed) | ((seen.most <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
         if 4 * divide.sum() > LARGEST:  # a pdf that is rough everywhere: the roughest cells, and the rest as it is
