@@ -452,7 +452,7 @@ class Lights:
         """
         mi = self.mi
         if self.rectangle is None:
-            hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+            hit = self.surfaces.nearest(ray, active)
             si = self.surfaces.interaction(hit, ray, active)
             radiance = self.emitted(si, active)
             return weigh(radiance, self.pdf(ray.o, solid_angle, si, active & dr.any(radiance != 0)))
@@ -467,7 +467,7 @@ class Lights:
         # Stops short of the light by the same relative distance as Interaction::spawn_ray_to.
         shadow.maxt = distance * (1 - mi.math.ShadowEpsilon)
         active &= dr.any(radiance != 0)
-        active &= ~self.scene.ray_test(shadow, active)
+        active &= ~self.surfaces.blocked(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
         return weigh(dr.select(active, radiance, 0), pdf)
 

@@ -1,9 +1,10 @@
-"""What a ray finds where it meets a shape, for scenes of thousands of shapes.
+"""What rays meet, and what they find there, for scenes of a few shapes and for scenes of thousands.
 
 Mitsuba asks the shape that was met by a virtual call, which Dr.Jit traces once for every shape there is: .1 ms each,
 at every vertex of the program. So where there are many spheres or rectangles their placements stand in one array, each
 lane reads that of the shape it has met, and the formula stands in the kernel once. Other shapes are called as before.
-Meshes need none of this: those of equal material are one.
+Meshes need none of this: those of equal material are one. Where shapes are few and simple, rays are traced in the
+kernel itself (`inline`), and the same formulas take less time than calls would.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from .inline import Inline
 from .types import Hit, Mask, OfVariant, Ray, Scene, Shape, SurfaceInteraction, UInt, Vector
 
 # From so many shapes of a kind on. Two spheres cost no more than one, since their code is the same; tracing 64 of them
@@ -24,13 +26,16 @@ MANY = 64
 
 
 class Surfaces:
-    """The surfaces of a scene as they are when this is made: `interaction` is what a ray finds there."""
+    """The surfaces of a scene as they are when this is made: `nearest` and `blocked` trace rays, `interaction` is what
+    a ray finds where it meets one."""
 
     def __init__(self, mi: ModuleType, scene: Scene):
-        self.mi = mi
-        shapes = scene.shapes()
+        self.mi, self.scene = mi, scene
+        shapes, read = scene.shapes(), _reader(mi)
+        self.inline = Inline.of(mi, scene, read)
         found = {kind: [shape for shape in shapes if shape.class_name() == kind] for kind in _KINDS}
-        self.kinds = [kind for kind, members in found.items() if len(members) >= MANY]
+        least = MANY if self.inline is None else 1
+        self.kinds = [kind for kind, members in found.items() if len(members) >= least]
         if not self.kinds:
             return
         self.others = [shape for shape in shapes if shape.class_name() not in self.kinds]
@@ -38,7 +43,6 @@ class Surfaces:
         size = 1 + max(numbers.values())  # what a pointer to a shape is in a kernel, a number from 1 on
         kind_of, place = np.zeros(size, np.uint32), np.zeros(size, np.uint32)
         placement = np.zeros((size, 16))
-        read = _reader(mi)
         for index, kind in enumerate(self.kinds, start=1):
             rows = [numbers[id(shape)] for shape in found[kind]]
             kind_of[rows] = index
@@ -48,6 +52,16 @@ class Surfaces:
         place[[numbers[id(shape)] for shape in self.others]] = np.arange(len(self.others))
         self.placement, self.kind_of, self.place = mi.Float(placement.ravel()), mi.UInt32(kind_of), mi.UInt32(place)
         dr.make_opaque(self.placement, self.kind_of, self.place)
+
+    def nearest(self, ray: Ray, active: Mask = True, coherent: bool = False) -> Hit:
+        """What a ray meets first; `coherent` where those beside it go the same way."""
+        if self.inline is not None:
+            return self.inline.nearest(ray, active)
+        return self.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
+
+    def blocked(self, ray: Ray, active: Mask = True) -> Mask:
+        """Whether a ray meets anything."""
+        return self.scene.ray_test(ray, active) if self.inline is None else self.inline.blocked(ray, active)
 
     def interaction(self, hit: Hit, ray: Ray, active: Mask = True) -> SurfaceInteraction:
         """The surface that was met, with all that Mitsuba's `compute_surface_interaction` tells by itself."""

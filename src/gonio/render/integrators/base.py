@@ -142,7 +142,7 @@ class Integrator:
         """A sample's camera ray, its weight, and the first thing that it meets."""
         ray, weight = self.camera_ray(pixel, key, index)
         ray = self.mi.Ray3f(ray)
-        return ray, weight, self.scene.ray_intersect_preliminary(ray, coherent=True)
+        return ray, weight, self.surfaces.nearest(ray, coherent=True)
 
     def camera_ray(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Ray, Radiance]:
         """A ray through a point of the pixel, and its weight."""
@@ -169,7 +169,7 @@ class Integrator:
 
     def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
         """Lanes whose surface sees the point."""
-        return active & ~self.scene.ray_test(si.spawn_ray_to(point), active)
+        return active & ~self.surfaces.blocked(si.spawn_ray_to(point), active)
 
     def rgb(self, radiance: Radiance, wavelengths: Sequence[Float]) -> Colour:
         """Radiance at a sample's wavelengths as linear RGB."""

@@ -103,7 +103,7 @@ class Caustics(Path):
         for step in (0.0, 1.0 / across):
             place = mi.Point2f(x + dr.opaque(mi.Float, step), y)
             rays.append(self.sensor.sample_ray(0.0, 0.5, place, mi.Point2f(0.5))[0])
-        hit = self.scene.ray_intersect_preliminary(mi.Ray3f(rays[0]))
+        hit = self.surfaces.nearest(mi.Ray3f(rays[0]))
         angle = dr.norm(rays[1].d - rays[0].d)
         widths = np.array(dr.select(hit.is_valid(), hit.t * angle, 0))
         widths = widths[widths > 0]

@@ -162,7 +162,7 @@ class Light(Transport):
         if eye is not None:
             active = self.unoccluded(si, eye, active)
         else:
-            active &= ~self.scene.ray_test(mi.Ray3f(si.p, away), active)
+            active &= ~self.surfaces.blocked(mi.Ray3f(si.p, away), active)
         place = mi.UInt32(y) * self.width + mi.UInt32(x)
         dither = mi.Float64(sampler.independent_pair(key, low, place ^ DITHER)[0])
         colour = [mi.Float64(v) * self.per_unit for v in self.rgb(value, si.wavelengths)]

@@ -84,7 +84,7 @@ class Particles:
         ray.o = dr.select(particle.place.is_valid(), ray.o, particle.origin)
         ray.wavelengths = wavelengths
         active = active & dr.any(particle.flux != 0) & (of.max_depth > 1)
-        hit = of.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        hit = of.surfaces.nearest(ray, active)
         flight = Flight(
             mi.UInt32(1),
             ray,
@@ -166,7 +166,7 @@ class Particles:
         if crossing is not None:
             inside = dr.select(si.wi.z * bs.wo.z < 0.0, crossing.beyond, crossing.here)
         ray = si.spawn_ray(si.to_world(bs.wo))
-        hit = of.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        hit = of.surfaces.nearest(ray, active)
         active &= hit.is_valid()
         eta = flight.eta * dr.select(active, bs.eta, 1)
         return Flight(flight.depth + 1, ray, hit, flight.flux, share, eta, flight.alone, inside, active)

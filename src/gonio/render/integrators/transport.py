@@ -301,7 +301,7 @@ class Transport(Integrator):
         if not self.traces_last:
             radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
             active = active & ~last
-        hit = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        hit = self.surfaces.nearest(ray, active)
         if not lights.has_environment:  # else the path goes on to meet it
             active = active & hit.is_valid()
         return PathState(
