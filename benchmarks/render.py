@@ -216,12 +216,11 @@ class _Stage(Transport):
 
     stage = "rays"
 
-    def begin(self, pixel: Any, key: Any, index: Any) -> Any:
+    def sample(self, pixel: Any, key: Any, index: Any) -> Any:
         ray, _ = self.camera_ray(pixel, key, index)
-        hit = self.scene.ray_intersect_preliminary(ray, coherent=True)
-        path = type("Ended", (), {"active": mi.Bool(False)})
+        hit = self.surfaces.nearest(ray, coherent=True)
         if self.stage == "camera rays":
-            return path, [dr.select(hit.is_valid(), hit.t, 0), mi.Float(0), mi.Float(0)]
+            return [dr.select(hit.is_valid(), hit.t, 0), mi.Float(0), mi.Float(0)]
         u = mi.Point2f(*self.pair(key, index, 3))
         if self.stage == "rays":  # shadow rays to points uniform on the lamp's area, from the bare point of the ray
             lamp = self.lights.rectangle
@@ -229,13 +228,13 @@ class _Stage(Transport):
             origin = ray(hit.t * (1 - 1e-4))
             away = point - origin
             shadow = mi.Ray3f(origin, away, 0.999, ray.time, ray.wavelengths)
-            shadowed = self.scene.ray_test(shadow, hit.is_valid())
-            return path, [dr.select(shadowed, 0, mi.Float(1)), mi.Float(0), mi.Float(0)]
-        si = hit.compute_surface_interaction(ray, mi.RayFlags.All)
+            shadowed = self.surfaces.blocked(shadow, hit.is_valid())
+            return [dr.select(shadowed, 0, mi.Float(1)), mi.Float(0), mi.Float(0)]
+        si = self.surfaces.interaction(hit, ray)
         light = self.lights.sample(si, u, si.is_valid())
         lit = si.is_valid() & (mi.Frame3f.cos_theta(si.to_local(light.ds.d)) > 0)
-        lit &= ~self.scene.ray_test(si.spawn_ray_to(light.ds.p), lit)
-        return path, list(dr.select(lit, light.weight, 0))
+        lit &= ~self.surfaces.blocked(si.spawn_ray_to(light.ds.p), lit)
+        return list(dr.select(lit, light.weight, 0))
 
 
 def stages(bsdf: Any, rounds: int, clock: Callable[[], float]) -> None:

@@ -218,7 +218,7 @@ def test_parts_of_a_picture_of_caustics_are_those_of_the_whole() -> None:
     part.select(slice(64, 128))
     whole.advance(6)
     part.advance(6)
-    assert np.array_equal(whole.state()["far0"][64:128], part.state()["far0"])
+    assert np.array_equal(whole.state()["radiance0"][64:128], part.state()["radiance0"])
 
 
 def test_a_scene_without_light_or_without_mirrors_needs_no_map() -> None:

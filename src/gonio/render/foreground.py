@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .integrators import Integrator, Render, Settings, Transport
+from .integrators.transport import PathState
 from .lights import Lights
-from .types import Float, Mask, Point, Radiance, Ray, Record, Scene, Sensor, SurfaceInteraction, UInt
+from .types import Float, Mask, Point, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
 
 
 class Foreground(Render):
@@ -49,8 +50,7 @@ class Foreground(Render):
 
     def image(self) -> NDArray[np.float32]:
         """(height, width, 4) float32: linear RGB, averaged over the whole pixel, and coverage; row 0 on top."""
-        sums = self._sums
-        return self._mean([*sums.near[0:3], sums.near[3]], [*sums.far, self.mi.Float64(0)])
+        return self._mean([*self._sums.radiance, *self._sums.features])
 
 
 class _Surfaces(Transport):
@@ -63,12 +63,15 @@ class _Surfaces(Transport):
         if self.apart is not None:
             self.lights = _Transparent(mi, self.apart)
 
-    def begin(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Record, list[Float]]:
-        """As the base's, for lanes that meet a surface; the feature is 1 there."""
-        path = self.first(pixel, key, index)
-        met = path.hit.is_valid()
-        path = self.extend(dataclasses.replace(path, active=met), key, [])
-        return path, [*self.rgb(path.radiance, path.ray.wavelengths), dr.select(met, self.mi.Float(1), 0)]
+    def first(self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True) -> PathState:
+        """As the base's, for lanes that meet a surface."""
+        path = super().first(pixel, key, index, begins)
+        return dataclasses.replace(path, active=path.hit.is_valid())
+
+    def extend(self, path: PathState, key: UInt, first: bool = False) -> tuple[PathState, list[Float]]:
+        """As the base's; the feature is 1 where there is a surface."""
+        following, _ = super().extend(path, key, first)
+        return following, [dr.select(path.active, self.mi.Float(1), 0)]
 
     def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
         """All lights are in sight where they stand apart."""

@@ -136,7 +136,7 @@ class Gradients(Render):
 
     def slopes(self) -> list[NDArray[np.float32]]:
         """The picture's derivative along each, (height, width, 3)."""
-        return [self._mean(self._sums.near[3 + 3 * i : 6 + 3 * i]) for i in range(len(self.along))]
+        return [self._mean(self._sums.features[3 * i : 3 * i + 3]) for i in range(len(self.along))]
 
 
 @dataclass
@@ -192,7 +192,7 @@ class _Carrying(Transport):
             leaves = [throughput, radiance, *(v for values in self._values.values() for v in values.values())]
             dr.enable_grad(leaves)
             moved = replace(path, throughput=throughput, radiance=radiance)
-            following = self.extend(moved, key, [] if first else None)
+            following, _ = self.extend(moved, key, first)
             # a value of its own: Dr.Jit forgets derivatives of what others are made from
             outgoing = [dr.select(following.active, following.throughput, 0), following.radiance]
             found = []

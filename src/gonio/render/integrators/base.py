@@ -133,16 +133,17 @@ class Integrator:
         """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples."""
 
         def step(index: UInt, sums: Sums) -> tuple[UInt, Sums]:
-            return index + 1, sums.add_near(self.sample(pixel, key, index))
+            values, every = self.sample(pixel, key, index), self.mi.Bool(True)
+            return index + 1, sums.add(values[:3], every, values[3:], every)
 
         state = (first + dr.zeros(self.mi.UInt32, dr.width(pixel)), sums)
         return dr.while_loop(state, lambda i, _: i < last, step, mode="symbolic", label="samples")[1]
 
-    def first_hit(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Ray, Radiance, Hit]:
+    def first_hit(self, pixel: UInt, key: UInt, index: UInt, active: Mask = True) -> tuple[Ray, Radiance, Hit]:
         """A sample's camera ray, its weight, and the first thing that it meets."""
         ray, weight = self.camera_ray(pixel, key, index)
         ray = self.mi.Ray3f(ray)
-        return ray, weight, self.surfaces.nearest(ray, coherent=True)
+        return ray, weight, self.surfaces.nearest(ray, active, coherent=True)
 
     def camera_ray(self, pixel: UInt, key: UInt, index: UInt) -> tuple[Ray, Radiance]:
         """A ray through a point of the pixel, and its weight."""

@@ -109,7 +109,7 @@ class Light(Transport):
 
         state = (first + dr.zeros(mi.UInt32, dr.width(pixel)), sums.invalid)
         _, invalid = dr.while_loop(state, lambda i, _: i < last, step, mode="symbolic", label="particles")
-        return Sums(sums.near, sums.far, invalid, sums.splats)
+        return Sums(sums.radiance, sums.features, invalid, sums.splats)
 
     def _see_lamp(self, key: UInt, low: UInt, particle: Particle, sums: Sums) -> UInt:
         """The lamp itself, as the camera sees it from the point where a particle leaves it."""

@@ -97,7 +97,9 @@ class Render:
         if count < 1:
             raise InputError(f"{count} samples asked for", "advance", "1 or more")
         mi = self.mi
-        with dr.suspend_grad(), garbage.kept(), engine.interruptible():
+        # Dr.Jit would record each loop once more, without what turns out to stay as it is: LLVM finds that by itself.
+        unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
+        with dr.suspend_grad(), garbage.kept(), engine.interruptible(), unchanged:
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
@@ -133,7 +135,7 @@ class Render:
     def state(self) -> dict[str, NDArray[Any]]:
         """The sums so far, as arrays of one entry a lane that stay as they are while more is rendered."""
         if not self._begun:
-            return Sums.zeros(self.mi, len(self._pixel), len(self._sums.near) - 3, self._splatted).arrays()
+            return Sums.zeros(self.mi, len(self._pixel), len(self._sums.features), self._splatted).arrays()
         ahead = {} if self._lanes is None else {LANES: np.asarray(self._lanes)}
         return {**self._sums.arrays(), **ahead}
 
@@ -147,12 +149,12 @@ class Render:
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
         self._pixel = engine.own(self.mi.UInt32, self._order[lanes])
-        self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.near) - 3, self._splatted)
+        self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.features), self._splatted)
         self.done, self._lanes = 0, None
 
     def image(self) -> NDArray[np.float32]:
         """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""
-        picture = self._mean(self._sums.near[0:3], self._sums.far)
+        picture = self._mean(self._sums.radiance)
         if self._splatted and self._begun:
             scale = self._integrator.unit / max(self.done, 1)
             splats = [np.array(channel) * scale for channel in self._sums.splats]
@@ -167,25 +169,24 @@ class Render:
         """
         if not self.aovs:
             raise InputError("features were not rendered", "Render.aov", "make the Render with aovs=True")
-        return {"albedo": self._mean(self._sums.near[3:6]), "normal": self._mean(self._sums.near[6:9])}
+        return {"albedo": self._mean(self._sums.features[:3]), "normal": self._mean(self._sums.features[3:])}
 
     @property
     def invalid(self) -> int:
         """How many values so far were not finite and were left out; anything but 0 is a fault of some BSDF or light."""
         return int(dr.sum(self._sums.invalid)[0])
 
-    def _mean(self, *sums: Sequence[Float]) -> NDArray[np.float32]:
-        """Each channel's sums, added up and divided by the samples, at their pixels."""
-        mi, channels = self.mi, list(zip(*sums, strict=True))
+    def _mean(self, channels: Sequence[Float]) -> NDArray[np.float32]:
+        """Each channel's sums divided by the samples, at their pixels."""
+        mi = self.mi
         shape = (self.height, self.width, len(channels))
         if not self._begun:
             return np.zeros(shape, np.float32)
         done = dr.opaque(mi.UInt32, self.done) if self._lanes is None else self._lanes
         done = mi.Float64(dr.maximum(done, 1))
         pixels = dr.empty(mi.Float, self.width * self.height * len(channels))
-        for number, parts in enumerate(channels):
-            value = mi.Float(sum(parts[1:], parts[0]) / done)
-            dr.scatter(pixels, value, self._pixel * len(channels) + number)
+        for number, total in enumerate(channels):
+            dr.scatter(pixels, mi.Float(total / done), self._pixel * len(channels) + number)
         return np.array(pixels, np.float32).reshape(shape)
 
 

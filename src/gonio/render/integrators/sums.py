@@ -17,36 +17,36 @@ from ..types import Float, Mask, UInt, Whole
 
 @dataclass
 class Sums:
-    """Sums in 64 bits, one entry a lane: radiance and features of first vertices, radiance of the rest of the paths.
+    """Sums in 64 bits, one entry a lane: radiance, and features of what samples see first.
 
     splats  red, green and blue that particles have brought, one entry a pixel, whole numbers; none where there are none
 
     A value that is not finite (a BSDF's overflow) is left out and counted, so that it does not cost the pixel.
     """
 
-    near: list[Float]
-    far: list[Float]
+    radiance: list[Float]
+    features: list[Float]
     invalid: UInt
     splats: list[Whole] = field(default_factory=list)
 
     @staticmethod
     def zeros(mi: ModuleType, lanes: int, features: int, pixels: int = 0) -> Sums:
         """`pixels`: of a picture that is splatted, else 0."""
-        near = [dr.zeros(mi.Float64, lanes) for _ in range(3 + features)]
+        found, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (3, features))
         splats = [dr.zeros(mi.Int64, pixels) for _ in range(3 if pixels else 0)]
-        sums = Sums(near, [dr.zeros(mi.Float64, lanes) for _ in range(3)], dr.zeros(mi.UInt32, lanes), splats)
+        sums = Sums(found, more, dr.zeros(mi.UInt32, lanes), splats)
         dr.make_opaque(sums)  # zeros as data: else the first pass would be a kernel of its own
         return sums
 
     def at(self, lane: UInt) -> Sums:
         """Those of the lanes with these numbers."""
-        near, far = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.near, self.far))
-        return Sums(near, far, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
+        found, more = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.radiance, self.features))
+        return Sums(found, more, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Each sum by its name; a view where the device is the CPU, but for splats, which are added to in place."""
-        found = {f"near{i}": np.asarray(values) for i, values in enumerate(self.near)}
-        found |= {f"far{i}": np.asarray(values) for i, values in enumerate(self.far)}
+        found = {f"radiance{i}": np.asarray(values) for i, values in enumerate(self.radiance)}
+        found |= {f"feature{i}": np.asarray(values) for i, values in enumerate(self.features)}
         found |= {f"splat{i}": np.array(values) for i, values in enumerate(self.splats)}
         return {**found, "invalid": np.asarray(self.invalid)}
 
@@ -63,20 +63,22 @@ class Sums:
             kind = {"f": mi.Float64, "i": mi.Int64, "u": mi.UInt32}[arrays[name].dtype.kind]
             return engine.own(kind, arrays[name])
 
-        near = [taken(f"near{i}") for i in range(len(like.near))]
-        found = Sums(near, [taken(f"far{i}") for i in range(len(like.far))], taken("invalid"))
+        radiance = [taken(f"radiance{i}") for i in range(len(like.radiance))]
+        found = Sums(radiance, [taken(f"feature{i}") for i in range(len(like.features))], taken("invalid"))
         found.splats = [taken(f"splat{i}") for i in range(len(like.splats))]
         return found
 
-    def add_near(self, values: Sequence[Float]) -> Sums:
-        near, invalid = self._add(self.near, values, True)
-        return Sums(near, self.far, invalid, self.splats)
+    def add(self, radiance: Sequence[Float], ended: Mask, features: Sequence[Float], begun: Mask) -> Sums:
+        """With the radiance of samples that have ended, and the features of those that have begun."""
+        found, lost = self._add(self.radiance, radiance, ended)
+        more, lost_too = self._add(self.features, features, begun)
+        lost = lost if lost_too is None else lost | lost_too
+        return Sums(found, more, self.invalid + dr.select(lost, type(self.invalid)(1), 0), self.splats)
 
-    def add_far(self, values: Sequence[Float], active: Mask) -> Sums:
-        far, invalid = self._add(self.far, values, active)
-        return Sums(self.near, far, invalid, self.splats)
-
-    def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], UInt]:
+    def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], Mask]:
+        """(sums, lanes of values that are not finite); none of these where there are no sums."""
+        if not sums:
+            return sums, None
         finite = dr.isfinite(sum(values))
         add = [s + type(s)(dr.select(finite & active, v, 0)) for s, v in zip(sums, values, strict=True)]
-        return add, self.invalid + dr.select(finite | ~dr.mask_t(finite)(active), type(self.invalid)(0), 1)
+        return add, ~finite & active

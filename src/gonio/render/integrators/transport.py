@@ -9,14 +9,13 @@ How it is fast, beside what `progressive` does:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, make_dataclass
-from functools import cache
+from dataclasses import dataclass
 from types import ModuleType
 from typing import ClassVar
 
 import drjit as dr
 
-from .. import engine, sampler
+from .. import sampler
 from ..adapter.variant import DISPERSES, NESTS, SEPARATES
 from ..lights import Lights
 from ..media import Crossing, Media
@@ -28,7 +27,6 @@ from ..types import (
     MitsubaBSDF,
     Radiance,
     Ray,
-    Record,
     Scene,
     Sensor,
     SurfaceInteraction,
@@ -48,9 +46,6 @@ SURVIVAL = 4.0
 # Dimensions of a path: each vertex takes VERTEX_DIMENSIONS of them.
 FIRST_VERTEX = FIRST_FREE
 LIGHT, LOBE, CHOICE, ROULETTE, VERTEX_DIMENSIONS = 0, 1, 2, 3, 4
-
-# Samples whose paths wait for each other, see Transport.accumulate.
-BATCH = 16
 
 
 @dataclass
@@ -73,39 +68,6 @@ class PathState:
     active: Mask
 
 
-@cache
-def _waiting_type(variant: str, media: bool, merges: bool) -> Record:
-    """What is kept of a path that waits after its first vertex: `pack` and `unpack` of a PathState.
-
-    A dataclass made for the variant, since Dr.Jit's local memory wants the true types of the fields. That memory
-    cannot hold masks (in Dr.Jit 1.5 they do not compile for the CPU), so what an intersection found is kept
-    without its mask `valid`; the distance says the same.
-    """
-    mi = engine.load()
-    found = {name: kind for name, kind in mi.PreliminaryIntersection3f.DRJIT_STRUCT.items() if name != "valid"}
-    kept = {"index": mi.UInt32, "ray": mi.Ray3f, "throughput": mi.Spectrum}
-    kept |= dict.fromkeys(("eta", "pdf", "solid_angle"), mi.Float)
-    kept |= ({"alone": mi.UInt32} if mi.is_spectral else {}) | ({"inside": mi.UInt32} if media else {})
-    kept |= {"lobe": mi.Float, "counts": mi.Float} if merges else {}
-
-    def pack(path: PathState) -> Record:
-        hit = {name: getattr(path.hit, name) for name in found}
-        return waiting(**{name: getattr(path, name) for name in kept}, **hit)
-
-    def unpack(rest: Record) -> PathState:
-        hit = dr.zeros(mi.PreliminaryIntersection3f)
-        for name in found:
-            setattr(hit, name, getattr(rest, name))
-        hit.valid = rest.t < dr.inf
-        fields = {"alone": mi.UInt32(0), "inside": mi.UInt32(0), "lobe": mi.Float(0), "counts": mi.Float(1)}
-        fields |= {name: kind(getattr(rest, name)) for name, kind in kept.items()}
-        return PathState(depth=mi.UInt32(1), hit=hit, radiance=mi.Spectrum(0), active=mi.Bool(True), **fields)
-
-    waiting: Record = make_dataclass("Waiting", [*kept.items(), *found.items()])
-    waiting.pack, waiting.unpack = staticmethod(pack), unpack
-    return waiting
-
-
 class Transport(Integrator):
     """An integrator that follows light along paths. A subclass says how:
 
@@ -124,7 +86,6 @@ class Transport(Integrator):
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         super().__init__(mi, scene, sensor, settings, aovs)
         self.media = Media(mi, scene)
-        self.Waiting = _waiting_type(mi.variant(), self.media.known, self.merges)
         self.context = mi.BSDFContext()
         self.context.type_mask = NESTS if self.media.known else SEPARATES
         self.lights = Lights(mi, scene, self.surfaces, beside_lobes=self.samples_lobes)
@@ -161,80 +122,65 @@ class Transport(Integrator):
     def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
         """Add samples [first, last) of every pixel to the sums, each sum in the order of the samples.
 
-        Samples go in batches of BATCH. The first vertices of a batch are done one sample after the other: their rays
-        are coherent, every lane is busy. The paths that go on from there are put by, and then followed in a flat
-        loop over vertices: a lane whose path has ended takes its next one at once, instead of idling until the
-        longest of its 16 neighbours' has ended. What comes after the first vertex is summed apart, so that the
-        order of additions, and hence the last bit, does not depend on where passes cut the batches.
+        One flat loop over vertices, whatever sample they are of: a lane whose path has ended begins its next one at
+        once, instead of idling until the longest of its 16 neighbours' has ended.
         """
-        mi = self.mi
-        lanes = dr.width(pixel)
-        # Counters of local memory start as full-width opaque arrays: Dr.Jit 1.5 takes a loop variable that starts as
-        # one number to be the same in all lanes, and then writes every lane's entry at one lane's place.
-        none = dr.opaque(mi.UInt32, 0, lanes)
-
-        def batch(index: UInt, sums: Sums) -> tuple[UInt, Sums]:
-            end = dr.minimum(index + BATCH, last)
-            waiting = dr.alloc_local(self.Waiting, BATCH if self.goes_on else 1, value=dr.zeros(self.Waiting))
-
-            def begin(index: UInt, sums: Sums, waiting: Record, count: UInt) -> tuple[UInt, Sums, Record, UInt]:
-                path, values = self.begin(pixel, key, index)
-                sums = sums.add_near(values)
-                if self.goes_on:
-                    waiting.write(self.Waiting.pack(path), count, path.active)
-                    count = count + dr.select(path.active, mi.UInt32(1), mi.UInt32(0))
-                return index + 1, sums, waiting, count
-
-            state = (index, sums, waiting, none)
-            state = dr.while_loop(state, lambda i, *_: i < end, begin, mode="symbolic", label="first vertices")
-            index, sums, waiting, count = state
-            if self.goes_on:
-                sums = self.follow(key, waiting, count, none, sums)
-            return index, sums
-
-        start = first + dr.zeros(mi.UInt32, lanes)
-        state = dr.while_loop((start, sums), lambda i, _: i < last, batch, mode="symbolic", label="batches")
-        return state[1]
-
-    def follow(self, key: UInt, waiting: Record, count: UInt, none: UInt, sums: Sums) -> Sums:
-        """Follow the paths put by in `waiting[0:count]` to their ends and add what they find."""
+        if not self.goes_on:
+            return super().accumulate(pixel, key, first, last, sums)
         mi = self.mi
 
-        def body(slot: UInt, path: PathState, waiting: Record, sums: Sums) -> tuple[UInt, PathState, Record, Sums]:
-            path = dr.select(path.active, path, waiting.read(slot).unpack())
-            path = self.extend(path, key)
+        def body(index: UInt, path: PathState, sums: Sums) -> tuple[UInt, PathState, Sums]:
+            begins = ~path.active
+            path = dr.select(begins, self.first(pixel, key, index, begins), path)
+            path, features = self.extend(path, key)
             ended = ~path.active
-            sums = sums.add_far(self.rgb(path.radiance, path.ray.wavelengths), ended)
-            return slot + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, waiting, sums
+            sums = sums.add(self.rgb(path.radiance, path.ray.wavelengths), ended, features, begins)
+            return index + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, sums
 
-        idle = dr.zeros(self.Waiting).unpack()
-        idle.active = mi.Bool(False)
-        state = (none, idle, waiting, sums)
-        loop = dr.while_loop(state, lambda slot, *_: slot < count, body, mode="symbolic", label="further vertices")
-        return loop[3]
+        nothing = dr.zeros(mi.Ray3f), dr.zeros(mi.PreliminaryIntersection3f), mi.Spectrum(0)
+        idle = self._path(mi.UInt32(0), *nothing, active=False)
+        state = (first + dr.zeros(mi.UInt32, dr.width(pixel)), idle, sums)
+        return dr.while_loop(state, lambda index, *_: index < last, body, mode="symbolic", label="vertices")[2]
 
-    def begin(self, pixel: UInt, key: UInt, index: UInt) -> tuple[PathState, list[Float]]:
-        """The first vertex of a sample: (the path that goes on from it, [r, g, b, features of this vertex])."""
-        path, features = self.first(pixel, key, index), list[Float]()
-        path = self.extend(path, key, features)
-        return path, [*self.rgb(path.radiance, path.ray.wavelengths), *features]
+    def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
+        """[r, g, b] and the features of a sample that ends at its first vertex."""
+        path, features = self.extend(self.first(pixel, key, index), key, first=True)
+        return [*self.rgb(path.radiance, path.ray.wavelengths), *features]
 
-    def first(self, pixel: UInt, key: UInt, index: UInt) -> PathState:
-        """A sample's path up to the first thing that it meets."""
-        mi = self.mi
-        ray, weight, hit = self.first_hit(pixel, key, index)
+    def first(self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True) -> PathState:
+        """A sample's path up to the first thing that it meets, on lanes that begin one."""
+        ray, weight, hit = self.first_hit(pixel, key, index, begins)
+        return self._path(index, ray, hit, self.mi.Spectrum(weight), True)
+
+    def _path(self, index: UInt, ray: Ray, hit: Hit, weight: Radiance, active: Mask) -> PathState:
+        """A path that has met nothing yet."""
+        mi, zero, one = self.mi, self.mi.Float(0), self.mi.Float(1)
         inside = self.begun if self.begun is not None else mi.UInt32(0)
-        zero, one = mi.Float(0), mi.Float(1)
-        return PathState(index, mi.UInt32(0), ray, hit, mi.Spectrum(weight), one, zero, zero, mi.Spectrum(0),
-                         mi.UInt32(0), inside, zero, one, mi.Bool(True))  # fmt: skip
+        return PathState(
+            index,
+            mi.UInt32(0),
+            ray,
+            hit,
+            weight,
+            one,
+            zero,
+            zero,
+            mi.Spectrum(0),
+            mi.UInt32(0),
+            inside,
+            zero,
+            one,
+            mi.Bool(active),
+        )
 
-    def extend(self, path: PathState, key: UInt, features: list[Float] | None = None) -> PathState:
+    def extend(self, path: PathState, key: UInt, first: bool = False) -> tuple[PathState, list[Float]]:
         """One vertex of a path: take its light, gather light there, choose the next direction and trace it.
 
-        features  given at the first vertex: a list that gets its albedo and normal, if they are wanted
+        first  whether it is known to be the first vertex, which makes the program shorter
+
+        Returns the path, and albedo and normal of the vertex where they are wanted.
         """
         mi, lights = self.mi, self.lights
-        first = features is not None
         ray, throughput, radiance, active = path.ray, path.throughput, path.radiance, path.active
         depth = mi.UInt32(0) if first else path.depth
         dimension = depth * VERTEX_DIMENSIONS + FIRST_VERTEX
@@ -275,9 +221,8 @@ class Transport(Integrator):
         if self.ambient is not None:
             radiance = radiance + throughput * self.ambient_light(self.ambient, bsdf, si, active)
         throughput = throughput * weight
-        if features is not None and self.aovs:
-            seen = (*self.rgb(throughput, ray.wavelengths), *si.sh_frame.n)
-            features += [dr.select(active, v, 0) for v in seen]
+        seen = (*self.rgb(throughput, ray.wavelengths), *si.sh_frame.n) if self.aovs else ()
+        features = [dr.select(active, v, 0) for v in seen]
 
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         active = active & dr.any(throughput != 0) & (self.samples_lobes | delta)
@@ -304,7 +249,7 @@ class Transport(Integrator):
         hit = self.surfaces.nearest(ray, active)
         if not lights.has_environment:  # else the path goes on to meet it
             active = active & hit.is_valid()
-        return PathState(
+        following = PathState(
             path.index,
             depth + 1,
             ray,
@@ -320,6 +265,7 @@ class Transport(Integrator):
             counts,
             active,
         )
+        return following, features
 
     def merged(
         self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
