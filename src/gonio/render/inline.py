@@ -74,14 +74,19 @@ class Inline:
     """The shapes of a scene, as they are when this is made. `of` says whether it is for them."""
 
     def __init__(self, mi: ModuleType, scene: Scene, spheres: list[Sphere], flats: list[Flat]):
-        self.mi, self.count = mi, len(scene.shapes())
-        self.shapes = scene.shapes_dr()  # read, not written into the kernel: what numbers they have changes
+        self.mi = mi
+        # Mitsuba's order of shapes is one of chance, which neither the kernel nor a tie between two shapes may follow.
+        flats.sort(key=lambda f: (f.kind, f.faces, f.rows))
+        spheres.sort(key=lambda s: (s.centre, s.radius))
+        parts = [flat.shape for flat in flats] + [sphere.shape for sphere in spheres]
+        self.shapes = dr.gather(mi.ShapePtr, scene.shapes_dr(), mi.UInt32(parts))  # of each part
+        dr.eval(self.shapes)
         # One array: kernels differ by the order in which the arrays that they read were made.
         numbers = [n for s in spheres for n in (*s.centre, s.radius)]
         numbers += [n for flat in flats for row in flat.rows for n in row]
         table = engine.own(mi.Float, np.array(numbers, np.float32))
         read = (dr.gather(mi.Float, table, at) for at in range(len(numbers)))
-        self.spheres = [(s.shape, mi.Point3f(*itertools.islice(read, 3)), next(read)) for s in spheres]
+        self.spheres = [(mi.Point3f(*itertools.islice(read, 3)), next(read)) for _ in spheres]
         self.flats = [(flat, [list(itertools.islice(read, 4)) for _ in range(3)]) for flat in flats]
 
     @staticmethod
@@ -116,19 +121,20 @@ class Inline:
         """What the ray meets first."""
         mi = self.mi
         best = dr.select(active, mi.Float(ray.maxt), 0)
-        index, face, place = mi.UInt32(self.count), mi.UInt32(0), mi.Point2f(0)
-        for flat, rows in self.flats:
+        count = len(self.flats) + len(self.spheres)
+        part, face, place = mi.UInt32(count), mi.UInt32(0), mi.Point2f(0)
+        for number, (flat, rows) in enumerate(self.flats):
             t, x, y, met = self._on_flat(flat, rows, ray, best)
-            best, index = dr.select(met, t, best), dr.select(met, flat.shape, index)
+            best, part = dr.select(met, t, best), dr.select(met, number, part)
             face, place = self._placed(flat, x, y, met, face, place)
-        for shape, centre, radius in self.spheres:
+        for number, (centre, radius) in enumerate(self.spheres, start=len(self.flats)):
             t, met = self._on_sphere(centre, radius, ray, best)
-            best, index = dr.select(met, t, best), dr.select(met, shape, index)
+            best, part = dr.select(met, t, best), dr.select(met, number, part)
         hit = dr.zeros(mi.PreliminaryIntersection3f)
-        hit.valid = index < self.count
+        hit.valid = part < count
         hit.t = dr.select(hit.valid, best, dr.inf)
         hit.prim_index, hit.prim_uv = face, place
-        hit.shape = dr.gather(mi.ShapePtr, self.shapes, index, hit.valid)
+        hit.shape = dr.gather(mi.ShapePtr, self.shapes, part, hit.valid)
         return hit
 
     def blocked(self, ray: Ray, active: Mask) -> Mask:
@@ -138,7 +144,7 @@ class Inline:
         met = mi.Bool(False)
         for flat, rows in self.flats:
             met |= self._on_flat(flat, rows, ray, most)[3]
-        for _, centre, radius in self.spheres:
+        for centre, radius in self.spheres:
             met |= self._on_sphere(centre, radius, ray, most)[1]
         return met
 

@@ -17,6 +17,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from . import engine
 from .inline import Inline
 from .types import Hit, Mask, OfVariant, Ray, Scene, Shape, SurfaceInteraction, UInt, Vector
 
@@ -50,8 +51,8 @@ class Surfaces:
             flipped = np.array([shape.has_flipped_normals() for shape in found[kind]])
             placement[rows] = _KINDS[kind][0](matrices, np.where(flipped, -1.0, 1.0)).reshape(-1, 16)
         place[[numbers[id(shape)] for shape in self.others]] = np.arange(len(self.others))
-        self.placement, self.kind_of, self.place = mi.Float(placement.ravel()), mi.UInt32(kind_of), mi.UInt32(place)
-        dr.make_opaque(self.placement, self.kind_of, self.place)
+        self.placement = engine.own(mi.Float, placement.ravel().astype(np.float32))
+        self.kind_of, self.place = engine.own(mi.UInt32, kind_of), engine.own(mi.UInt32, place)
 
     def nearest(self, ray: Ray, active: Mask = True, coherent: bool = False) -> Hit:
         """What a ray meets first; `coherent` where those beside it go the same way."""
