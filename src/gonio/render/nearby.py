@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from . import engine
-from .sky import found_among
+from .sky import Choice
 from .types import Emitter, Float, Mask, Point, Scene, UInt
 
 CELLS = 8  # a side, at most
@@ -60,23 +60,23 @@ class Nearby:
         sums = np.cumsum(table, axis=1)
         sums[:, count - 1 :] = 1.0
         self._chance = engine.own(mi.Float, table.ravel().astype(np.float32))
-        self._sums = engine.own(mi.Float, sums.ravel().astype(np.float32))
+        self._choice = Choice(mi, sums)
 
     def _row(self, p: Point) -> UInt:
         mi = self.mi
         at = [dr.clip((p[i] - self._low[i]) * self._scale[i], 0.0, self.cells - 1.0) for i in range(3)]
         x, y, z = (mi.UInt32(v) for v in at)
-        return (x + self.cells * (y + self.cells * z)) * self.columns
+        return x + self.cells * (y + self.cells * z)
 
     def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
         """(number of a lamp, what is left of `u`, in [0, 1], the lamp's probability)."""
         row = self._row(p)
-        index, left = found_among(self.mi, self._sums, row, self.columns, u)
-        return index, left, dr.gather(self.mi.Float, self._chance, row + index)
+        index, left = self._choice.of(row, u)
+        return index, left, dr.gather(self.mi.Float, self._chance, row * self.columns + index)
 
     def probability(self, p: Point, index: UInt, active: Mask) -> Float:
         """That `choose` gives this lamp."""
-        return dr.gather(self.mi.Float, self._chance, self._row(p) + index, active)
+        return dr.gather(self.mi.Float, self._chance, self._row(p) * self.columns + index, active)
 
 
 def _fraction(x: Float) -> Float:
