@@ -52,7 +52,7 @@ class Program:
         functions_of = dict(zip((r.name for r in found), recorded.functions, strict=False))
         self.recorded = {r: functions_of[r.name] for r in found}
         self.entries: dict[str, Routine] = {}
-        stem = type(model).__name__.lstrip("_")
+        stem = graph.class_name(model)
         for routine in found:
             for method in (*functions, "derive"):
                 if routine.name == f"{stem}_{method}":
@@ -72,9 +72,7 @@ class Program:
         fields = tuple(field_list(value))
         key = (type(value).__name__, fields)
         if key not in self._parameters:
-            name = graph.first_free(
-                type(value).__name__.lstrip("_"), [s.record.name for s in self._parameters.values()]
-            )
+            name = graph.first_free(graph.class_name(value), [s.record.name for s in self._parameters.values()])
             doc = (type(value).__doc__ or "").strip().splitlines()[0]
             self._parameters[key] = Struct(name, list(fields), doc, dict(parameter_docs(value)))
         return self._parameters[key]
@@ -94,7 +92,7 @@ class Program:
                 if not key:
                     continue
                 if isinstance(value, BSDF):
-                    owner.setdefault(key, type(value).__name__.lstrip("_"))
+                    owner.setdefault(key, graph.class_name(value))
                 used.setdefault(key, set())
                 for index in routine.used:
                     root, path, derived = place(routine.parameters[index].static)
@@ -104,7 +102,7 @@ class Program:
             fields = [(path, type_) for path, type_ in key if path in paths]
             if fields and key in owner:
                 name = graph.first_free(f"{owner[key]}Derived", [s.record.name for s in self._derived.values()])
-                by = f"{type(self.model).__name__.lstrip('_')}_derive"
+                by = f"{graph.class_name(self.model)}_derive"
                 doc = f"What follows from the parameters alone: {by} computes it, once a draw."
                 self._derived[key] = Struct(name, fields, doc)
         derive = self.entries.get("derive")
@@ -143,7 +141,7 @@ class Program:
                 wanted |= {v.static for v in routine.values() if v.op == "call"}
         for routine in found:
             unnamed = routine.record is None and not routine.single
-            if routine in wanted and unnamed and routine.name != f"{type(self.model).__name__.lstrip('_')}_derive":
+            if routine in wanted and unnamed and routine.name != f"{graph.class_name(self.model)}_derive":
                 self._name_result(routine)
         return [routine for routine in found if routine in wanted]
 

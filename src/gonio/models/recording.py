@@ -35,5 +35,5 @@ def record(material: Material, method: str = "eval", mode: Mode = "radiance") ->
     inner = inspect.unwrap(getattr(type(material), method))
     more: dict[str, Any] = {"mode": mode} if "mode" in inspect.signature(inner).parameters else {}
     kinds = {"wo": "vec3", "u": "vec3"} if method == "sample" else {"wo": "vec3", "wi": "vec3"}
-    name = f"{type(material).__name__.lstrip('_')}_{method}"
+    name = f"{graph.class_name(material)}_{method}"
     return ops.record(inner, types=kinds, name=name, self=symbols(material), **more)

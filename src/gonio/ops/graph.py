@@ -355,6 +355,11 @@ def _constant(number: float | np.number) -> Node:
     return emit("constant", type_of(number), static=number)
 
 
+def class_name(value: object) -> str:
+    """The name that its class gives to what is recorded of it; shaders allow no underscore before names."""
+    return type(value).__name__.lstrip("_")
+
+
 def first_free(name: str, taken: Container[str]) -> str:
     """The name, or name_2, name_3 and so on: the first that is not taken."""
     names = itertools.chain([name], (f"{name}_{count}" for count in itertools.count(2)))
@@ -376,7 +381,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
         stem = python_function.__name__.strip("_")
         owner = bound.arguments.get("self")
         if owner is not None:
-            stem = f"{type(owner).__name__.lstrip('_')}_{stem}"
+            stem = f"{class_name(owner)}_{stem}"
         elif python_function.__qualname__.count(".") == 1:  # a static method
             stem = f"{python_function.__qualname__.split('.')[0]}_{stem}"
         name = first_free(stem, taken)
