@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import functools
 import math
+import threading
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import (
@@ -340,15 +341,35 @@ def _spellings(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(s for n in (*plain, f"gonio-{name}") for s in (n, n.replace("-", "_"))))
 
 
-def _all() -> list[type[MaterialPart]]:
-    known = models()
-    classes = [_declare((name,), known[lab.model], lab) for name, lab in LAB.items()]
-    return classes + [_declare(_spellings(name), model, None) for name, model in known.items()]
+class _Declared(Mapping[str, type[MaterialPart]]):
+    """The class of each type, by its names in a scene. One is made when it is asked for: making all takes a second."""
+
+    def __init__(self) -> None:
+        known = models()
+        self._lab = {name: known[lab.model] for name, lab in LAB.items()}
+        self._others = {spelling: name for name in known for spelling in _spellings(name)}
+        self._made: dict[str, type[MaterialPart]] = {}
+        self._lock = threading.RLock()
+
+    def __getitem__(self, name: str) -> type[MaterialPart]:
+        own = name if name in self._lab else self._others[name]
+        with self._lock:
+            if name not in self._made:
+                names = (name,) if name in self._lab else _spellings(own)
+                part = _declare(names, self._lab.get(name) or models()[own], LAB.get(name))
+                part.model_rebuild(_types_namespace={"Material": Material})
+                self._made |= dict.fromkeys(names, part)
+            return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from (*self._lab, *self._others)
+
+    def __len__(self) -> int:
+        return len(self._lab) + len(self._others)
 
 
-MATERIALS = _all()
-BY_TYPE = {name: cls for cls in MATERIALS for name in cls.model_fields["type"].annotation.__args__}  # type: ignore
-OWN = "FILE.py:CLASS"  # tag of materials that were not there when this module was loaded
+BY_TYPE = _Declared()
+OWN = "FILE.py:CLASS"  # tag of materials; those of another program's files have their format's
 
 
 @functools.cache
@@ -450,18 +471,12 @@ def _beside(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
 def _tag(value: object) -> str | None:
     if isinstance(value, DocumentPart):
         return value.type
-    if not isinstance(value, dict):
-        return value.type if isinstance(value, MaterialPart) and type(value) is BY_TYPE.get(value.type) else OWN
-    name = value.get("type")
-    if not isinstance(name, str):
-        return None if name is None else OWN
-    known = name in BY_TYPE or name in Document.family.all()
-    own = not known and (outside.names_code(name) or part_of(name) is not None or library.resembles(name))
-    return OWN if own else name
+    name = value.get("type") if isinstance(value, dict) else OWN
+    return name if name is None or (isinstance(name, str) and name in Document.family.all()) else OWN
 
 
 def _own(value: object, info: ValidationInfo) -> object:
-    """A material of the user's own: registered, or of a file, which runs where the user allowed it."""
+    """A material by its type: Gonio's, named, registered, or of a file, which runs where the user allowed it."""
     if isinstance(value, MaterialPart):
         return value
     if not isinstance(value, dict):
@@ -469,10 +484,13 @@ def _own(value: object, info: ValidationInfo) -> object:
     name, context = value["type"], info.context or {}
     if not isinstance(name, str):
         raise invalid(f"unknown type '{name}'", "known: " + ", ".join(sorted(BY_TYPE)), "type")
-    if not outside.names_code(name) and library.resembles(name):
+    if name not in BY_TYPE and not outside.names_code(name) and library.resembles(name):
         return _from_library(name, value, context)
     part = part_of(name)
     if part is None:
+        if not outside.names_code(name):
+            known = ", ".join(f"'{one}'" for one in (*BY_TYPE, *Document.family.all()))
+            raise PydanticCustomError("union_tag_invalid", "unknown type", {"tag": name, "expected_tags": known})
         if not context.get("allow_code"):
             hint = "read the file first; then --allow-code lets the scene run it"
             raise invalid(f"'{name}' is code, which a scene alone does not run", hint, "type")
@@ -493,14 +511,21 @@ def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> 
     return BY_TYPE[model.name].model_validate({**value, "type": model.name, "preset": preset}, context=context)
 
 
+# What stands for any of Gonio's materials in a generated schema: those are many, and each may hold others.
+PLACEHOLDER = {"$comment": "any material"}
+
 if TYPE_CHECKING:
     Material: TypeAlias = MaterialPart
 else:
-    _pattern = {"type": {"type": "string", "pattern": r"\.py:\w+$"}}
-    _schema = {"type": "object", "properties": _pattern, "required": ["type"], "description": "A class in a file."}
-    _members: list[Any] = [Annotated[cls, Tag(name)] for name, cls in BY_TYPE.items()]
-    _members += [Annotated[DocumentPart, AfterValidator(_from_document), Tag(name)] for name in Document.family.all()]
-    _members.append(Annotated[MaterialPart, PlainValidator(_own), WithJsonSchema(_schema), Tag(OWN)])
+    _members: list[Any] = [
+        Annotated[DocumentPart, AfterValidator(_from_document), Tag(name)] for name in Document.family.all()
+    ]
+    _members.append(Annotated[MaterialPart, PlainValidator(_own), WithJsonSchema(PLACEHOLDER), Tag(OWN)])
     Material = Annotated[Union[tuple(_members)], Discriminator(_tag)]  # noqa: UP007
-    for _cls in MATERIALS:
-        _cls.model_rebuild(_types_namespace={"Material": Material})
+
+
+def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
+    """The schema of any material, from references to those of Gonio's."""
+    pattern = {"type": {"type": "string", "pattern": r"\.py:\w+$"}}
+    own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
+    return {"oneOf": [*references, own]}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic.json_schema import models_json_schema
 
 from ...errors import InputError, did_you_mean
 from ...members import Family
@@ -19,7 +20,7 @@ from ..images import SUFFIXES
 from ..request import check_film
 from ..types import Json
 from .files import located
-from .materials import Material
+from .materials import BY_TYPE, PLACEHOLDER, Material, any_material
 from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
 
 if TYPE_CHECKING:
@@ -474,21 +475,34 @@ class SceneDescription(Part):
         return located(file, self.folder, self.where(pointer), self._allow_outside)
 
 
+MATERIAL = "#/$defs/AnyMaterial"
+
+
 def json_schema() -> dict[str, Any]:
     """The format as a JSON Schema (draft 2020-12), for editors and other checkers."""
-    schema = _without_null(SceneDescription.model_json_schema(by_alias=True))
+    parts = dict.fromkeys(BY_TYPE.values())
+    wanted: list[tuple[Any, Literal["validation"]]] = [(part, "validation") for part in (SceneDescription, *parts)]
+    references, pool = models_json_schema(wanted, by_alias=True)
+    definitions = pool["$defs"]
+    schema = definitions.pop(references[SceneDescription, "validation"]["$ref"].rpartition("/")[2])
+    material = any_material(references[part, "validation"] for part in parts)
+    schema["$defs"] = {**definitions, MATERIAL.rpartition("/")[2]: material}
+    schema = _finished(schema)
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "Gonio scene"
     return schema
 
 
-def _without_null(schema: Any) -> Any:
-    """The schema without `null`, which stands for an absent key here and which the reader refuses in a file."""
+def _finished(schema: Any) -> Any:
+    """The schema without `null`, which stands for an absent key here and which the reader refuses in a file, and with
+    materials where they may stand."""
     if isinstance(schema, list):
-        return [_without_null(item) for item in schema]
+        return [_finished(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
+    if PLACEHOLDER.items() <= schema.items():
+        schema = {**{key: item for key, item in schema.items() if key not in PLACEHOLDER}, "$ref": MATERIAL}
     options = [item for item in schema.get("anyOf", ()) if item != {"type": "null"}]
     if len(options) == 1:
         schema = {**{key: item for key, item in schema.items() if key != "anyOf"}, **options[0]}
-    return {key: _without_null(item) for key, item in schema.items() if not (key == "default" and item is None)}
+    return {key: _finished(item) for key, item in schema.items() if not (key == "default" and item is None)}
