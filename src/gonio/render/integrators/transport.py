@@ -97,8 +97,9 @@ class Transport(Integrator):
         self.disperses = any(shape.bsdf().flags() & DISPERSES for shape in scene.shapes())
         eye = mi.Point3f(sensor.world_transform() @ mi.Point3f(0.0)) if self.media.known else None
         self.begun = None if eye is None else self.media.around(eye)
-        # Where media dim the way to a lamp, or particles compete for it, the last ray is traced like the others.
-        self.traces_last = self.media.known or self.merges
+        # Where media dim the way to a lamp, or particles compete for it, the last ray is traced like the others; and
+        # where it may meet any of several lamps, for which each vertex would have a second ray and its surface.
+        self.traces_last = self.media.known or self.merges or (depth > 2 and self.lights.rectangle is None)
         # Whether any path has a second vertex to shade.
         self.goes_on = (depth > 2 or self.traces_last) and (self.samples_lobes or self.follows_delta)
 
