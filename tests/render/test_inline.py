@@ -83,6 +83,10 @@ def test_rays_meet_what_mitsubas_meet(kind):
             off = np.minimum(off, np.abs(off - 1))  # where a sphere's u begins again
         assert np.quantile(off, 0.999) <= 3e-5 * scale and off.max() <= 1e-2 * scale, name
     assert not dr.any(hit.is_valid() & (hit.t <= 0))
+    if kind in ("cube", "merged"):  # two faces that are one shape here are told apart
+        assert np.mean(np.array(theirs.prim_index == hit.prim_index)[met]) > 1 - 1e-3
+        off = np.abs(np.array(theirs.prim_uv) - np.array(hit.prim_uv))[:, met].max(0)
+        assert np.quantile(off, 0.99) < 1e-4
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -137,6 +141,23 @@ def test_a_ray_that_leaves_a_sphere_does_not_meet_it_where_it_starts(radius, awa
 def test_other_scenes_are_left_to_mitsuba(more):
     mi = engine.load()
     assert surfaces.Surfaces(mi, mi.load_dict({"type": "scene", "s": {"type": "sphere"}, **more})).inline is None
+
+
+def test_the_order_of_shapes_makes_no_difference():
+    mi = engine.load()
+    described = list(shapes(mi)["all"].items())
+    found = []
+    for order in (described, described[::-1]):
+        scene = mi.load_dict({"type": "scene", **dict(order)})
+        ours = surfaces.Surfaces(mi, scene).inline
+        assert ours is not None
+        hit = ours.nearest(rays(mi), mi.Bool(True))
+        kinds = [(flat.kind, flat.faces, flat.rows) for flat, _ in ours.flats]
+        found.append(
+            (kinds, [[float(x[0]) for x in (*centre, radius)] for centre, radius in ours.spheres], np.array(hit.t))
+        )
+    assert found[0][:2] == found[1][:2]
+    assert np.array_equal(found[0][2], found[1][2])
 
 
 def test_a_face_without_an_area_is_never_met():
