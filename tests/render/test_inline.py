@@ -160,6 +160,17 @@ def test_the_order_of_shapes_makes_no_difference():
     assert np.array_equal(found[0][2], found[1][2])
 
 
+def test_a_scene_of_faces_without_an_area_is_left_to_mitsuba():
+    mi = engine.load()
+    mesh = mi.Mesh("thin", 3, 1)
+    values = mi.traverse(mesh)
+    values["vertex_positions"], values["faces"] = [0, 0, 0, 1, 0, 0, 2, 0, 0], [0, 1, 2]
+    values.update()
+    ours = surfaces.Surfaces(mi, mi.load_dict({"type": "scene", "mesh": mesh}))
+    assert ours.inline is None
+    assert not dr.any(ours.nearest(rays(mi)).is_valid())
+
+
 def test_a_face_without_an_area_is_never_met():
     mi = engine.load()
     mesh = mi.Mesh("thin", 4, 2)

@@ -115,7 +115,7 @@ class Inline:
             if away + radius > LARGEST * (1.0 + max(away - radius, 0.0)):
                 return None
             spheres.append(Sphere(index, centre.tolist(), radius))
-        return Inline(mi, scene, spheres, flats)
+        return Inline(mi, scene, spheres, flats) if spheres or flats else None
 
     def nearest(self, ray: Ray, active: Mask) -> Hit:
         """What the ray meets first."""
@@ -202,9 +202,8 @@ def _flat(shape: int, kind: str, frame: Matrix, faces: Faces = ()) -> Flat | Non
     normal = np.cross(across, along)
     if not (size := float(np.linalg.norm(normal))) > 0.0:
         return None
-    if kind == "disk" and (
-        abs(across @ along) > FLAT * size or abs(abs(up @ normal) / np.linalg.norm(up) - size) > FLAT * size
-    ):
+    leans = abs(up @ normal) <= (1.0 - FLAT) * np.linalg.norm(up) * size
+    if kind == "disk" and (leans or abs(across @ along) > FLAT * size):
         return None  # Mitsuba has its own view of a disk whose axes are not perpendicular
     frame = frame.copy()
     frame[:3, 2] = normal / np.sqrt(size)  # of a length like that of the others; where its own points does not matter
