@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gonio.render import engine, lights
+from gonio.render import engine, lights, solid_angles
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -29,7 +29,7 @@ def solid_angle_64(p: tuple[float, float, float]) -> float:
     "p", [(0, 0, 1), (0.3, 0.2, -0.4), (3, 2, 1), (5, 0.1, 0.05), (0.2, 0.1, 20), (100, 50, 70), (-1, -0.5, 0.3)]
 )
 def test_solid_angle_agrees_with_quadrature_near_and_far(p: tuple[float, float, float]) -> None:
-    seen = lights.SphericalRectangle(rectangle(), mi.Point3f(p))
+    seen = solid_angles.SphericalRectangle(rectangle(), mi.Point3f(p))
     assert float(seen.solid_angle[0]) == pytest.approx(solid_angle_64(p), rel=2e-5)
 
 
@@ -38,7 +38,7 @@ def test_directions_are_uniform_in_the_solid_angle(p: tuple[float, float, float]
     """Moments of the sampled points, weighted 1/pdf, are those of the rectangle under the solid angle measure."""
     n = 256
     u, v = (mi.Float(g.ravel().astype(np.float32)) for g in np.meshgrid(*[(np.arange(n) + 0.5) / n] * 2))
-    point, uv, pdf = lights.SphericalRectangle(rectangle(), mi.Point3f(p)).sample(u, v)
+    point, uv, pdf = solid_angles.SphericalRectangle(rectangle(), mi.Point3f(p)).sample(u, v)
     point, pdf, uv = np.array(point, np.float64), np.array(pdf, np.float64), np.array(uv, np.float64)
     assert np.allclose(point[0], -1 + 2 * uv[0], atol=1e-5) and np.allclose(point[1], -0.5 + 1.5 * uv[1], atol=1e-5)
     assert uv.min() > -1e-5 and uv.max() < 1 + 1e-5
@@ -51,7 +51,7 @@ def test_directions_are_uniform_in_the_solid_angle(p: tuple[float, float, float]
 
 
 def test_tiny_and_huge_solid_angles_fall_back_to_the_area() -> None:
-    seen = lights.SphericalRectangle(rectangle(), mi.Point3f([0, 0, 0.3], [0, 0, 0.1], [500, 1e-7, 1]))
+    seen = solid_angles.SphericalRectangle(rectangle(), mi.Point3f([0, 0, 0.3], [0, 0, 0.1], [500, 1e-7, 1]))
     assert list(seen.uniform) == [False, False, True]
     u = mi.Float([0.3, 0.3, 0.3])
     _, _, pdf = seen.sample(u, u)
@@ -116,12 +116,12 @@ def test_registering_twice_does_nothing() -> None:
 def test_a_sheared_rectangle_is_not_taken_for_a_rectangle() -> None:
     turned = T().rotate([1, 0, 0], 40).rotate([0, 0, 1], 20).scale([1, 3, 1])
     straight = mi.load_dict({"type": "rectangle", "to_world": turned})
-    assert lights.is_rectangle(mi, straight)
+    assert solid_angles.is_rectangle(mi, straight)
     sheared = mi.load_dict(
         {"type": "rectangle", "to_world": T([[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])}
     )
-    assert not lights.is_rectangle(mi, sheared)
-    assert not lights.is_rectangle(mi, mi.load_dict({"type": "sphere"}))
+    assert not solid_angles.is_rectangle(mi, sheared)
+    assert not solid_angles.is_rectangle(mi, mi.load_dict({"type": "sphere"}))
 
 
 def test_a_bright_light_is_chosen_more_often_and_none_never() -> None:

@@ -1,9 +1,7 @@
 """Lights: the two-sided area light, and how the integrators choose a light and a point on it.
 
-Three parts:
+Two parts:
 
-- `SphericalRectangle`: uniform sampling of the solid angle of a rectangle (Urena2013), the least noisy cheap way
-  to sample the lab's lights;
 - `register(mi)`: the Mitsuba plugin `gonio_area`, a light that shines from both sides of any shape;
 - `Lights`: what the integrators ask: a light sample, the light met by a ray, and the density of both.
 """
@@ -19,6 +17,7 @@ import drjit as dr
 from ..errors import InputError
 from .nearby import Nearby
 from .sky import Sky
+from .solid_angles import Ball, Rectangle, SphericalCap, SphericalRectangle, balls, is_rectangle, is_sphere
 from .surfaces import Surfaces
 from .types import (
     DirectionSample,
@@ -34,139 +33,10 @@ from .types import (
     Ray,
     Record,
     Scene,
-    Shape,
     SurfaceInteraction,
     TraversalCallback,
-    Vector,
+    UInt,
 )
-
-# Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
-# 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing
-# from the solid angle. Above: the point lies all but in the rectangle (2 pi = 6.283), where 1/z0 loses its digits.
-SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
-
-
-@dataclass
-class Rectangle:
-    """A rectangle in space: corner, two perpendicular unit axes, their lengths, the normal axis0 x axis1."""
-
-    corner: Point
-    axis0: Vector
-    axis1: Vector
-    length0: Float
-    length1: Float
-
-    @staticmethod
-    def of(mi: ModuleType, shape: Shape) -> Rectangle:
-        """The rectangle of a Mitsuba `rectangle` shape as the kernel sees it, so that moving it recompiles nothing."""
-        zero, one = mi.Float(0), mi.Float(1)
-        corner = shape.sample_position(zero, mi.Point2f(zero, zero)).p
-        edge0 = shape.sample_position(zero, mi.Point2f(one, zero)).p - corner
-        edge1 = shape.sample_position(zero, mi.Point2f(zero, one)).p - corner
-        length0, length1 = dr.norm(edge0), dr.norm(edge1)
-        return Rectangle(corner, edge0 / length0, edge1 / length1, length0, length1)
-
-    @property
-    def normal(self) -> Vector:
-        return dr.cross(self.axis0, self.axis1)
-
-    @property
-    def area(self) -> Float:
-        return self.length0 * self.length1
-
-    def pdf(self, solid_angle: Float, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) toward a point seen at `distance` under |cosine|: uniform in the solid angle where one is
-        given, uniform on the area where it is 0."""
-        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
-        return dr.select(solid_angle > 0, dr.rcp(solid_angle), by_area)
-
-    def hit(self, origin: Point, direction: Vector) -> tuple[Float, tuple[Float, Float], Mask]:
-        """Where a ray meets the rectangle: (distance, (u, v) in [0, 1]^2, whether it does)."""
-        normal = self.normal
-        distance = dr.dot(self.corner - origin, normal) / dr.dot(direction, normal)
-        offset = dr.fma(direction, distance, origin) - self.corner
-        u, v = dr.dot(offset, self.axis0) / self.length0, dr.dot(offset, self.axis1) / self.length1
-        return distance, (u, v), (distance > 0) & (dr.minimum(u, v) >= 0) & (dr.maximum(u, v) <= 1)
-
-
-class SphericalRectangle:
-    """A rectangle seen from a point: its solid angle, and directions uniform in it.
-
-    Urena2013, sec. 3: in the frame of the rectangle, with the point at the origin and the rectangle at z0 < 0, the
-    u-coordinate is found by inverting the solid angle of a sub-rectangle, the v-coordinate by inverting the height
-    on the sphere. Where the solid angle is too small or too large for float32 the area is sampled instead.
-
-    `solid_angle` is exact for small ones too: twice the sum of the two triangles' (Van Oosterom and Strackee 1983),
-    whose numerator is a product and cancels nothing, unlike the sum of four angles less 2 pi.
-    """
-
-    def __init__(self, rectangle: Rectangle, origin: Point):
-        self.rectangle, self.origin = rectangle, origin
-        offset = rectangle.corner - origin
-        self.x0, self.y0 = dr.dot(offset, rectangle.axis0), dr.dot(offset, rectangle.axis1)
-        self.x1, self.y1 = self.x0 + rectangle.length0, self.y0 + rectangle.length1
-        self.z0 = -dr.abs(dr.dot(offset, rectangle.normal))
-        zz = dr.square(self.z0)
-        xx0, xx1, yy0, yy1 = dr.square(self.x0), dr.square(self.x1), dr.square(self.y0), dr.square(self.y1)
-        # z components of the normals of the planes through the origin and an edge: v = y0, y1 and u = x0.
-        self.n0 = -self.y0 * dr.rsqrt(yy0 + zz)
-        self.n2 = self.y1 * dr.rsqrt(yy1 + zz)
-        n3 = -self.x0 * dr.rsqrt(xx0 + zz)
-        self.k = 2 * dr.pi - dr.acos(-self.n2 * n3) - dr.acos(-n3 * self.n0)
-        self.solid_angle = self._solid_angle(zz, xx0, xx1, yy0, yy1)
-        self.uniform = (self.solid_angle > SMALLEST_SOLID_ANGLE) & (self.solid_angle < LARGEST_SOLID_ANGLE)
-
-    def _solid_angle(self, zz: Float, xx0: Float, xx1: Float, yy0: Float, yy1: Float) -> Float:
-        r00, r10 = dr.sqrt(xx0 + yy0 + zz), dr.sqrt(xx1 + yy0 + zz)
-        r01, r11 = dr.sqrt(xx0 + yy1 + zz), dr.sqrt(xx1 + yy1 + zz)
-        volume = -self.z0 * self.rectangle.area
-        # dot products of corner vectors: along an edge, and across the diagonal 10-01 that both triangles share
-        across = self.x0 * self.x1 + self.y0 * self.y1 + zz
-        along_x0, along_x1 = self.x0 * self.x1 + yy0 + zz, self.x0 * self.x1 + yy1 + zz
-        along_y0, along_y1 = xx0 + self.y0 * self.y1 + zz, xx1 + self.y0 * self.y1 + zz
-        lower = r00 * r10 * r01 + along_x0 * r01 + along_y0 * r10 + across * r00
-        upper = r11 * r10 * r01 + along_x1 * r10 + along_y1 * r01 + across * r11
-        # The two half angles a and b add as complex numbers, (lower + i volume)(upper + i volume): one atan2, not two.
-        # Each half angle is below pi/2 in sum with the other <= pi, so the sum stays inside atan2's branch.
-        return 2 * dr.atan2(volume * (lower + upper), lower * upper - dr.square(volume))
-
-    def pdf(self, distance: Float, cosine: Float) -> Float:
-        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
-        return self.rectangle.pdf(dr.select(self.uniform, self.solid_angle, 0), distance, cosine)
-
-    def sample(self, u: Float, v: Float) -> tuple[Point, tuple[Float, Float], Float]:
-        """A point of the rectangle from two numbers in [0, 1): (point, (u, v) on it in [0, 1]^2, pdf in 1/sr)."""
-        sine, cosine = dr.sincos(dr.fma(u, self.solid_angle, self.k))
-        fu = (cosine * self.n0 - self.n2) / sine
-        cu = dr.clip(dr.copysign(dr.rsqrt(dr.square(fu) + dr.square(self.n0)), fu), -1, 1)
-        x = -(cu * self.z0) * dr.rsqrt(dr.maximum(1 - dr.square(cu), 1e-12))
-        x = dr.clip(x, self.x0, self.x1)
-        dd = dr.square(x) + dr.square(self.z0)
-        h0 = self.y0 * dr.rsqrt(dd + dr.square(self.y0))
-        h1 = self.y1 * dr.rsqrt(dd + dr.square(self.y1))
-        h = dr.fma(v, h1 - h0, h0)
-        y = dr.clip(h * dr.sqrt(dd) * dr.rsqrt(dr.maximum(1 - dr.square(h), 1e-12)), self.y0, self.y1)
-        x = dr.select(self.uniform, x, dr.fma(u, self.rectangle.length0, self.x0))
-        y = dr.select(self.uniform, y, dr.fma(v, self.rectangle.length1, self.y0))
-        x, y = x - self.x0, y - self.y0
-        point = self.rectangle.corner + self.rectangle.axis0 * x + self.rectangle.axis1 * y
-        away = point - self.origin
-        distance = dr.norm(away)
-        cosine = dr.abs(self.z0) / distance
-        return point, (x / self.rectangle.length0, y / self.rectangle.length1), self.pdf(distance, cosine)
-
-
-def is_sphere(mi: ModuleType, shape: Shape) -> bool:
-    return bool(shape.shape_type() == mi.ShapeType.Sphere.value)
-
-
-def is_rectangle(mi: ModuleType, shape: Shape) -> bool:
-    """Whether a shape is a `rectangle` whose edges are perpendicular (a sheared one is not)."""
-    if shape is None or shape.shape_type() != mi.ShapeType.Rectangle.value:
-        return False
-    rectangle = Rectangle.of(mi, shape)
-    # 1e-4: the lean of edges that float32 transforms of a true rectangle stay far below; it bounds the error.
-    return abs(float(dr.dot(rectangle.axis0, rectangle.axis1)[0])) < 1e-4
 
 
 def register(mi: ModuleType) -> None:
@@ -182,7 +52,7 @@ def register(mi: ModuleType) -> None:
               emitter on two shapes: two lamps of the same radiance need different tags, or `load_dict(...,
               optimize=False)`
 
-    It is sampled by solid angle on rectangles, by the shape's own method on others. Not for light tracing
+    It is sampled by solid angle on rectangles and spheres, by area on others. Not for light tracing
     (`sample_ray` is not offered).
     """
     if mi.variant() in _registered:
@@ -211,8 +81,8 @@ def register(mi: ModuleType) -> None:
             shape = self.get_shape()
             if is_rectangle(mi, shape):
                 ds = _rectangle_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
-            elif is_sphere(mi, shape):  # samples the visible cap
-                ds = shape.sample_direction(it, sample, active)
+            elif is_sphere(mi, shape):  # not its own method: (u, v) there are the sample, and it shines on itself
+                ds = _ball_sample(mi, SphericalCap(mi, Ball.of(mi, shape), it.p), sample, it)
             else:  # not its own method: a mesh's never chooses a point whose normal looks away
                 ds = _area_sample(mi, shape.sample_position(it.time, sample, active), it)
             active = mi.Bool(active) & (ds.pdf > 0)
@@ -226,7 +96,7 @@ def register(mi: ModuleType) -> None:
             if is_rectangle(mi, shape):
                 pdf = SphericalRectangle(Rectangle.of(mi, shape), it.p).pdf(ds.dist, cosine)
             elif is_sphere(mi, shape):
-                pdf = shape.pdf_direction(it, ds, active)
+                pdf = SphericalCap(mi, Ball.of(mi, shape), it.p).pdf(ds.dist, cosine)
             else:
                 pdf = shape.pdf_position(ds, active) * dr.square(ds.dist) / cosine
             return dr.select(active & (cosine > 0), pdf, 0)
@@ -254,6 +124,16 @@ def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Point, i
     point, uv, pdf = seen.sample(sample.x, sample.y)
     ps = dr.zeros(mi.PositionSample3f, dr.width(point))
     ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(seen.rectangle.normal), mi.Point2f(*uv), it.time
+    ds = _toward(mi, ps, it)
+    ds.pdf = pdf
+    return ds
+
+
+def _ball_sample(mi: ModuleType, seen: SphericalCap, sample: Point, it: Interaction) -> DirectionSample:
+    """A Mitsuba direction sample from a ball."""
+    point, normal, pdf = seen.sample(sample.x, sample.y)
+    ps = dr.zeros(mi.PositionSample3f, dr.width(point))
+    ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(normal), mi.Point2f(*seen.ball.uv(normal)), it.time
     ds = _toward(mi, ps, it)
     ds.pdf = pdf
     return ds
@@ -303,6 +183,7 @@ class Lights:
             self.rectangle = Rectangle.of(mi, self.emitters[0].get_shape())
             dr.make_opaque(self.rectangle)
         self.sky, self.sky_place = self._sky(beside_lobes)
+        self.balls = self._balls()
         if self.count > 1:
             self.probability = self._probabilities()
             self.choice = mi.DiscreteDistribution(self.probability)
@@ -320,6 +201,22 @@ class Lights:
                 sky = Sky(self.mi, self.scene, emitter, beside_lobes)
                 return (sky, place) if sky.known else (None, -1)
         return None, -1
+
+    def _balls(self) -> Float | None:
+        """`solid_angles.balls` of the one-sided lamps of Mitsuba, which it samples by positions in float32.
+
+        Those of a lamp of 4 mm three metres away are 2 % too bright. Ones with a texture it samples by that.
+        """
+        mi = self.mi
+
+        def known(emitter: Emitter) -> bool:
+            return bool(
+                emitter.class_name() == "AreaLight"
+                and is_sphere(mi, emitter.get_shape())
+                and not mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
+            )
+
+        return balls(mi, [emitter if known(emitter) else None for emitter in self.emitters])
 
     def _is_rectangle_light(self, emitter: Emitter) -> bool:
         known = getattr(emitter, "two_sided", False) or emitter.class_name() == "AreaLight"
@@ -379,31 +276,69 @@ class Lights:
             at_light = mi.SurfaceInteraction3f(ds, si.wavelengths)
             at_light.wi = at_light.to_local(-ds.d)
             weight = dr.select(ds.pdf > 0, self.emitters[0].eval(at_light, active) / ds.pdf, 0)
-            return LightSample(ds, weight, mi.Bool(False), dr.select(seen.uniform, seen.solid_angle, 0))
+            normal = ds.n * dr.mulsign(self._off(si.p, ds.p), dr.dot(ds.n, ds.d))
+            return LightSample(ds, ds.p - normal, weight, mi.Bool(False), dr.select(seen.uniform, seen.solid_angle, 0))
         if self.count == 1:
             if self.sky is not None:
                 return self._toward_sky(self.sky, si, u, active)
-            ds, weight = self.emitters[0].sample_direction(si, u, active)
-            return LightSample(ds, weight, mi.Bool(ds.delta), mi.Float(0))
+            return self._toward_lamp(self.emitters[0], mi.UInt32(0), si, u, active)
         index, left, probability = self.nearby.choose(si.p, u.x)
         u = mi.Point2f(left, u.y)
         place = dr.gather(mi.UInt32, self.place, index, active)
         emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), place, active)
         if self.sky is None:
+            light = self._toward_lamp(emitter, index, si, u, active)
+        else:
+            lamp = index != self.sky_place
+            near = self._toward_lamp(emitter, index, si, u, active & lamp)
+            light = dr.select(lamp, near, self._toward_sky(self.sky, si, u, active))
+        light.ds.pdf *= probability
+        light.weight /= probability
+        return light
+
+    def _toward_lamp(
+        self, emitter: Emitter, index: UInt, si: SurfaceInteraction, u: Point, active: Mask
+    ) -> LightSample:
+        """A lamp's own sample, or that of a ball.
+
+        Its shadow ray ends as far off the lamp's surface as it begins off `si`'s: a round lamp would hide its own limb
+        from one that ends on it. Nothing comes from closer, where all is rounding.
+        """
+        mi = self.mi
+        if self.balls is None:
             ds, weight = emitter.sample_direction(si, u, active)
         else:
-            above, lamp = self._toward_sky(self.sky, si, u, active), index != self.sky_place
-            ds, weight = emitter.sample_direction(si, u, active & lamp)
-            ds, weight = dr.select(lamp, ds, above.ds), dr.select(lamp, weight, above.weight)
-        ds.pdf *= probability
-        return LightSample(ds, weight / probability, mi.Bool(ds.delta), mi.Float(0))
+            ball, radius = self._ball(index)
+            ds, weight = emitter.sample_direction(si, u, active & (radius == 0))
+            own = _ball_sample(mi, SphericalCap(mi, ball, si.p), u, si)
+            own.n, own.emitter = own.n * dr.sign(radius), emitter
+            at_light = mi.SurfaceInteraction3f(own, si.wavelengths)
+            at_light.wi = at_light.to_local(-own.d)
+            shone = emitter.eval(at_light, active & (radius != 0)) / own.pdf
+            ds, weight = dr.select(radius == 0, ds, own), dr.select(radius == 0, weight, shone)
+        off = self._off(si.p, ds.p)
+        normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point has none
+        target = mi.Point3f(ds.p - normal * dr.mulsign(off, dr.dot(normal, ds.d)))
+        weight = dr.select(ds.delta | (ds.dist > off), weight, 0)
+        return LightSample(ds, target, weight, mi.Bool(ds.delta), mi.Float(0))
+
+    def _ball(self, index: UInt, active: Mask = True) -> tuple[Ball, Float]:
+        """(the ball that a lamp is, its radius with the sign of its normal, 0 where it is none)."""
+        mi = self.mi
+        row = dr.gather(mi.Vector4f, self.balls, index, active)
+        return Ball(mi.Point3f(row.xyz), dr.abs(row.w)), row.w
+
+    def _off(self, p: Point, q: Point) -> Float:
+        """How far off surfaces a ray between two points begins and ends."""
+        reach = dr.maximum(dr.max(dr.abs(p)), dr.max(dr.abs(q)))
+        return self.mi.math.RayEpsilon * (1 + reach)
 
     def _toward_sky(self, sky: Sky, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
         mi = self.mi
         ds = dr.zeros(mi.DirectionSample3f, dr.width(si.p))
         ds.d, ds.p, ds.pdf, radiance = sky.sample(si, u, active)
         ds.dist, ds.n, ds.time, ds.delta = dr.norm(ds.p - si.p), mi.Normal3f(-ds.d), si.time, mi.Bool(False)
-        return LightSample(ds, dr.select(ds.pdf > 0, radiance / ds.pdf, 0), mi.Bool(False), mi.Float(0))
+        return LightSample(ds, ds.p, dr.select(ds.pdf > 0, radiance / ds.pdf, 0), mi.Bool(False), mi.Float(0))
 
     def pdf(self, origin: Point, solid_angle: Float, si: SurfaceInteraction, active: Mask) -> Float:
         """Density with which `sample`, asked at `origin`, would have chosen the direction in which light `si` was met.
@@ -423,15 +358,23 @@ class Lights:
         if self.count == 1:
             if self.sky is not None:
                 return self.sky.pdf(ds.d)
-            return self.emitters[0].pdf_direction(it, ds, active)
+            return self._density(self.emitters[0], mi.UInt32(0), it, ds, active)
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
+        index = dr.gather(mi.UInt32, self.number, number, active)
         if self.sky is None:
-            density = ds.emitter.pdf_direction(it, ds, active)
+            density = self._density(ds.emitter, index, it, ds, active)
         else:
             lamp = active & si.is_valid()  # the sky is what no surface is before
-            density = dr.select(lamp, ds.emitter.pdf_direction(it, ds, lamp), self.sky.pdf(ds.d))
-        index = dr.gather(mi.UInt32, self.number, number, active)
+            density = dr.select(lamp, self._density(ds.emitter, index, it, ds, lamp), self.sky.pdf(ds.d))
         return density * self.nearby.probability(origin, index, active)
+
+    def _density(self, emitter: Emitter, index: UInt, it: Interaction, ds: DirectionSample, active: Mask) -> Float:
+        """Density (1/sr) with which `_toward_lamp` chooses a direction."""
+        if self.balls is None:
+            return emitter.pdf_direction(it, ds, active)
+        ball, radius = self._ball(index, active)
+        of_ball = SphericalCap(self.mi, ball, it.p).pdf(ds.dist, dr.abs(dr.dot(ds.d, ds.n)))
+        return dr.select(radius == 0, emitter.pdf_direction(it, ds, active & (radius == 0)), of_ball)
 
     def share(self, pdf: Float, other: Float) -> Float:
         """What one of two strategies of a sample each is weighed by, of densities `pdf` and `other`, lights and lobes.
@@ -464,8 +407,7 @@ class Lights:
         at_light.wi = at_light.to_local(-ray.d)
         radiance = self.emitters[0].eval(at_light, active)
         shadow = mi.Ray3f(ray)
-        # Stops short of the light by the same relative distance as Interaction::spawn_ray_to.
-        shadow.maxt = distance * (1 - mi.math.ShadowEpsilon)
+        shadow.maxt = distance - self._off(ray.o, ray(distance))
         active &= dr.any(radiance != 0)
         active &= ~self.surfaces.blocked(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
@@ -489,10 +431,12 @@ def _order(emitter: Emitter) -> tuple[str, list[float]]:
 
 @dataclass
 class LightSample:
-    """A direction sample `ds`, radiance over pdf `weight`, whether the light is a point (no BSDF sample can meet it),
-    and the solid angle of a rectangle sampled uniformly in it (0 where it was not)."""
+    """A direction sample `ds`, the point `target` up to which nothing may stand in its way, radiance over pdf `weight`,
+    whether the light is a point (no BSDF sample can meet it), and the solid angle of a rectangle sampled uniformly in
+    it (0 where it was not)."""
 
     ds: DirectionSample
+    target: Point
     weight: Radiance
     delta: Mask
     solid_angle: Float

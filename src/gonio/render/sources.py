@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from . import engine
-from .lights import Lights, is_sphere
+from .lights import Lights
+from .solid_angles import balls, is_sphere
 from .types import (
     Emitter,
     Float,
@@ -144,7 +144,7 @@ class Sources:
         self.kind_of, self.two_sided = mi.UInt32(self.kinds), mi.Bool(sides)
         parallel = [mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection) for emitter in lights.emitters]
         self.parallel = mi.Bool(parallel)
-        self.balls = _normals_of_spheres(mi, lights.emitters)
+        self.balls = balls(mi, lights.emitters)
         box = scene.bbox()
         centre, radius = (np.zeros(3), 1.0)
         if box.valid():
@@ -230,7 +230,7 @@ class Sources:
         ps: PositionSample = emitter.get_shape().sample_position(0.0, place, active)
         if self.balls is not None:  # of a sphere that is turned, Mitsuba 3.9 has the normal of one that is not
             ball = dr.gather(mi.Vector4f, self.balls, number, active)
-            ps.n = dr.select(ball.w != 0.0, mi.Normal3f(dr.normalize(ps.p - mi.Point3f(ball.xyz)) * ball.w), ps.n)
+            ps.n = dr.select(ball.w != 0.0, mi.Normal3f((ps.p - mi.Point3f(ball.xyz)) / ball.w), ps.n)
         si = mi.SurfaceInteraction3f(ps, wavelengths) if mi.is_spectral else mi.SurfaceInteraction3f(ps, [])
         two_sided = dr.gather(mi.Bool, self.two_sided, number, active)
         if self.targets is not None:
@@ -338,21 +338,6 @@ def _kind(mi: ModuleType, emitter: Emitter) -> int:
         return SURFACE
     what = f"a lamp of the kind {emitter.class_name()}, which sends no particles"
     raise InputError(what, "integrator", "use --integrator path, or a lamp with a surface, a point or an environment")
-
-
-def _normals_of_spheres(mi: ModuleType, emitters: list[Emitter]) -> Float | None:
-    """Four numbers for each lamp: the centre of a sphere, and 1 where its normal points outward, -1 inward; 0 of
-    lamps that are none. None where no lamp is one."""
-    rows = np.zeros((len(emitters), 4))
-    for row, emitter in zip(rows, emitters, strict=True):
-        shape = emitter.get_shape() if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface) else None
-        if shape is not None and is_sphere(mi, shape):
-            box = shape.bbox()
-            size = float(np.max(np.array(box.extents())))
-            outside = mi.Point3f(box.center()) + mi.Vector3f(0, 0, 2 * size)
-            seen = shape.ray_intersect(mi.Ray3f(outside, mi.Vector3f(0, 0, -1)))
-            row[:] = *np.array(box.center(), float).ravel(), np.sign(float(seen.n.z[0]))
-    return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
 
 
 def _on_disc(mi: ModuleType, u: Point) -> Vector:

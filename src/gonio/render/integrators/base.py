@@ -20,6 +20,8 @@ from .sums import Sums
 # integrator's.
 PIXEL, TIME, APERTURE, FIRST_FREE = 0, 1, 2, 3
 
+NEARLY = 1e-6  # of a distance: as far as float32 tells it from the next
+
 # The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm): white of radiance 1 has Y = 1.
 CIE_Y_INTEGRAL = 106.7502593994140625
 
@@ -169,8 +171,11 @@ class Integrator:
         return ""
 
     def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
-        """Lanes whose surface sees the point."""
-        return active & ~self.surfaces.blocked(si.spawn_ray_to(point), active)
+        """Lanes whose surface sees the point, which is on none itself."""
+        ray = si.spawn_ray_to(point)
+        # To the very point: Mitsuba's rays end a thousandth of the way before, through what is so close to a lamp.
+        ray.maxt = dr.norm(point - ray.o) * (1 - NEARLY)
+        return active & ~self.surfaces.blocked(ray, active)
 
     def rgb(self, radiance: Radiance, wavelengths: Sequence[Float]) -> Colour:
         """Radiance at a sample's wavelengths as linear RGB."""

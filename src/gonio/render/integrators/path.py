@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..lights import is_sphere
+from ..solid_angles import is_sphere
 from .base import Settings
 from .transport import Transport
 

@@ -338,7 +338,7 @@ class Transport(Integrator):
             side = dr.select(si.wi.z * toward.z < 0.0, crossing.beyond, crossing.here)
             gathered *= self.media.transmitted(side, si, light.ds.dist) & crossing.surface
         visible = active & dr.any(gathered != 0)
-        visible = self.unoccluded(si, light.ds.p, visible)
+        visible = self.unoccluded(si, light.target, visible)
         return dr.select(visible, gathered, 0), light.solid_angle, bs, weight
 
     def attached(
