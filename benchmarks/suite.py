@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import itertools
 import os
 import time
 from collections.abc import Callable
@@ -45,7 +46,8 @@ from gonio.render.request import UNTIL_MOST  # noqa: E402
 from scenes import SCENES, Scene  # noqa: E402
 
 SAMPLERS = ("independent", "stratified", "multijitter", "ldsampler")
-ROUNDS = 3
+ROUNDS = 3  # of a comparison, at least; more until the ratio is known to KNOWN or TIRED seconds have passed
+KNOWN, TIRED = 0.05, 180.0
 EACH = 16  # samples of a part of the reference
 ROUNDING = 1e-6  # of a mean, that Mitsuba's sums in 32 bits are off by: blocks of an even sky have no noise at all
 console = Console(width=None if os.isatty(1) else 130)
@@ -185,7 +187,11 @@ def relmse(x: np.ndarray, r: np.ndarray, where: np.ndarray | slice = slice(None)
 
 def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
     """Gonio first, then Mitsuba's path tracer, then for caustics Gonio's path tracer and Mitsuba's `ptracer`; all take
-    turns, so that a busy machine is busy for all."""
+    turns, so that a busy machine is busy for all.
+
+    Where a hundredth of the pixels holds most of the error, a few pictures tell little of it, and the best of four
+    peers is the luckiest: so there are more rounds there.
+    """
     starts = [("Gonio", lambda n: ours(scene, n, "caustics" if scene.caustic else "path"))]
     starts += [(s, lambda n, s=s: theirs(scene, s, n)) for s in SAMPLERS]
     if scene.caustic:
@@ -194,7 +200,10 @@ def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
     field = [Contender(name, make(spp)) for name, make in starts]
     singles = [make(1) for _, make in starts]
     where = reached(scene) if scene.caustic else slice(None)
-    for round_number in range(ROUNDS + 1):  # the first compiles
+    begun = time.perf_counter()
+    for round_number in itertools.count():  # the first compiles
+        if round_number > ROUNDS and (spread(field) < KNOWN or time.perf_counter() - begun > TIRED):
+            return field
         for contender, single in zip(field, singles, strict=True):
             begin = time.perf_counter()
             single()(7)
@@ -213,7 +222,17 @@ def compete(scene: Scene, truth: np.ndarray, spp: int) -> list[Contender]:
                 contender.errors += [relmse(picture, truth), relmse(again, truth)]
                 if scene.caustic and np.any(where):
                     contender.reached += [relmse(picture, truth, where), relmse(again, truth, where)]
-    return field
+    raise AssertionError("the rounds go on until they return")
+
+
+def best_peer(field: list[Contender]) -> Contender:
+    return min(field[1 : 1 + len(SAMPLERS)], key=lambda c: c.cost)
+
+
+def spread(field: list[Contender]) -> float:
+    """One standard error of the ratio of the errors of Gonio and its best peer, relative to it."""
+    errors = [np.array(c.errors) for c in (field[0], best_peer(field))]
+    return float(np.sqrt(sum(np.var(e, ddof=1) / len(e) / np.mean(e) ** 2 for e in errors)))
 
 
 SMALLER = 4  # than the scene says, a side: pictures of `promises`
@@ -330,18 +349,15 @@ def main() -> None:
         spp = max(scene.spp // 4, 4) if given.quick else scene.spp
         truth, apart = reference(scene, 4 if given.quick else given.seconds)
         field = compete(scene, truth, spp)
-        mine, others = field[0], field[1 : 1 + len(SAMPLERS)]
-        best = min(others, key=lambda c: c.cost)
+        mine, best = field[0], best_peer(field)
         samples = scene.size[0] * scene.size[1] * spp / 1e6
         row = [name + (" (c)" if scene.caustic else ""), best.name]
         row += [f"{min(c.first):.2f}" for c in (mine, best)]
         row += [f"{samples / min(c.steady):.1f}" for c in (mine, best)]
         row += [f"{np.mean(c.errors) * spp:.3g}" for c in (mine, best)]
-        logs = [np.log(c.errors) for c in (mine, best)]
-        spread = float(np.sqrt(sum(np.var(x, ddof=1) / len(x) for x in logs)))
         ratio = best.cost / mine.cost
         ratios[scene.caustic].append(ratio)
-        words = f"{ratio:.3g} ± {ratio * spread:.2g}" + (f" ({apart:.1f} sigma apart)" if apart > 5 else "")
+        words = f"{ratio:.3g} ± {ratio * spread(field):.2g}" + (f" ({apart:.1f} sigma apart)" if apart > 5 else "")
         table.add_row(*row, words)
         console.print(" | ".join([*row, words]))
         if scene.caustic:
