@@ -10,8 +10,8 @@ import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
 T = mi.ScalarTransform4f
 
 
-def rectangle() -> lights.Rectangle:
-    return lights.Rectangle(
+def rectangle() -> solid_angles.Rectangle:
+    return solid_angles.Rectangle(
         mi.Point3f(-1, -0.5, 0), mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Float(2.0), mi.Float(1.5)
     )
 
@@ -38,7 +38,7 @@ def test_directions_are_uniform_in_the_solid_angle(p: tuple[float, float, float]
     """Moments of the sampled points, weighted 1/pdf, are those of the rectangle under the solid angle measure."""
     n = 256
     u, v = (mi.Float(g.ravel().astype(np.float32)) for g in np.meshgrid(*[(np.arange(n) + 0.5) / n] * 2))
-    point, uv, pdf = solid_angles.SphericalRectangle(rectangle(), mi.Point3f(p)).sample(u, v)
+    point, _, uv, pdf = solid_angles.SphericalRectangle(rectangle(), mi.Point3f(p)).sample(u, v)
     point, pdf, uv = np.array(point, np.float64), np.array(pdf, np.float64), np.array(uv, np.float64)
     assert np.allclose(point[0], -1 + 2 * uv[0], atol=1e-5) and np.allclose(point[1], -0.5 + 1.5 * uv[1], atol=1e-5)
     assert uv.min() > -1e-5 and uv.max() < 1 + 1e-5
@@ -54,7 +54,7 @@ def test_tiny_and_huge_solid_angles_fall_back_to_the_area() -> None:
     seen = solid_angles.SphericalRectangle(rectangle(), mi.Point3f([0, 0, 0.3], [0, 0, 0.1], [500, 1e-7, 1]))
     assert list(seen.uniform) == [False, False, True]
     u = mi.Float([0.3, 0.3, 0.3])
-    _, _, pdf = seen.sample(u, u)
+    *_, pdf = seen.sample(u, u)
     assert np.isfinite(np.array(pdf)).all()
 
 

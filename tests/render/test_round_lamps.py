@@ -141,12 +141,12 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
 def test_a_cap_is_sampled_with_the_density_that_it_tells(p: tuple[float, float, float]) -> None:
     """Moments of directions, weighted by 1 / pdf, are those of all directions that meet the ball."""
     centre, radius = np.array([0.3, 0.2, 0.1]), 0.7
-    seen = solid_angles.SphericalCap(
-        mi, solid_angles.Ball(mi.Point3f(*map(float, centre)), mi.Float(radius)), mi.Point3f(*map(float, p))
-    )
+    ball_ = solid_angles.Ball(mi.Point3f(*map(float, centre)), mi.Float(radius), mi.Float(1))
+    seen = solid_angles.SphericalCap(mi, ball_, mi.Point3f(*map(float, p)))
     n = 512
     u, v = (mi.Float(g.ravel().astype(np.float32)) for g in np.meshgrid(*[(np.arange(n) + 0.5) / n] * 2))
-    point, normal, pdf = (np.array(x, np.float64) for x in seen.sample(u, v))
+    point, normal, _, pdf = seen.sample(u, v)
+    point, normal, pdf = (np.array(x, np.float64) for x in (point, normal, pdf))
     assert np.linalg.norm(point - centre[:, None], axis=0) == pytest.approx(radius, abs=1e-5)
     assert point - centre[:, None] == pytest.approx(radius * normal, abs=1e-5)
     away = point - np.array(p)[:, None]

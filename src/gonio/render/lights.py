@@ -15,9 +15,10 @@ from types import ModuleType
 import drjit as dr
 
 from ..errors import InputError
+from .lamps import Lamps, direction_sample, has_known_sides, rectangle_of, toward
 from .nearby import Nearby
 from .sky import Sky
-from .solid_angles import Ball, Rectangle, SphericalCap, SphericalRectangle, balls, is_rectangle, is_sphere
+from .solid_angles import Ball, Rectangle, SphericalCap, SphericalRectangle, is_rectangle, is_sphere
 from .surfaces import Surfaces
 from .types import (
     DirectionSample,
@@ -70,7 +71,8 @@ def register(mi: ModuleType) -> None:
                 raise InputError("missing", "gonio_area.radiance", "give the radiance: a number, a colour or a texture")
             self.radiance = properties.get_emissive_texture("radiance")
             properties.get("tag", "")
-            self.m_flags = mi.EmitterFlags.Surface
+            varying = mi.EmitterFlags.SpatiallyVarying if self.radiance.is_spatially_varying() else 0
+            self.m_flags = mi.EmitterFlags.Surface | varying
 
         def eval(self, si: SurfaceInteraction, active: Mask = True) -> Radiance:
             return dr.select(active, self.radiance.eval(si, active), 0)
@@ -80,9 +82,9 @@ def register(mi: ModuleType) -> None:
         ) -> tuple[DirectionSample, Radiance]:
             shape = self.get_shape()
             if is_rectangle(mi, shape):
-                ds = _rectangle_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
+                ds = direction_sample(mi, SphericalRectangle(Rectangle.of(mi, shape), it.p), sample, it)
             elif is_sphere(mi, shape):  # not its own method: (u, v) there are the sample, and it shines on itself
-                ds = _ball_sample(mi, SphericalCap(mi, Ball.of(mi, shape), it.p), sample, it)
+                ds = direction_sample(mi, SphericalCap(mi, Ball.of(mi, shape), it.p), sample, it)
             else:  # not its own method: a mesh's never chooses a point whose normal looks away
                 ds = _area_sample(mi, shape.sample_position(it.time, sample, active), it)
             active = mi.Bool(active) & (ds.pdf > 0)
@@ -119,40 +121,11 @@ def register(mi: ModuleType) -> None:
 _registered: set[str] = set()
 
 
-def _rectangle_sample(mi: ModuleType, seen: SphericalRectangle, sample: Point, it: Interaction) -> DirectionSample:
-    """A Mitsuba direction sample from a spherical rectangle."""
-    point, uv, pdf = seen.sample(sample.x, sample.y)
-    ps = dr.zeros(mi.PositionSample3f, dr.width(point))
-    ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(seen.rectangle.normal), mi.Point2f(*uv), it.time
-    ds = _toward(mi, ps, it)
-    ds.pdf = pdf
-    return ds
-
-
-def _ball_sample(mi: ModuleType, seen: SphericalCap, sample: Point, it: Interaction) -> DirectionSample:
-    """A Mitsuba direction sample from a ball."""
-    point, normal, pdf = seen.sample(sample.x, sample.y)
-    ps = dr.zeros(mi.PositionSample3f, dr.width(point))
-    ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(normal), mi.Point2f(*seen.ball.uv(normal)), it.time
-    ds = _toward(mi, ps, it)
-    ds.pdf = pdf
-    return ds
-
-
 def _area_sample(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
     """A Mitsuba direction sample from a point sampled by area: pdf per steradian = pdf per area * r^2 / |cos|."""
-    ds = _toward(mi, ps, it)
+    ds = toward(mi, ps, it)
     cosine = dr.abs(dr.dot(ds.d, ds.n))
     ds.pdf = dr.select(cosine > 0, ps.pdf * dr.square(ds.dist) / cosine, 0)
-    return ds
-
-
-def _toward(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
-    ds = mi.DirectionSample3f(ps)
-    away = ps.p - it.p
-    ds.dist = dr.norm(away)
-    ds.d = away / ds.dist
-    ds.delta = mi.Bool(False)
     return ds
 
 
@@ -179,11 +152,11 @@ class Lights:
         self.count = len(self.emitters)
         self.rectangle: Rectangle | None = None
         self.has_environment = scene.environment() is not None
-        if self.count == 1 and self._is_rectangle_light(self.emitters[0]):
-            self.rectangle = Rectangle.of(mi, self.emitters[0].get_shape())
+        if self.count == 1 and has_known_sides(self.emitters[0]):
+            self.rectangle = rectangle_of(mi, self.emitters[0].get_shape())
             dr.make_opaque(self.rectangle)
-        self.sky, self.sky_place = self._sky(beside_lobes)
-        self.balls = self._balls()
+        self.around = next((i for i in range(self.count) if self._is_environment(self.emitters[i])), -1)
+        self.sky = self._sky(beside_lobes)
         if self.count > 1:
             self.probability = self._probabilities()
             self.choice = mi.DiscreteDistribution(self.probability)
@@ -191,36 +164,22 @@ class Lights:
             self.by_pointer = self._by_pointer(self.probability)
             self.nearby = Nearby(mi, scene, self.emitters)
             self.number = self._by_pointer(dr.arange(mi.UInt32, self.count))
+        pointers = dr.gather(mi.EmitterPtr, scene.emitters_dr(), mi.UInt32(order)) if self.count else None
+        self.lamps = Lamps(mi, self.emitters, pointers)
+        unknown = [i for i in range(self.count) if not self.lamps.known[i] and i != self.around]
+        self.asks = bool(unknown)  # whether there are lights that are to be asked, and of those, any that rays meet
+        self.asks_met = any(self.emitters[i].get_shape() is not None for i in unknown) or self.lamps.radiance is None
 
-    def _sky(self, beside_lobes: bool) -> tuple[Sky | None, int]:
-        """The environment's density, where it is one that varies, and its place among the emitters."""
-        for place, emitter in enumerate(self.emitters):
-            if "data" in dict(self.mi.traverse(emitter)) and self.mi.has_flag(
-                emitter.flags(), self.mi.EmitterFlags.Infinite
-            ):
-                sky = Sky(self.mi, self.scene, emitter, beside_lobes)
-                return (sky, place) if sky.known else (None, -1)
-        return None, -1
+    def _sky(self, beside_lobes: bool) -> Sky | None:
+        """The environment's density, where it is one that varies."""
+        if self.around < 0 or "data" not in dict(self.mi.traverse(self.emitters[self.around])):
+            return None
+        sky = Sky(self.mi, self.scene, self.emitters[self.around], beside_lobes)
+        return sky if sky.known else None
 
-    def _balls(self) -> Float | None:
-        """`solid_angles.balls` of the one-sided lamps of Mitsuba, which it samples by positions in float32.
-
-        Those of a lamp of 4 mm three metres away are 2 % too bright. Ones with a texture it samples by that.
-        """
-        mi = self.mi
-
-        def known(emitter: Emitter) -> bool:
-            return bool(
-                emitter.class_name() == "AreaLight"
-                and is_sphere(mi, emitter.get_shape())
-                and not mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
-            )
-
-        return balls(mi, [emitter if known(emitter) else None for emitter in self.emitters])
-
-    def _is_rectangle_light(self, emitter: Emitter) -> bool:
-        known = getattr(emitter, "two_sided", False) or emitter.class_name() == "AreaLight"
-        return known and is_rectangle(self.mi, emitter.get_shape())
+    def _is_environment(self, emitter: Emitter) -> bool:
+        flags, kinds = emitter.flags(), self.mi.EmitterFlags
+        return self.mi.has_flag(flags, kinds.Infinite) and not self.mi.has_flag(flags, kinds.DeltaDirection)
 
     def _probabilities(self) -> Float:
         """Half uniform, half by the mean unoccluded light at 256 points spread in the scene's bounding box.
@@ -260,14 +219,30 @@ class Lights:
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
         """Radiance that the surface (or, where the ray left the scene, the environment) at `si` sends along the ray."""
+        mi, sent = self.mi, self.mi.Spectrum(0)
         if self.count == 0:
-            return dr.zeros(self.mi.Spectrum)
-        if self.count > 1:
-            return si.emitter(self.scene).eval(si, active)
-        # One is asked by itself: a call from the kernel takes a twentieth of a render under a sky.
-        shape = self.emitters[0].get_shape()
-        here = ~si.is_valid() if shape is None else si.shape == self.mi.ShapePtr(shape)
-        return dr.select(here, self.emitters[0].eval(si, active & here), 0)
+            return sent
+        # Calls from the kernel take a tenth of a render under a sky: a light that is alone is asked by itself.
+        if self.around >= 0:
+            beyond = ~si.is_valid()
+            sent = dr.select(beyond, self.emitters[self.around].eval(si, active & beyond), 0)
+        if self.count - (self.around >= 0) == 0:
+            return sent
+        met = active & si.is_valid()
+        if self.count == 1:
+            shape = self.emitters[0].get_shape()
+            if shape is None:
+                return sent
+            here = met & (si.shape == mi.ShapePtr(shape))
+            return dr.select(here, self.emitters[0].eval(si, here), 0)
+        emitter = si.emitter(self.scene, met)
+        if self.asks_met:
+            return dr.select(met, emitter.eval(si, met), sent)
+        number = dr.reinterpret_array(mi.UInt32, emitter)
+        here = met & (number > 0)
+        index = dr.gather(mi.UInt32, self.number, number, here)
+        row = self.lamps.row(index, here)
+        return dr.select(here, self.lamps.sent(row, index, si.n, si.to_world(si.wi), here), sent)
 
     def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
         """A direction toward a light: `u` in [0, 1)^2 chooses the light by its x, and by what is left a point on it.
@@ -277,26 +252,26 @@ class Lights:
         mi = self.mi
         if self.rectangle is not None:
             seen = SphericalRectangle(self.rectangle, si.p)
-            ds = _rectangle_sample(mi, seen, u, si)
-            at_light = mi.SurfaceInteraction3f(ds, si.wavelengths)
-            at_light.wi = at_light.to_local(-ds.d)
-            weight = dr.select(ds.pdf > 0, self.emitters[0].eval(at_light, active) / ds.pdf, 0)
-            normal = ds.n * dr.mulsign(self._off(si.p, ds.p), dr.dot(ds.n, ds.d))
-            return LightSample(ds, ds.p - normal, weight, mi.Bool(False), dr.select(seen.uniform, seen.solid_angle, 0))
+            ds = direction_sample(mi, seen, u, si)
+            light = self._ended(si, ds, self._sent(self.emitters[0], ds, si, active) / ds.pdf)
+            light.solid_angle = dr.select(seen.uniform, seen.solid_angle, 0)
+            return light
         if self.count == 1:
-            if self.sky is not None:
-                return self._toward_sky(self.sky, si, u, active)
+            if self.around == 0:
+                return self._toward_environment(si, u, active)
             return self._toward_lamp(self.emitters[0], mi.UInt32(0), si, u, active)
         index, left, probability = self.nearby.choose(si.p, u.x)
         u = mi.Point2f(left, u.y)
         place = dr.gather(mi.UInt32, self.place, index, active)
         emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), place, active)
-        if self.sky is None:
+        if self.around < 0:
             light = self._toward_lamp(emitter, index, si, u, active)
         else:
-            lamp = index != self.sky_place
+            lamp = index != self.around
+            if self.count == 2:  # one that is alone is asked by itself
+                emitter = self.emitters[1 - self.around]
             near = self._toward_lamp(emitter, index, si, u, active & lamp)
-            light = dr.select(lamp, near, self._toward_sky(self.sky, si, u, active))
+            light = dr.select(lamp, near, self._toward_environment(si, u, active & ~lamp))
         light.ds.pdf *= probability
         light.weight /= probability
         return light
@@ -304,39 +279,50 @@ class Lights:
     def _toward_lamp(
         self, emitter: Emitter, index: UInt, si: SurfaceInteraction, u: Point, active: Mask
     ) -> LightSample:
-        """A lamp's own sample, or that of a ball.
+        """The sample of a light that is no environment."""
+        lamps = self.lamps
+        row = lamps.row(index, active)
+        known = active & lamps.is_known(row)
+        asked = not lamps.kinds or self.asks
+        if asked:
+            found = self._ended(si, *emitter.sample_direction(si, u, active & ~known))
+        if not lamps.kinds:
+            return found
+        ds = lamps.sample(row, si, u)
+        sent = self._sent(emitter, ds, si, known)
+        if lamps.radiance is not None:
+            sent = lamps.sent(row, index, ds.n, -ds.d, known)
+        light = self._ended(si, ds, dr.select(ds.pdf > 0, sent / ds.pdf, 0))
+        return dr.select(known, light, found) if asked else light
 
-        Its shadow ray ends as far off the lamp's surface as it begins off `si`'s: a round lamp would hide its own limb
-        from one that ends on it. Nothing comes from closer, where all is rounding.
+    def _sent(self, emitter: Emitter, ds: DirectionSample, si: SurfaceInteraction, active: Mask) -> Radiance:
+        """What a lamp sends to `si` from a place on it."""
+        at_light = self.mi.SurfaceInteraction3f(ds, si.wavelengths)
+        at_light.wi = at_light.to_local(-ds.d)
+        return emitter.eval(at_light, active)
+
+    def _ended(self, si: SurfaceInteraction, ds: DirectionSample, weight: Radiance) -> LightSample:
+        """A light's sample, with the end of its shadow ray as far off the lamp's surface as it begins off `si`'s.
+
+        From a ray that ended on it, a round lamp would hide its own limb. Nothing comes from closer, where all is
+        rounding.
         """
         mi = self.mi
-        if self.balls is None:
-            ds, weight = emitter.sample_direction(si, u, active)
-        else:
-            ball, radius = self._ball(index)
-            ds, weight = emitter.sample_direction(si, u, active & (radius == 0))
-            own = _ball_sample(mi, SphericalCap(mi, ball, si.p), u, si)
-            own.n, own.emitter = own.n * dr.sign(radius), emitter
-            at_light = mi.SurfaceInteraction3f(own, si.wavelengths)
-            at_light.wi = at_light.to_local(-own.d)
-            shone = emitter.eval(at_light, active & (radius != 0)) / own.pdf
-            ds, weight = dr.select(radius == 0, ds, own), dr.select(radius == 0, weight, shone)
         off = self._off(si.p, ds.p)
         normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point has none
         target = mi.Point3f(ds.p - normal * dr.mulsign(off, dr.dot(normal, ds.d)))
         weight = dr.select(ds.delta | (ds.dist > off), weight, 0)
         return LightSample(ds, target, weight, mi.Bool(ds.delta), mi.Float(0))
 
-    def _ball(self, index: UInt, active: Mask = True) -> tuple[Ball, Float]:
-        """(the ball that a lamp is, its radius with the sign of its normal, 0 where it is none)."""
-        mi = self.mi
-        row = dr.gather(mi.Vector4f, self.balls, index, active)
-        return Ball(mi.Point3f(row.xyz), dr.abs(row.w)), row.w
-
     def _off(self, p: Point, q: Point) -> Float:
         """How far off surfaces a ray between two points begins and ends."""
         reach = dr.maximum(dr.max(dr.abs(p)), dr.max(dr.abs(q)))
         return self.mi.math.RayEpsilon * (1 + reach)
+
+    def _toward_environment(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
+        if self.sky is not None:
+            return self._toward_sky(self.sky, si, u, active)
+        return self._ended(si, *self.emitters[self.around].sample_direction(si, u, active))
 
     def _toward_sky(self, sky: Sky, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
         mi = self.mi
@@ -360,26 +346,34 @@ class Lights:
         it = dr.zeros(mi.SurfaceInteraction3f)
         it.p = origin
         ds = mi.DirectionSample3f(self.scene, si, it)
+        density = mi.Float(0)
+        if self.around >= 0:
+            density = (
+                self.emitters[self.around].pdf_direction(it, ds, active) if self.sky is None else self.sky.pdf(ds.d)
+            )
         if self.count == 1:
-            if self.sky is not None:
-                return self.sky.pdf(ds.d)
-            return self._density(self.emitters[0], mi.UInt32(0), it, ds, active)
+            return density if self.around >= 0 else self._density(self.emitters[0], mi.UInt32(0), it, ds, active)
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
         index = dr.gather(mi.UInt32, self.number, number, active)
-        if self.sky is None:
-            density = self._density(ds.emitter, index, it, ds, active)
-        else:
-            lamp = active & si.is_valid()  # the sky is what no surface is before
-            density = dr.select(lamp, self._density(ds.emitter, index, it, ds, lamp), self.sky.pdf(ds.d))
+        lamp = active & si.is_valid()  # the environment is what no surface is before
+        density = dr.select(lamp, self._density(ds.emitter, index, it, ds, lamp), density)
         return density * self.nearby.probability(origin, index, active)
+
+    def _around(self, it: Interaction, ds: DirectionSample, active: Mask) -> Float:
+        """Density (1/sr) with which `_toward_environment` chooses a direction."""
+        if self.sky is not None:
+            return self.sky.pdf(ds.d)
+        return self.emitters[self.around].pdf_direction(it, ds, active)
 
     def _density(self, emitter: Emitter, index: UInt, it: Interaction, ds: DirectionSample, active: Mask) -> Float:
         """Density (1/sr) with which `_toward_lamp` chooses a direction."""
-        if self.balls is None:
-            return emitter.pdf_direction(it, ds, active)
-        ball, radius = self._ball(index, active)
-        of_ball = SphericalCap(self.mi, ball, it.p).pdf(ds.dist, dr.abs(dr.dot(ds.d, ds.n)))
-        return dr.select(radius == 0, emitter.pdf_direction(it, ds, active & (radius == 0)), of_ball)
+        lamps = self.lamps
+        row = lamps.row(index, active)
+        known = active & lamps.is_known(row)
+        density = emitter.pdf_direction(it, ds, active & ~known) if self.asks else self.mi.Float(0)
+        if not lamps.kinds:
+            return density
+        return dr.select(known, lamps.pdf(row, it.p, ds.dist, dr.abs(dr.dot(ds.d, ds.n))), density)
 
     def share(self, pdf: Float, other: Float) -> Float:
         """What one of two strategies of a sample each is weighed by, of densities `pdf` and `other`, lights and lobes.

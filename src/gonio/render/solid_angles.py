@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
 import drjit as dr
-import numpy as np
 
-from . import engine
-from .types import Emitter, Float, Mask, Point, Shape, Vector
+from .types import Float, Mask, Point, Shape, Vector
 
 # Outside these solid angles (steradian) the area is sampled instead. Below: angles near pi in float32 carry
 # 2.4e-7, so at 1e-3 sr the sampled position is still good to 2.4e-4 of an edge, and light so far away gains nothing
@@ -20,20 +17,28 @@ SMALLEST_SOLID_ANGLE, LARGEST_SOLID_ANGLE = 1e-3, 6.22
 # A point is on a ball, as far as float32 knows, closer to it than this part of the radius and that of its coordinates.
 TOUCHING, ROUNDING = 1e-4, 1e-6
 
+# Cosine of the lean of edges that float32 transforms of a true rectangle stay far below; it bounds the error.
+STRAIGHT = 1e-4
+
+Sample = tuple[Point, Vector, tuple[Float, Float], Float]  # a point, its normal, (u, v) there, its density in 1/sr
+
 
 @dataclass
 class Rectangle:
-    """A rectangle in space: corner, two perpendicular unit axes, their lengths, the normal axis0 x axis1."""
+    """A rectangle in space: corner, two perpendicular unit axes, their lengths, and the side of its normal: 1 where
+    that is axis0 x axis1, else -1."""
 
     corner: Point
     axis0: Vector
     axis1: Vector
     length0: Float
     length1: Float
+    side: Float | int = 1
 
     @staticmethod
     def of(mi: ModuleType, shape: Shape) -> Rectangle:
-        """The rectangle of a Mitsuba `rectangle` shape as the kernel sees it, so that moving it recompiles nothing."""
+        """The rectangle of a Mitsuba `rectangle` as the kernel sees it, so that moving it recompiles nothing; of its
+        sides either may be that of the normal."""
         zero, one = mi.Float(0), mi.Float(1)
         corner = shape.sample_position(zero, mi.Point2f(zero, zero)).p
         edge0 = shape.sample_position(zero, mi.Point2f(one, zero)).p - corner
@@ -43,7 +48,7 @@ class Rectangle:
 
     @property
     def normal(self) -> Vector:
-        return dr.cross(self.axis0, self.axis1)
+        return dr.cross(self.axis0, self.axis1) * self.side
 
     @property
     def area(self) -> Float:
@@ -109,8 +114,8 @@ class SphericalRectangle:
         """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
         return self.rectangle.pdf(dr.select(self.uniform, self.solid_angle, 0), distance, cosine)
 
-    def sample(self, u: Float, v: Float) -> tuple[Point, tuple[Float, Float], Float]:
-        """A point of the rectangle from two numbers in [0, 1): (point, (u, v) on it in [0, 1]^2, pdf in 1/sr)."""
+    def sample(self, u: Float, v: Float) -> Sample:
+        """A point of the rectangle from two numbers in [0, 1)."""
         sine, cosine = dr.sincos(dr.fma(u, self.solid_angle, self.k))
         fu = (cosine * self.n0 - self.n2) / sine
         cu = dr.clip(dr.copysign(dr.rsqrt(dr.square(fu) + dr.square(self.n0)), fu), -1, 1)
@@ -128,15 +133,18 @@ class SphericalRectangle:
         away = point - self.origin
         distance = dr.norm(away)
         cosine = dr.abs(self.z0) / distance
-        return point, (x / self.rectangle.length0, y / self.rectangle.length1), self.pdf(distance, cosine)
+        uv = x / self.rectangle.length0, y / self.rectangle.length1
+        return point, self.rectangle.normal, uv, self.pdf(distance, cosine)
 
 
 @dataclass
 class Ball:
-    """A sphere in space: its centre, its radius, and where (u, v) are wanted the axes from which they are counted."""
+    """A sphere in space: its centre, its radius, the side of its normal (1 outward, -1 inward), and where (u, v) are
+    wanted the axes from which they are counted."""
 
     centre: Point
     radius: Float
+    side: Float
     axes: tuple[Vector, ...] = ()
 
     @staticmethod
@@ -144,10 +152,11 @@ class Ball:
         """The ball of a Mitsuba `sphere` as the kernel sees it, so that moving it recompiles nothing."""
         zero, half, one = mi.Float(0), mi.Float(0.5), mi.Float(1)
         top, bottom = (shape.sample_position(zero, mi.Point2f(zero, v)).p for v in (zero, one))
+        side = mi.Float(-1 if shape.has_flipped_normals() else 1)
         centre = 0.5 * (top + bottom)
         radius = 0.5 * dr.norm(top - bottom)
         x, y = (shape.sample_position(zero, mi.Point2f(u, half)).p - centre for u in (zero, mi.Float(0.25)))
-        return Ball(centre, radius, (x / radius, y / radius, (top - centre) / radius))
+        return Ball(centre, radius, side, (x / radius, y / radius, (top - centre) / radius))
 
     def uv(self, outward: Vector) -> tuple[Float, Float]:
         """(u, v) of the place whose normal is `outward`, as rays find them there; (0, 0) of a ball without axes."""
@@ -189,8 +198,8 @@ class SphericalCap:
         by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * area, 1e-30))
         return dr.select(self.outside, dr.rcp(self.solid_angle), by_area)
 
-    def sample(self, u: Float, v: Float) -> tuple[Point, Vector, Float]:
-        """A point of the ball from two numbers in [0, 1): (point, its normal outward, pdf in 1/sr)."""
+    def sample(self, u: Float, v: Float) -> Sample:
+        """A point of the ball from two numbers in [0, 1)."""
         mi, ball = self.mi, self.ball
         low = self.height * u
         sine = dr.safe_sqrt(low * (2 - low))
@@ -203,24 +212,8 @@ class SphericalCap:
         point = dr.fma(normal, ball.radius, ball.centre)
         away = point - self.origin
         distance = dr.norm(away)
-        return point, normal, self.pdf(distance, dr.abs(dr.dot(away, normal)) / distance)
-
-
-def balls(mi: ModuleType, emitters: Sequence[Emitter | None]) -> Float | None:
-    """Four numbers for each lamp: the centre of a sphere and its radius, which is negative where the normal points
-    inward; 0 of lamps that are none. None where no lamp is one."""
-    rows = np.zeros((len(emitters), 4))
-    for row, emitter in zip(rows, emitters, strict=True):
-        if emitter is None:
-            continue
-        shape = emitter.get_shape() if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface) else None
-        if shape is not None and is_sphere(mi, shape):
-            ball = Ball.of(mi, shape)
-            centre, radius = np.array(ball.centre, float).ravel(), float(ball.radius[0])
-            outside = ball.centre + mi.Vector3f(0, 0, 2 * radius)
-            seen = shape.ray_intersect(mi.Ray3f(outside, mi.Vector3f(0, 0, -1)))
-            row[:] = *centre, radius * np.sign(float(seen.n.z[0]))
-    return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
+        pdf = self.pdf(distance, dr.abs(dr.dot(away, normal)) / distance)
+        return point, normal * ball.side, ball.uv(normal), pdf
 
 
 def is_sphere(mi: ModuleType, shape: Shape) -> bool:
@@ -232,5 +225,4 @@ def is_rectangle(mi: ModuleType, shape: Shape) -> bool:
     if shape is None or shape.shape_type() != mi.ShapeType.Rectangle.value:
         return False
     rectangle = Rectangle.of(mi, shape)
-    # 1e-4: the lean of edges that float32 transforms of a true rectangle stay far below; it bounds the error.
-    return abs(float(dr.dot(rectangle.axis0, rectangle.axis1)[0])) < 1e-4
+    return abs(float(dr.dot(rectangle.axis0, rectangle.axis1)[0])) < STRAIGHT

@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import engine
 from .lights import Lights
-from .solid_angles import balls, is_sphere
+from .solid_angles import is_sphere
+from .surfaces import reader
 from .types import (
     Emitter,
     Float,
@@ -144,7 +146,7 @@ class Sources:
         self.kind_of, self.two_sided = mi.UInt32(self.kinds), mi.Bool(sides)
         parallel = [mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection) for emitter in lights.emitters]
         self.parallel = mi.Bool(parallel)
-        self.balls = balls(mi, lights.emitters)
+        self.balls = _balls(mi, lights.emitters)
         box = scene.bbox()
         centre, radius = (np.zeros(3), 1.0)
         if box.valid():
@@ -338,6 +340,19 @@ def _kind(mi: ModuleType, emitter: Emitter) -> int:
         return SURFACE
     what = f"a lamp of the kind {emitter.class_name()}, which sends no particles"
     raise InputError(what, "integrator", "use --integrator path, or a lamp with a surface, a point or an environment")
+
+
+def _balls(mi: ModuleType, emitters: Sequence[Emitter]) -> Float | None:
+    """Four numbers for each lamp: the centre of a sphere and its radius, which is negative where the normal points
+    inward; 0 of lamps that are none. None where no lamp is one."""
+    rows, read = np.zeros((len(emitters), 4)), reader(mi)
+    for row, emitter in zip(rows, emitters, strict=True):
+        shape = emitter.get_shape() if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface) else None
+        if shape is not None and is_sphere(mi, shape):
+            to_world = np.array(read(shape)).reshape(4, 4)
+            radius = np.linalg.norm(to_world[:3, 0])
+            row[:] = *to_world[:3, 3], -radius if shape.has_flipped_normals() else radius
+    return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
 
 
 def _on_disc(mi: ModuleType, u: Point) -> Vector:

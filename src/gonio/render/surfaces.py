@@ -32,7 +32,7 @@ class Surfaces:
 
     def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
-        shapes, read = scene.shapes(), _reader(mi)
+        shapes, read = scene.shapes(), reader(mi)
         self.inline = Inline.of(mi, scene, read)
         found = {kind: [shape for shape in shapes if shape.class_name() == kind] for kind in _KINDS}
         least = MANY if self.inline is None else 1
@@ -177,7 +177,7 @@ _KINDS: dict[str, tuple[Callable[[Matrices, NDArray[np.float64]], Matrices], For
 }
 
 
-def _reader(mi: ModuleType) -> Callable[[Shape], list[float]]:
+def reader(mi: ModuleType) -> Callable[[Shape], list[float]]:
     """Reads where a shape stands, the 16 numbers of `to_world` row by row, in a fifth of `mi.traverse`'s time."""
     base: Any = mi.TraversalCallback
 
