@@ -181,3 +181,23 @@ def test_uv_of_a_ball_are_those_that_rays_find() -> None:
         gap = np.abs(u - np.array(si.uv.x))
         assert np.minimum(gap, 1 - gap) == pytest.approx(0, abs=2e-4)
         assert v == pytest.approx(np.array(si.uv.y), abs=1e-3)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("mirror", [1, -1])
+@pytest.mark.parametrize("others", [0, 1])
+def test_a_rectangle_shines_from_the_side_of_its_normal(others: int, mirror: int, flip: bool) -> None:
+    """Turned over, mirrored, with flipped normals, alone and beside another one: as Mitsuba has it."""
+    for turn in (90, -90):
+        place = T().translate([0, 3, 0]).rotate([1, 0, 0], turn).scale([mirror, 1, 1])
+        red = {"type": "area", "radiance": {"type": "rgb", "value": [2.0, 1.0, 0.5]}}
+        lamp = {"type": "rectangle", "to_world": place, "flip_normals": flip, "emitter": red, "bsdf": grey(0.0)}
+        more = {f"m{i}": ball("area", (2, 2, 2), 0.2, bsdf=grey(0.0)) for i in range(others)}
+        scene = {"floor": FLOOR, "lamp": lamp, **more}
+        film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+        view = {"type": "perspective", "fov": 9, "to_world": T().look_at([4.5, 1, 0], [0, 0, 0], [0, 0, 1])}
+        loaded = mi.load_dict({"type": "scene", "camera": {**view, "film": film}, **scene}, optimize=False)
+        render = Render(loaded, Settings("path", 2))
+        render.advance(1024)
+        expected = np.array(mi.render(loaded, integrator=mi.load_dict({"type": "path", "max_depth": 2}), spp=1024))
+        assert render.image().mean((0, 1)) == pytest.approx(expected.mean((0, 1)), rel=3e-3, abs=1e-9)

@@ -1,7 +1,7 @@
 """The rectangles and balls of even radiance among a scene's lights, in tables: a formula each samples them all.
 
-Asked by calls from the kernel, as lights of any other kind are, lamps cost a tenth of a render; and Mitsuba's own are
-sampled by area (rectangles) or by positions in 32 bits (of a ball of 4 mm three metres away, 2 % too bright).
+Asked by calls from the kernel, as lights of any other kind are, lamps cost a tenth of a render; and Mitsuba's own balls
+are sampled by positions in 32 bits, of which one of 4 mm three metres away is 2 % too bright.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from . import engine
-from .solid_angles import STRAIGHT, Ball, Rectangle, SphericalCap, SphericalRectangle
+from .solid_angles import STRAIGHT, Ball, Rectangle, RectangularArea, Seen, SphericalCap
 from .surfaces import reader
 from .types import (
     DirectionSample,
@@ -67,18 +67,22 @@ class Lamps:
     def is_known(self, row: OfVariant) -> Mask:
         return row[3, 0] != NONE
 
-    def _seen(self, row: OfVariant, origin: Point) -> list[tuple[Mask, SphericalRectangle | SphericalCap]]:
+    def _seen(self, row: OfVariant, origin: Point) -> list[tuple[Mask, Seen]]:
         """(lanes for which it holds, the lamp as it is seen from a point) for each kind that there is."""
-        mi, found = self.mi, list[tuple[Mask, SphericalRectangle | SphericalCap]]()
+        mi, found = self.mi, list[tuple[Mask, Seen]]()
         if RECTANGLE in self.kinds:
-            found.append((row[3, 0] == RECTANGLE, SphericalRectangle(_rectangle(mi, row), origin)))
+            found.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
         if BALL in self.kinds:
             place = mi.Point3f(row[0, 0], row[0, 1], row[0, 2])
             found.append((row[3, 0] == BALL, SphericalCap(mi, Ball(place, row[1, 3], row[0, 3]), origin)))
         return found
 
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
-        """A direction toward a lamp, uniform in its solid angle."""
+        """A direction toward a lamp: uniform in the solid angle of a ball, on the area of a rectangle.
+
+        Rectangles by solid angle have 6 % less error beside several near lamps, and take 25 % more time: a path that
+        meets a lamp has to measure it again.
+        """
         found: DirectionSample | None = None
         for here, seen in self._seen(row, it.p):
             ds = direction_sample(self.mi, seen, u, it)
@@ -140,9 +144,7 @@ def _fill(row: np.ndarray, kind: str, to_world: np.ndarray, flipped: bool) -> No
     row[1:3, :3], row[1:3, 3], row[3, 0] = edges / lengths[:, None], lengths, RECTANGLE
 
 
-def direction_sample(
-    mi: ModuleType, seen: SphericalRectangle | SphericalCap, sample: Point, it: Interaction
-) -> DirectionSample:
+def direction_sample(mi: ModuleType, seen: Seen, sample: Point, it: Interaction) -> DirectionSample:
     """A Mitsuba direction sample toward a lamp as it is seen from `it`."""
     ps = dr.zeros(mi.PositionSample3f, dr.width(it.p))
     point, normal, uv, pdf = seen.sample(sample.x, sample.y)

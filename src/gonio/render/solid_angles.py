@@ -1,4 +1,4 @@
-"""Lamps as they are seen from a point: directions toward rectangles and balls, even in their solid angle."""
+"""Lamps as they are seen from a point: directions toward rectangles and balls, even in their solid angle or area."""
 
 from __future__ import annotations
 
@@ -57,8 +57,10 @@ class Rectangle:
     def pdf(self, solid_angle: Float, distance: Float, cosine: Float) -> Float:
         """Density (1/sr) toward a point seen at `distance` under |cosine|: uniform in the solid angle where one is
         given, uniform on the area where it is 0."""
-        by_area = dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
-        return dr.select(solid_angle > 0, dr.rcp(solid_angle), by_area)
+        return dr.select(solid_angle > 0, dr.rcp(solid_angle), self.pdf_by_area(distance, cosine))
+
+    def pdf_by_area(self, distance: Float, cosine: Float) -> Float:
+        return dr.square(distance) * dr.rcp(dr.maximum(cosine * self.area, 1e-30))  # grazing: large, never inf
 
     def hit(self, origin: Point, direction: Vector) -> tuple[Float, tuple[Float, Float], Mask]:
         """Where a ray meets the rectangle: (distance, (u, v) in [0, 1]^2, whether it does)."""
@@ -138,6 +140,27 @@ class SphericalRectangle:
 
 
 @dataclass
+class RectangularArea:
+    """A rectangle of which points are sampled uniform on its area."""
+
+    rectangle: Rectangle
+    origin: Point
+
+    def pdf(self, distance: Float, cosine: Float) -> Float:
+        """Density (1/sr) of `sample` toward a point of the rectangle at `distance`, seen under |cosine| on it."""
+        return self.rectangle.pdf_by_area(distance, cosine)
+
+    def sample(self, u: Float, v: Float) -> Sample:
+        """A point of the rectangle from two numbers in [0, 1)."""
+        rectangle = self.rectangle
+        point = rectangle.corner + rectangle.axis0 * (rectangle.length0 * u) + rectangle.axis1 * (rectangle.length1 * v)
+        away = point - self.origin
+        distance = dr.norm(away)
+        pdf = self.pdf(distance, dr.abs(dr.dot(away, rectangle.normal)) / distance)
+        return point, rectangle.normal, (u, v), pdf
+
+
+@dataclass
 class Ball:
     """A sphere in space: its centre, its radius, the side of its normal (1 outward, -1 inward), and where (u, v) are
     wanted the axes from which they are counted."""
@@ -214,6 +237,9 @@ class SphericalCap:
         distance = dr.norm(away)
         pdf = self.pdf(distance, dr.abs(dr.dot(away, normal)) / distance)
         return point, normal * ball.side, ball.uv(normal), pdf
+
+
+Seen = SphericalRectangle | RectangularArea | SphericalCap
 
 
 def is_sphere(mi: ModuleType, shape: Shape) -> bool:
