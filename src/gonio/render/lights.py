@@ -155,6 +155,10 @@ class Lights:
         if self.count == 1 and has_known_sides(self.emitters[0]):
             self.rectangle = rectangle_of(mi, self.emitters[0].get_shape())
             dr.make_opaque(self.rectangle)
+        shape = self.emitters[0].get_shape() if self.count == 1 else None
+        # Data, too: where another scene is alive, this one's shapes have other numbers.
+        self.shape = None if shape is None else dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
+        dr.make_opaque(self.shape)
         self.around = next((i for i in range(self.count) if self._is_environment(self.emitters[i])), -1)
         self.sky = self._sky(beside_lobes)
         if self.count > 1:
@@ -230,10 +234,9 @@ class Lights:
             return sent
         met = active & si.is_valid()
         if self.count == 1:
-            shape = self.emitters[0].get_shape()
-            if shape is None:
+            if self.shape is None:
                 return sent
-            here = met & (si.shape == mi.ShapePtr(shape))
+            here = met & (dr.reinterpret_array(mi.UInt32, si.shape) == self.shape)
             return dr.select(here, self.emitters[0].eval(si, here), 0)
         emitter = si.emitter(self.scene, met)
         if self.asks_met:
