@@ -169,8 +169,8 @@ class Lights:
             self.nearby = Nearby(mi, scene, self.emitters)
             self.number = self._by_pointer(dr.arange(mi.UInt32, self.count))
         pointers = dr.gather(mi.EmitterPtr, scene.emitters_dr(), mi.UInt32(order)) if self.count else None
-        self.lamps = Lamps(mi, self.emitters, pointers)
-        unknown = [i for i in range(self.count) if not self.lamps.known[i] and i != self.around]
+        self.lamps = Lamps(mi, self.emitters if self.rectangle is None else [], pointers)
+        unknown = [i for i, known in enumerate(self.lamps.known) if not known and i != self.around]
         self.asks = bool(unknown)  # whether there are lights that are to be asked, and of those, any that rays meet
         self.asks_met = any(self.emitters[i].get_shape() is not None for i in unknown) or self.lamps.radiance is None
 
