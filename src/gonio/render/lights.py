@@ -134,9 +134,10 @@ class Lights:
 
     A scene lit by one rectangle, as most of the lab's are, takes a short way: no choice of light, no virtual call,
     solid-angle sampling whether the emitter is `gonio_area` or Mitsuba's one-sided `area`, and for a path's last
-    ray a hit test of one rectangle. Every other scene asks the emitters themselves (point, environment, ...); one of
-    several is chosen by the light that it sends to where one is (`Nearby`), and for particles, which begin at lamps, by
-    `probability`: half evenly, half by the light that it sends into the scene.
+    ray a hit test of one rectangle. In other scenes rectangles and balls are sampled from tables (`Lamps`), and lights
+    of other kinds (points, textures, ...) asked themselves; one of several is chosen by the light that it sends to
+    where one is (`Nearby`), and for particles, which begin at lamps, by `probability`: half evenly, half by the light
+    that it sends into the scene.
 
     beside_lobes  lobes are sampled too: an environment's own samples leave to them what they find (`Sky`)
     """
@@ -159,6 +160,7 @@ class Lights:
         # Data, too: where another scene is alive, this one's shapes have other numbers.
         self.shape = None if shape is None else dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
         dr.make_opaque(self.shape)
+        # the environment's place among the emitters, -1 where there is none
         self.around = next((i for i in range(self.count) if self._is_environment(self.emitters[i])), -1)
         self.sky = self._sky(beside_lobes)
         if self.count > 1:
@@ -230,8 +232,6 @@ class Lights:
         if self.around >= 0:
             beyond = ~si.is_valid()
             sent = dr.select(beyond, self.emitters[self.around].eval(si, active & beyond), 0)
-        if self.count - (self.around >= 0) == 0:
-            return sent
         met = active & si.is_valid()
         if self.count == 1:
             if self.shape is None:
@@ -351,9 +351,7 @@ class Lights:
         ds = mi.DirectionSample3f(self.scene, si, it)
         density = mi.Float(0)
         if self.around >= 0:
-            density = (
-                self.emitters[self.around].pdf_direction(it, ds, active) if self.sky is None else self.sky.pdf(ds.d)
-            )
+            density = self._density_around(it, ds, active)
         if self.count == 1:
             return density if self.around >= 0 else self._density(self.emitters[0], mi.UInt32(0), it, ds, active)
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
@@ -362,7 +360,7 @@ class Lights:
         density = dr.select(lamp, self._density(ds.emitter, index, it, ds, lamp), density)
         return density * self.nearby.probability(origin, index, active)
 
-    def _around(self, it: Interaction, ds: DirectionSample, active: Mask) -> Float:
+    def _density_around(self, it: Interaction, ds: DirectionSample, active: Mask) -> Float:
         """Density (1/sr) with which `_toward_environment` chooses a direction."""
         if self.sky is not None:
             return self.sky.pdf(ds.d)
