@@ -50,7 +50,7 @@ class Lamps:
                 if kind in ("Rectangle", "Sphere"):
                     _fill(row, kind, np.array(read(shape)).reshape(4, 4), shape.has_flipped_normals())
                     row[3, 1] = getattr(emitter, "two_sided", False)
-        self.known = [bool(row[3, 0] != NONE) for row in rows]
+        self.known = [bool(row[3, 0] != NONE) for row in rows[: len(emitters)]]
         self.kinds = sorted({int(row[3, 0]) for row in rows} - {NONE})
         self.table = engine.own(mi.Float, rows.ravel().astype(np.float32))
         self.radiance: Float | None = None

@@ -70,30 +70,40 @@ class PhotonMap:
         self.mask = dr.opaque(mi.UInt32, (1 << bits) - 1)
         self.keys = (1 << bits) + ROW
         self.low = dr.opaque(mi.Int32, -(ROW // 2))  # of cells along x, about the origin of the scene
-        found = []
+        keys = []
         for photon, there in zip(photons, kept, strict=True):
             cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photon.position]
-            # all as many as there are particles: what stands for all alike is one number, which would be joined as one
-            values = [value + dr.zeros(mi.Float, dr.width(photon.position)) for value in photon.packed()]
+            values = photon.packed()
             there = there & dr.isfinite(sum(values[1:], values[0]))
-            key = dr.select(there, self._row(cell[1], cell[2]) + self._along(cell[0]), self.keys)
-            found.append([key, *values])
-        dr.eval(found)
-        keys, *values = [dr.concat(list(parts)) for parts in zip(*found, strict=True)]
-        assert {dr.width(one) for one in (keys, *values)} == {total}
+            keys.append(dr.select(there, self._row(cell[1], cell[2]) + self._along(cell[0]), self.keys))
+        dr.eval(keys)
+        key = np.concatenate([np.array(one) for one in keys])
         # The key above the number: their order is one of whole numbers, and the same whoever sorts.
-        words = (np.array(keys, np.uint64) << np.uint64(32)) | np.arange(total, dtype=np.uint64)
-        words = words[words < np.uint64(self.keys) << np.uint64(32)]
+        lie = np.flatnonzero(key < self.keys)
+        words = (key[lie].astype(np.uint64) << np.uint64(32)) | lie.astype(np.uint64)
         words.sort()
         self.count = len(words)
-        per_key = np.bincount((words >> np.uint64(32)).astype(np.int64), minlength=self.keys)
-        self.starts = engine.own(mi.UInt32, np.concatenate([[0], np.cumsum(per_key)]).astype(np.uint32))
+        starts = np.zeros(self.keys + 1, np.uint32)
+        np.cumsum(np.bincount(key[lie], minlength=self.keys), out=starts[1:])
+        self.starts = engine.own(mi.UInt32, starts)
         order = engine.own(mi.UInt32, words.astype(np.uint32) if self.count else np.zeros(1, np.uint32))
-        self.values = dr.empty(mi.Float, dr.width(order) * FIELDS)
+        self.values = self._sorted(photons, order)
+
+    def _sorted(self, photons: Sequence[Photon], order: UInt) -> Float:
+        """The particles in that order of theirs, one kind after the other, FIELDS numbers each."""
+        mi, first = self.mi, 0
+        found = Photon.none(mi)
+        for photon in photons:
+            count = dr.width(photon.position)
+            here = (order >= dr.opaque(mi.UInt32, first)) & (order < dr.opaque(mi.UInt32, first + count))
+            found = dr.select(here, dr.gather(Photon, photon, order - dr.opaque(mi.UInt32, first), here), found)
+            first += count
+        values = dr.empty(mi.Float, dr.width(order) * FIELDS)
         lane = dr.arange(mi.UInt32, dr.width(order))
-        for place, value in enumerate(values):
-            dr.scatter(self.values, dr.gather(mi.Float, value, order), lane * FIELDS + place)
-        dr.eval(self.values)
+        for place, value in enumerate(found.packed()):
+            dr.scatter(values, value, lane * FIELDS + place)
+        dr.eval(values)
+        return values
 
     def _row(self, y: UInt, z: UInt) -> UInt:
         mi = self.mi
