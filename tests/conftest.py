@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,12 @@ sys.path.insert(0, str(Path(__file__).parent))  # `sphere`, `materials`
 
 from gonio import ops
 from gonio.render import engine
+
+# A shell's background and nohup hand ignored signals down, and who waits for a Ctrl-C here would wait for ever.
+for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.SIG_DFL)):
+    number = getattr(signal, name, None)
+    if number is not None and signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, handler)
 
 if os.environ.get("GONIO_TEST_DEVICE") == "cuda":  # `make test-gpu`: what would take the CPU takes the GPU
     _choose = engine.variant_for

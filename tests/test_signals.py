@@ -12,10 +12,7 @@ ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 
 # sends the process a signal when it imports a module
 SENT = """
-import os, signal, sys
-
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a test in a shell's background inherits ignored ones
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+import os, sys
 
 class Sender:
     def find_spec(self, name, path=None, target=None):

@@ -350,18 +350,7 @@ def test_pictures_of_one_channel_become_grey() -> None:
 
 def _start(scene: Path, output: Path) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "gonio.cli", "render", str(scene), "--spp", str(2**29), "-o", str(output)]
-
-    def heard() -> None:  # a test run in the background of a shell, or under nohup, hands ignored signals down
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)
-
-    return subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=heard,
-    )
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 @pytest.fixture
