@@ -214,10 +214,13 @@ def test_scalar_variants_are_one_clear_error(name: str) -> None:
         mi.load_dict({"type": "gonio_conductor"})
 
 
-def test_our_integrators_say_so_in_polarized_variants() -> None:
-    mi.set_variant("llvm_ad_mono_polarized")
+@pytest.mark.parametrize(
+    "name, what", [("llvm_ad_mono_polarized", "is polarized"), ("scalar_rgb", "works on one ray at a time")]
+)
+def test_our_integrators_say_in_which_variants_they_do_not_work(name: str, what: str) -> None:
+    mi.set_variant(name)
     scene = mi.load_dict({"type": "scene", "camera": {"type": "perspective"}})
-    with pytest.raises(go.InputError, match="llvm_ad_mono_polarized is polarized"):
+    with pytest.raises(go.InputError, match=f"{name} {what}"):
         integrators.Render(scene, integrators.Settings())
 
 

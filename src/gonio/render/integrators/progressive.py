@@ -57,10 +57,10 @@ class Render:
         share: NDArray[np.uint32] | None = None,
     ):
         self.mi = mi = engine.load()
-        if mi.is_polarized:
-            raise InputError(
-                f"variant {mi.variant()} is polarized", "Render", "take one that is not, or Mitsuba's own path"
-            )
+        if mi.is_polarized or mi.variant().startswith("scalar"):
+            what = "is polarized" if mi.is_polarized else "works on one ray at a time"
+            hint = "load the scene with llvm_ad_rgb or another that is not so, or take Mitsuba's own path"
+            raise InputError(f"variant {mi.variant()} {what}", "Render", hint)
         self.scene, self.settings, self.aovs = scene, settings, aovs
         if sensor is None and not scene.sensors():
             raise InputError("the scene has no camera", "scene.sensors()", "add a sensor, or pass one")
