@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import ClassVar
 
@@ -13,11 +13,12 @@ import numpy as np
 from .. import engine, sampler
 from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
-from ..types import Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
+from ..types import BSDFSample, Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
+from . import transport
 from .base import Settings
 from .particles import FIRST_VERTEX, VERTEX_DIMENSIONS, Flight, Particles
 from .path import Path
-from .transport import PathState
+from .transport import ROULETTE, PathState
 
 SHARED = 4  # samples of a pixel that look at the same map
 PER_PIXEL = 2.0  # particles of a map for each pixel,
@@ -28,6 +29,9 @@ CROWD = 4.0  # radii wide: the cubes in which particles are counted
 COLOURS = 4  # wavelengths of a sample in spectral variants
 HUES = 0x48554553  # key of the sequence that maps take them from
 PROBED = 48  # rays each way, to measure a pixel
+ASKED_COSINES = (-1.0, -0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 1.0)  # where materials are asked how they choose lobes,
+ASKED_STEPS = 65  # by so many numbers each
+END = 2.0**-20  # of the numbers that choose a lobe: what chooses the one at each end; no lobe is rarer
 
 
 @dataclass
@@ -43,6 +47,24 @@ class _Way:
     second: Photon
 
 
+@dataclass
+class _Chains:
+    """What a path carries along of the mirrors and smooth glass on its way.
+
+    lobe    pdf over cosine with which the last lobe before them chose its direction; 0 where there was none
+    counts  of the light behind them that it finds from that surface on
+    trip    0 of a sample's first trip; 1 where a second is to follow, 2 on that
+    odds    how likely a second trip takes the chain from the camera on, over how likely a first one does
+    number  [0, 1), by which a second trip chooses
+    """
+
+    lobe: Float
+    counts: Float
+    trip: UInt
+    odds: Float
+    number: Float
+
+
 class Caustics(Path):
     """Path tracing, where light by way of mirrors and smooth glass comes from a map of particles, too.
 
@@ -55,6 +77,11 @@ class Caustics(Path):
     particles that come from there the other way, are as dense as p / cos and g N pi r^2 over the same étendue, with
     the particles' density g at the lamp; what mirrors and lenses do to the width of the beam is the same for both.
     Merging as one more way to sample a path is of Georgiev2012.
+
+    Lamps that the camera itself sees by mirrors and glass no particle shows, and a lamp behind two reflections within a
+    glass ball is met by one path in a thousand. So where a path has come to glass first, its sample goes on a second
+    trip: by mirrors and glass alone, with reflection and refraction as likely as each other, to the lamp or to nothing.
+    Both trips are weighed by how likely they go that way (power heuristic).
     """
 
     name = "caustics"
@@ -65,6 +92,7 @@ class Caustics(Path):
         super().__init__(mi, scene, sensor, settings, aovs)
         self.particles: Particles | None = None
         self._map: tuple[int, PhotonMap] | None = None
+        self._forks = False  # whether there are second trips
         self.merging = bool(self.smooth) and self.lights.count > 0 and settings.max_depth > 2
         if not self.merging:
             return
@@ -73,6 +101,7 @@ class Caustics(Path):
         self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
         self.radius = FOOTPRINT * self._pixel()
         self._total = dr.opaque(mi.Float, self.count)
+        self._forks = self._both_ends()
         self._crowding = Crowding.nowhere(mi)
         self._seen = False  # a map, from which to tell where particles crowd
 
@@ -210,7 +239,11 @@ class Caustics(Path):
     def hue(self, index: UInt, own: Float) -> Float:
         return self._hue(index // SHARED, index) if self.merging and self.mi.is_spectral else own
 
-    def merged(
+    def carried(self) -> _Chains | None:
+        mi = self.mi
+        return _Chains(mi.Float(0), mi.Float(1), mi.UInt32(0), mi.Float(1), mi.Float(0)) if self.merging else None
+
+    def brought(
         self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
     ) -> tuple[Radiance, Float]:
         """The light that particles have brought to a place, toward the path that has come there; and what counts of the
@@ -218,13 +251,13 @@ class Caustics(Path):
         mi = self.mi
         if self._map is None:
             return mi.Spectrum(0), mi.Float(1)
-        photons, depth = self._map[1], path.depth
+        photons, depth, chains = self._map[1], path.depth, path.more
         active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         normal = mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, si.to_world(si.wi)))
         # Who has come here by mirrors shares what first particles have brought with second particles.
-        by_mirrors = (path.lobe > 0) & (path.pdf == 0)
+        by_mirrors = (chains.lobe > 0) & (path.pdf == 0)
         crowd = self._crowding.at(si.p) * dr.inv_pi
-        counts = dr.select(by_mirrors, self._by_path(path.lobe, crowd, photons), 1)
+        counts = dr.select(by_mirrors, self._by_path(chains.lobe, crowd, photons), 1)
 
         def visit(photon: Photon, weight: Float, here: Mask) -> Radiance:
             here &= photon.depth + depth + 1 <= self.max_depth
@@ -247,12 +280,121 @@ class Caustics(Path):
         ratio = particles / lobe
         return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
 
-    def found(self, path: PathState, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
-        """What a path finds at a lamp that it meets by way of mirrors, beside the particles."""
+    def met(
+        self, path: PathState, si: SurfaceInteraction, bsdf: MitsubaBSDF, emitted: Radiance, active: Mask
+    ) -> tuple[Radiance, Mask]:
+        """What a path finds at a lamp that it meets by way of mirrors, beside the particles or another trip."""
         if self._map is None:
-            return emitted
+            return emitted, active
         assert self.particles is not None
-        behind = active & (path.lobe > 0) & dr.any(emitted != 0)
+        mi, chains = self.mi, path.more
+        lit = active & (path.pdf == 0) & dr.any(emitted != 0)
+        behind = lit & (chains.lobe > 0)
         density = self.particles.sources.density(path.ray.o, si, path.ray.d, behind)
-        share = path.counts * self._by_path(path.lobe, density, self._map[1])
-        return dr.select(behind, emitted * share, emitted)
+        share = dr.select(behind, chains.counts * self._by_path(chains.lobe, density, self._map[1]), 1)
+        if not self._forks:
+            return emitted * share, active
+        second, odds2 = chains.trip == 2, dr.square(chains.odds)
+        by_second = dr.select(chains.odds == 1, 0, odds2 / (1 + odds2))  # 1: there was no choice on the way
+        share = dr.select(lit & (chains.lobe == 0), dr.select(second, by_second, 1 - by_second), share)
+        return emitted * share, active & ~(second & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth))
+
+    def followed(
+        self,
+        path: PathState,
+        following: PathState,
+        si: SurfaceInteraction,
+        bsdf: MitsubaBSDF,
+        bs: BSDFSample,
+        kept: Float,
+    ) -> PathState:
+        if self._map is None:
+            return following
+        mi, chains = self.mi, path.more
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        begun = bs.pdf / dr.maximum(abs(dr.dot(following.ray.d, si.n)), 1e-6)
+        after = replace(
+            chains,
+            lobe=dr.select(delta, chains.lobe * dr.square(bs.eta), begun),
+            counts=dr.select(delta, chains.counts, kept),
+        )
+        if not self._forks:
+            return replace(following, more=after)
+        # On the chain from the camera on: two ways, of which a second trip takes each as often, or a sole one, or
+        # what a second trip does not follow.
+        here, two = path.active & (chains.lobe == 0), delta & self._two(bsdf.flags())
+        sole = delta & (bs.pdf > 1 - END)
+        fork = here & two & ~sole
+        odds = chains.odds * dr.select(here & ~sole, dr.select(fork & (bs.pdf > END), 0.5 / bs.pdf, 0), 1)
+        after.odds = odds
+        second = chains.trip == 2
+        after.trip = dr.select(fork & (chains.trip == 0) & (chains.odds > 0), mi.UInt32(1), chains.trip)
+        after.number = dr.select(fork, 2 * chains.number - dr.floor(2 * chains.number), chains.number)
+        weight = dr.select(fork & second, 2 * bs.pdf, 1)
+        active = following.active & (~second | (odds > 0))
+        return replace(following, throughput=following.throughput * weight, active=active, more=after)
+
+    # ------------------------------------------------------------------ second trips
+
+    def renewed(self, fresh: PathState, path: PathState, key: UInt, begins: Mask) -> tuple[PathState, Mask]:
+        if not self._forks:
+            return super().renewed(fresh, path, key, begins)
+        again = begins & (path.more.trip == 1)
+        # One number makes all choices, a digit each: so the ways that several of them make are taken evenly, too.
+        number = self.pair(key, path.index, transport.FIRST_VERTEX + ROULETTE)[0]
+        fresh.radiance = dr.select(again, path.radiance, fresh.radiance)
+        fresh.more.trip = dr.select(again, self.mi.UInt32(2), fresh.more.trip)
+        fresh.more.number = number
+        return dr.select(begins, fresh, path), begins & ~again
+
+    def complete(self, path: PathState) -> Mask:
+        return ~path.active & (path.more.trip != 1) if self._forks else super().complete(path)
+
+    def choice(self, path: PathState, u: Float) -> Float:
+        if not self._forks:
+            return u
+        return dr.select(path.more.trip == 2, dr.select(path.more.number < 0.5, END, 1 - END), u)
+
+    def roulette(
+        self, path: PathState, key: UInt, dimension: UInt, depth: UInt, throughput: Radiance, eta: Float, active: Mask
+    ) -> tuple[Radiance, Mask]:
+        """As the base's, but not of a second trip, nor of a first that has not come to where a second is to follow."""
+        share, survives = super().roulette(path, key, dimension, depth, throughput, eta, active)
+        if not self._forks:
+            return share, survives
+        plays = (path.more.trip == 1) | (path.more.lobe > 0)
+        return dr.select(plays, share, throughput), dr.select(plays, survives, active)
+
+    def _two(self, flags: UInt) -> Mask:
+        """Whether a surface reflects as a mirror and lets through straight or refracted, and does nothing else."""
+        mi, kinds = self.mi, self.mi.BSDFFlags
+        through = mi.has_flag(flags, kinds.DeltaTransmission) ^ mi.has_flag(flags, kinds.Null)
+        return mi.has_flag(flags, kinds.DeltaReflection) & through & ~mi.has_flag(flags, kinds.Smooth)
+
+    def _both_ends(self) -> bool:
+        """Whether there are surfaces with two ways, each of which one end of the numbers that choose a lobe takes.
+
+        Asked of the materials themselves, since anybody may write one; those with more than one change of ways along
+        the numbers have no second trips.
+        """
+        mi = self.mi
+        plugins = {id(plugin): plugin for plugin in (shape.bsdf() for shape in self.smooth)}.values()
+        asked = [plugin for plugin in plugins if self._two(mi.UInt32(+plugin.flags()))[0]]
+        shape = len(ASKED_COSINES), ASKED_STEPS
+        lane = dr.arange(mi.UInt32, shape[0] * shape[1])
+        si = dr.zeros(mi.SurfaceInteraction3f, len(lane))
+        si.n, si.dp_du, si.dp_dv = mi.Normal3f(0, 0, 1), mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
+        si.sh_frame = mi.Frame3f(si.n)
+        cosine = dr.gather(mi.Float, mi.Float(ASKED_COSINES), lane // ASKED_STEPS)
+        si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(cosine)), 0, cosine)
+        si.wavelengths = type(si.wavelengths)(*[550] * dr.size_v(si.wavelengths))  # nm, where there are any
+        u = dr.lerp(END, 1 - END, mi.Float(lane % ASKED_STEPS) / (ASKED_STEPS - 1))
+        for plugin in asked:
+            bs, _ = plugin.sample(self.context, si, u, mi.Point2f(0.5))
+            first = np.array(mi.Float(bs.wo.z * cosine)).reshape(shape) < 0
+            first = first == first[:, :1]  # those that go where the smallest number goes, of which it is so likely:
+            likely = np.array(mi.Float(bs.pdf) + 0 * cosine).reshape(shape)[:, 0]
+            changes = np.sum(first[:, 1:] != first[:, :-1], axis=1)
+            if np.any(changes > 1) or not np.all(abs(first.mean(1) - likely) < 2 / ASKED_STEPS):
+                return False
+        return bool(asked)

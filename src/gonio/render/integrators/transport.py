@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import ModuleType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import drjit as dr
 
@@ -63,9 +63,8 @@ class PathState:
     radiance: Radiance  # found so far
     alone: UInt  # 1 where the first wavelength goes on without the others
     inside: UInt  # of which media, see `media.py`
-    lobe: Float  # pdf over cosine with which the last lobe before mirrors chose its direction; 0 where there was none
-    counts: Float  # of the light behind mirrors that it finds from that surface on
     active: Mask
+    more: Any = None  # what a subclass carries along
 
 
 class Transport(Integrator):
@@ -74,8 +73,10 @@ class Transport(Integrator):
     samples_lights  whether each vertex looks for light by sampling the lights
     samples_lobes   whether it does by sampling the BSDF's lobes; delta lobes are always followed
     plays_roulette  whether dim paths are ended by chance
-    merges          whether particles bring light to vertices too: then it has `merged` and `found`
+    merges          whether particles bring light to vertices too
     depth           the longest path in segments, a method
+
+    and where it has more to do on the way `carried`, `renewed`, `complete`, `met`, `choice`, `brought`, `followed`
     """
 
     samples_lights: ClassVar[bool] = True
@@ -132,9 +133,9 @@ class Transport(Integrator):
 
         def body(index: UInt, path: PathState, sums: Sums) -> tuple[UInt, PathState, Sums]:
             begins = ~path.active
-            path = dr.select(begins, self.first(pixel, key, index, begins), path)
+            path, begins = self.renewed(self.first(pixel, key, index, begins), path, key, begins)
             path, features = self.extend(path, key)
-            ended = ~path.active
+            ended = self.complete(path)
             sums = sums.add(self.rgb(path.radiance, path.ray.wavelengths), ended, features, begins)
             return index + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, sums
 
@@ -155,7 +156,7 @@ class Transport(Integrator):
 
     def _path(self, index: UInt, ray: Ray, hit: Hit, weight: Radiance, active: Mask) -> PathState:
         """A path that has met nothing yet."""
-        mi, zero, one = self.mi, self.mi.Float(0), self.mi.Float(1)
+        mi, zero = self.mi, self.mi.Float(0)
         inside = self.begun if self.begun is not None else mi.UInt32(0)
         return PathState(
             index,
@@ -163,15 +164,14 @@ class Transport(Integrator):
             ray,
             hit,
             weight,
-            one,
+            mi.Float(1),
             zero,
             zero,
             mi.Spectrum(0),
             mi.UInt32(0),
             inside,
-            zero,
-            one,
             mi.Bool(active),
+            self.carried(),
         )
 
     def extend(self, path: PathState, key: UInt, first: bool = False) -> tuple[PathState, list[Float]]:
@@ -196,27 +196,27 @@ class Transport(Integrator):
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)
             weight = lights.share(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
-            if self.merges:
-                emitted = self.found(path, si, emitted, active & (path.pdf == 0))
-        radiance = radiance + throughput * dr.select(active, emitted, 0)
-        active = active & si.is_valid() & (depth + 1 < self.max_depth)
-
         bsdf = si.bsdf(ray)
+        emitted, goes_on = self.met(path, si, bsdf, emitted, active)
+        radiance = radiance + throughput * dr.select(active, emitted, 0)
+        active = active & si.is_valid() & (depth + 1 < self.max_depth) & goes_on
+
         crossing = self.media.crossing(si, bsdf, path.inside, active) if self.media.known else None
         if crossing is not None:
             si.duv_dx = mi.Vector2f(crossing.outer - 1.0, 0.0)
         alone = path.alone
         if self.disperses:
             throughput, alone = self.separate(throughput, alone, active & ((bsdf.flags() & DISPERSES) != 0))
-        gathered, solid_angle, bs, weight = self.scatter(path.index, key, dimension, si, bsdf, active, crossing)
+        gathered, solid_angle, bs, weight = self.scatter(path, key, dimension, si, bsdf, active, crossing)
         inside = path.inside
         if crossing is not None:
             bs, weight = self.straight_on(si, bs, weight, active & ~crossing.surface)
             inside = dr.select(si.wi.z * bs.wo.z < 0.0, crossing.beyond, crossing.here)
+        kept = None
         if self.merges:
             surface = active if crossing is None else active & crossing.surface
             _, u = sampler.independent_pair(key, path.index, dimension + ROULETTE)
-            brought, counts_here = self.merged(si, bsdf, path, u, surface)
+            brought, kept = self.brought(si, bsdf, path, u, surface)
             gathered = gathered + brought
         radiance = radiance + throughput * dr.select(active, gathered, 0)
         if self.ambient is not None:
@@ -230,14 +230,9 @@ class Transport(Integrator):
         pdf = dr.select(delta, 0, bs.pdf) if self.samples_lights else mi.Float(0)
         eta = path.eta * dr.select(active, bs.eta, 1)
         if self.plays_roulette:
-            throughput, active = self.roulette(path.index, key, dimension, depth, throughput, eta, active)
+            throughput, active = self.roulette(path, key, dimension, depth, throughput, eta, active)
 
         ray = si.spawn_ray(si.to_world(bs.wo))
-        lobe, counts = path.lobe, path.counts
-        if self.merges:
-            counts = dr.select(delta, counts, counts_here)
-            begun = bs.pdf / dr.maximum(abs(dr.dot(ray.d, si.n)), 1e-6)
-            lobe = dr.select(delta, lobe * dr.square(bs.eta), begun)
         # The last ray can only find light: no surface beyond it is shaded.
         end = active & last
 
@@ -262,21 +257,54 @@ class Transport(Integrator):
             radiance,
             alone,
             inside,
-            lobe,
-            counts,
             active,
+            path.more,
         )
-        return following, features
+        return self.followed(path, following, si, bsdf, bs, kept), features
 
-    def merged(
+    # ------------------------------------------------------------------ what a subclass may do on the way
+
+    def carried(self) -> Any:
+        """`PathState.more` of a path that begins; None, or a dataclass of the kernel's values."""
+        return None
+
+    def renewed(self, fresh: PathState, path: PathState, key: UInt, begins: Mask) -> tuple[PathState, Mask]:
+        """Where a path has ended, the next one in its place; and whether that is of a new sample."""
+        return dr.select(begins, fresh, path), begins
+
+    def complete(self, path: PathState) -> Mask:
+        """Whether a sample is complete."""
+        return ~path.active
+
+    def met(
+        self, path: PathState, si: SurfaceInteraction, bsdf: MitsubaBSDF, emitted: Radiance, active: Mask
+    ) -> tuple[Radiance, Mask]:
+        """What counts of the light of what a path meets, and whether it goes on from there."""
+        return emitted, active
+
+    def choice(self, path: PathState, u: Float) -> Float:
+        """The number that chooses a lobe."""
+        return u
+
+    def brought(
         self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
-    ) -> tuple[Radiance, Float]:
-        """Of an integrator that merges: what particles bring to a vertex, and `PathState.counts` from there on."""
+    ) -> tuple[Radiance, Any]:
+        """Of an integrator that merges: what particles bring to a vertex, and what `followed` is told of it."""
         raise NotImplementedError
 
-    def found(self, path: PathState, si: SurfaceInteraction, emitted: Radiance, active: Mask) -> Radiance:
-        """Of an integrator that merges: what counts of a lamp that a path meets by way of mirrors."""
-        raise NotImplementedError
+    def followed(
+        self,
+        path: PathState,
+        following: PathState,
+        si: SurfaceInteraction,
+        bsdf: MitsubaBSDF,
+        bs: BSDFSample,
+        kept: Any,
+    ) -> PathState:
+        """The path after a vertex, with what it carries along from there."""
+        return following
+
+    # ------------------------------------------------------------------ the parts of a vertex
 
     def straight_on(
         self, si: SurfaceInteraction, bs: BSDFSample, weight: Radiance, through: Mask
@@ -301,7 +329,7 @@ class Transport(Integrator):
 
     def scatter(
         self,
-        index: UInt,
+        path: PathState,
         key: UInt,
         dimension: UInt,
         si: SurfaceInteraction,
@@ -316,7 +344,8 @@ class Transport(Integrator):
         Returns (light gathered from the lights, solid angle of the light, BSDF sample, its weight).
         """
         mi, lights, context = self.mi, self.lights, self.context
-        lobe, _ = self.pair(key, index, dimension + CHOICE)
+        index = path.index
+        lobe = self.choice(path, self.pair(key, index, dimension + CHOICE)[0])
         u = mi.Point2f(*self.direction_pair(key, index, dimension + LOBE))
         if not self.samples_lights or lights.count == 0:
             bs, weight = bsdf.sample(context, si, lobe, u, active)
@@ -363,14 +392,14 @@ class Transport(Integrator):
         return dr.select(active, reflected * light.eval(si, active), 0)
 
     def roulette(
-        self, index: UInt, key: UInt, dimension: UInt, depth: UInt, throughput: Radiance, eta: Float, active: Mask
+        self, path: PathState, key: UInt, dimension: UInt, depth: UInt, throughput: Radiance, eta: Float, active: Mask
     ) -> tuple[Radiance, Mask]:
         """End dim paths by chance: survive with SURVIVAL times the throughput's largest channel, at most .95.
 
         Inside glass radiance is scaled by eta^2, which the way out takes back: it does not make a path important.
         """
         survive = dr.clip(SURVIVAL * dr.max(dr.detach(throughput)) * dr.square(eta), 1e-6, 0.95)
-        u, _ = sampler.independent_pair(key, index, dimension + ROULETTE)
+        u, _ = sampler.independent_pair(key, path.index, dimension + ROULETTE)
         plays = depth + 1 >= ROULETTE_DEPTH
         active = active & (~plays | (u < survive))
         return dr.select(plays, throughput / survive, throughput), active
