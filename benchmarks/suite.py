@@ -145,7 +145,7 @@ def of_paths(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
 
 def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
     before = caustics.FOOTPRINT
-    caustics.FOOTPRINT = 0.5 * before
+    caustics.FOOTPRINT = 0.75 * before
     try:
         one = ours(scene, 8 * EACH, "caustics")()
         if (seen := reached(scene)).any() and (whole := blocks(seen[None, ..., None]) == 1)[0].any():
@@ -268,7 +268,7 @@ def promises(names: list[str], error: float) -> None:
         judged += 1
         samples = [run.done for run in runs]
         before = caustics.FOOTPRINT
-        caustics.FOOTPRINT = 0.5 * before
+        caustics.FOOTPRINT = 0.75 * before
         truth = picture(1000, MORE * max(samples))
         caustics.FOOTPRINT = before
         true = [relmse(run.image(), truth) / error for run in runs]

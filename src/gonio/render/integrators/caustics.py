@@ -23,7 +23,7 @@ from .transport import ROULETTE, PathState
 SHARED = 4  # samples of a pixel that look at the same map
 PER_PIXEL = 2.0  # particles of a map for each pixel,
 FEWEST, MOST = 1 << 14, 1 << 19  # but so many at least, and at most
-FOOTPRINT = 1.5  # first radius of a search, in pixels as they are seen on the scene on the median
+FOOTPRINT = 1.0  # first radius of a search, in pixels as they are seen on the scene on the median
 SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
 CROWD = 4.0  # radii wide: the cubes in which particles are counted
 COLOURS = 4  # wavelengths of a sample in spectral variants
