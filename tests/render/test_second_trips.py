@@ -110,3 +110,9 @@ def test_a_lamp_that_mirrors_alone_show_is_seen_once() -> None:
     other = {"type": "sphere", "center": [-1, -0.7, 0.5], "radius": 0.2, "bsdf": GLASS}
     drawn = scene(SILVER, 0.5, other=other)
     agree(pictures(drawn, "caustics", 64, 6), pictures(drawn, "path", 256, 6))
+
+
+def test_long_chains_keep_their_weights_finite() -> None:
+    drawn = scene({"type": "dielectric", "int_ior": 1.01}, 0.5)
+    found = pictures(drawn, "caustics", 4096, 1, depth=100)  # asserts that no value is left out
+    assert found.mean() > 0.01

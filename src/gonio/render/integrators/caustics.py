@@ -31,6 +31,7 @@ HUES = 0x48554553  # key of the sequence that maps take them from
 PROBED = 48  # rays each way, to measure a pixel
 ASKED_COSINES = (-1.0, -0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 1.0)  # where materials are asked how they choose lobes,
 ASKED_STEPS = 65  # by so many numbers each
+MOST_ODDS = 1e12  # of a second trip, so that their square is finite
 END = 2.0**-20  # of the numbers that choose a lobe: what chooses the one at each end; no lobe is rarer
 
 
@@ -294,8 +295,8 @@ class Caustics(Path):
         share = dr.select(behind, chains.counts * self._by_path(chains.lobe, density, self._map[1]), 1)
         if not self._forks:
             return emitted * share, active
-        second, odds2 = chains.trip == 2, dr.square(chains.odds)
-        by_second = dr.select(chains.odds == 1, 0, odds2 / (1 + odds2))  # 1: there was no choice on the way
+        second = chains.trip == 2
+        by_second = dr.select(chains.odds == 1, 0, dr.rcp(1 + dr.rcp(dr.square(chains.odds))))  # 1: there was no choice
         share = dr.select(lit & (chains.lobe == 0), dr.select(second, by_second, 1 - by_second), share)
         return emitted * share, active & ~(second & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth))
 
@@ -326,6 +327,7 @@ class Caustics(Path):
         sole = delta & (bs.pdf > 1 - END)
         fork = here & two & ~sole
         odds = chains.odds * dr.select(here & ~sole, dr.select(fork & (bs.pdf > END), 0.5 / bs.pdf, 0), 1)
+        odds = dr.minimum(odds, MOST_ODDS)
         after.odds = odds
         second = chains.trip == 2
         after.trip = dr.select(fork & (chains.trip == 0) & (chains.odds > 0), mi.UInt32(1), chains.trip)
