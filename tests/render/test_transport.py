@@ -11,6 +11,8 @@ import pytest
 from gonio.errors import InputError
 from gonio.render import engine, lights
 from gonio.render.integrators import Render, Settings
+from gonio.render.integrators.caustics import Caustics
+from gonio.render.photons import Photon, PhotonMap
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -274,3 +276,129 @@ def test_path_says_where_it_starves_and_what_does_not() -> None:
         (small, GLASS, Settings("direct")),
     ):
         assert Render(scene(lamp, ball, size=8), settings).advice == ""
+
+
+# ---------------------------------------------------------------------- second trips
+
+COATED = {"type": "plastic", "diffuse_reflectance": rgb(0.6)}
+SILVER = {"type": "conductor", "material": "Ag"}
+
+
+def before_a_wall(glass: dict, radius: float, size: int = 20, wall: dict | None = SILVER, **rest: Any) -> Any:
+    """A ball before a wall, a ball lamp beside it."""
+    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
+    eye = T().look_at([0, 0.3, 4], [0, 0, 0], [0, 1, 0])
+    lamp = {"type": "sphere", "center": [1.2, 1, 1.2], "radius": radius, "emitter": AREA}
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "sensor": {"type": "perspective", "fov": 30, "to_world": eye, "film": film},
+            "ball": {"type": "sphere", "radius": 0.7, "bsdf": glass},
+            "lamp": lamp,
+            **({"wall": {"type": "rectangle", "to_world": T().translate([0.2, 0, -1]), "bsdf": wall}} if wall else {}),
+            **rest,
+        }
+    )
+
+
+def agree(a: np.ndarray, b: np.ndarray) -> None:
+    """Two stacks of pictures have the same mean, known to 3 %, and so have their blocks."""
+    assert sigmas(a, b, 5) < 5
+    found = [x.mean((1, 2)) for x in (a, b)]
+    error = np.sqrt(sum(x.var(0, ddof=1) / len(x) for x in found))
+    assert np.all(error < 0.03 * found[1].mean(0))
+    assert np.all(abs(found[0].mean(0) - found[1].mean(0)) < 5 * error)
+
+
+BUMPED = {"type": "bumpmap", "arbitrary": {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(np.eye(4, dtype="f"))}}
+
+
+COPPER = {"type": "conductor", "material": "Cu"}
+MATERIALS = {
+    "glass": GLASS,
+    "two glasses": {"type": "blendbsdf", "weight": 0.3, "a": GLASS, "b": {"type": "dielectric", "int_ior": 1.8}},
+    "copper with holes": {"type": "mask", "opacity": 0.4, "bsdf": COPPER},
+    "glass with holes": {"type": "mask", "opacity": 0.6, "bsdf": GLASS},
+    "a pane": {"type": "thindielectric", "int_ior": 1.8},
+    "bent glass": {**BUMPED, "bsdf": GLASS},
+    "coated": COATED,
+}
+
+
+@pytest.mark.parametrize(
+    "name", [n if k < 3 else pytest.param(n, marks=pytest.mark.slow) for k, n in enumerate(MATERIALS)]
+)
+def test_second_trips_take_nothing_and_add_nothing(name: str) -> None:
+    drawn = before_a_wall(MATERIALS[name], 0.5)
+    agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
+
+
+def test_second_trips_find_what_first_ones_hardly_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = before_a_wall(GLASS, 0.3, wall=None)
+    with_them = pictures(drawn, "caustics", 64, 12, 8)
+    monkeypatch.setattr(Caustics, "_both_ends", lambda self: False)
+    without = pictures(drawn, "caustics", 64, 12, 8)
+    assert with_them.var(0, ddof=1).mean() < 0.5 * without.var(0, ddof=1).mean()
+
+
+def test_second_trips_end_where_light_is_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = before_a_wall(GLASS, 0.5, wall=COATED)
+    with_them = pictures(drawn, "caustics", 128, 6, 8)
+    monkeypatch.setattr(Caustics, "_both_ends", lambda self: False)
+    agree(with_them, pictures(drawn, "caustics", 128, 6, 8))
+
+
+def test_features_are_of_first_trips() -> None:
+    drawn = before_a_wall(GLASS, 0.5)
+    path, caustics = (Render(drawn, Settings(name, 8), aovs=True) for name in ("path", "caustics"))
+    for render in (path, caustics):
+        render.advance(16)
+    for name, feature in path.aov().items():
+        assert np.array_equal(feature, caustics.aov()[name])
+
+
+def test_a_lamp_that_mirrors_alone_show_is_seen_once() -> None:
+    other = {"type": "sphere", "center": [-1, -0.7, 0.5], "radius": 0.2, "bsdf": GLASS}
+    drawn = before_a_wall(SILVER, 0.5, other=other)
+    agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 256, 6, 8))
+
+
+def test_long_chains_keep_their_weights_finite() -> None:
+    drawn = before_a_wall({"type": "dielectric", "int_ior": 1.01}, 0.5, size=8)
+    found = pictures(drawn, "caustics", 2048, 1, depth=100)  # asserts that no value is left out
+    assert found.mean() > 0.01
+
+
+# ---------------------------------------------------------------------- the map
+
+
+def test_a_map_gives_the_particles_within_its_radius() -> None:
+    """Against a sum over all of them; so many that their keys take more than 16 bits."""
+    rng = np.random.default_rng(7)
+    count, radius = 60000, 0.0025  # few enough of a row that none is left out
+    at = rng.random((3, count)).astype(np.float32) * [[2], [2], [0]]
+    kept = rng.random(count) < 0.8
+    flux = rng.random(count).astype(np.float32)
+    photon = Photon.none(mi)
+    photon.position, photon.flux = mi.Point3f(*map(mi.Float, at)), mi.Spectrum(mi.Float(flux))
+    photon.normal, photon.direction = (dr.zeros(mi.Vector3f, count) + mi.Vector3f(0, 0, 1) for _ in range(2))
+    photon.density, photon.depth = dr.zeros(mi.Float, count), dr.zeros(mi.UInt32, count)
+    photon.again = dr.zeros(mi.Bool, count)
+    halves = np.split(np.arange(count), 2)  # two kinds, as first and second particles are
+
+    def part(numbers: np.ndarray) -> Photon:
+        return dr.gather(Photon, photon, mi.UInt32(numbers.astype(np.uint32)))
+
+    found = PhotonMap(mi, [part(half) for half in halves], [mi.Bool(kept[half]) for half in halves], radius)
+    assert found.count == kept.sum() > 2**15
+    assert np.array_equal(
+        np.sort(np.array(found.values).reshape(-1, 16)[:, 0]), np.sort(at[0, kept].astype(np.float32))
+    )
+    places = 2 * rng.random((2, 300)).astype(np.float32)
+    place = mi.Point3f(mi.Float(places[0]), mi.Float(places[1]), 0)
+    zero = dr.zeros(mi.Spectrum, 300)
+    up, every = dr.zeros(mi.Vector3f, 300) + mi.Vector3f(0, 0, 1), dr.full(mi.Bool, True, 300)
+    summed = found.gather(place, up, dr.zeros(mi.Float, 300), zero, lambda p, w, here: p.flux * w, every)
+    distance2 = ((places[:, :, None] - at[:2, None, kept]) ** 2).sum(0)
+    weight = np.maximum(1 - distance2 / radius**2, 0) * 2 / (np.pi * radius**2)
+    assert np.array(summed)[0] == pytest.approx(weight @ flux[kept], rel=1e-3, abs=1)

@@ -153,9 +153,7 @@ class Caustics(Path):
         turn = lane * COLOURS // dr.opaque(mi.UInt32, self.count)
         hue = self._hue(dr.opaque(mi.UInt32, number), turn) if mi.is_spectral else None
         particle, flight = particles.leave(key, low, mi.Bool(True), hue)
-        none = Photon(
-            mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Spectrum(0), mi.Float(0), mi.UInt32(0), mi.Bool(False)
-        )
+        none = Photon.none(mi)
 
         def vertex(way: _Way) -> _Way:
             flight = way.flight
