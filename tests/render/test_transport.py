@@ -343,9 +343,9 @@ def test_second_trips_find_what_first_ones_hardly_do(monkeypatch: pytest.MonkeyP
 
 def test_second_trips_end_where_light_is_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = before_a_wall(GLASS, 0.5, wall=COATED)
-    with_them = pictures(drawn, "caustics", 128, 6, 8)
+    with_them = pictures(drawn, "caustics", 256, 6, 8)
     monkeypatch.setattr(Caustics, "_both_ends", lambda self: False)
-    agree(with_them, pictures(drawn, "caustics", 128, 6, 8))
+    agree(with_them, pictures(drawn, "caustics", 256, 6, 8))
 
 
 def test_features_are_of_first_trips() -> None:
