@@ -237,6 +237,7 @@ def spread(field: list[Contender]) -> float:
 
 SMALLER = 4  # than the scene says, a side: pictures of `promises`
 RUNS, MORE, LONGEST = 4, 24, 60
+SHARPER = 0.5  # of the radius that a picture came to, where it is blurred
 
 
 def promises(names: list[str], error: float) -> None:
@@ -249,11 +250,11 @@ def promises(names: list[str], error: float) -> None:
         scene = replace(scene, size=(max(scene.size[0] // SMALLER, 48), max(scene.size[1] // SMALLER, 48)))
         loaded = scene.load(mi)
 
-        def settings(seed: int, scene: Scene = scene) -> Settings:
-            return Settings("caustics" if scene.caustic else "path", scene.depth, seed=seed)
+        def settings(seed: int, radius: float = 1.0, scene: Scene = scene) -> Settings:
+            return Settings("caustics" if scene.caustic else "path", scene.depth, seed=seed, radius=radius)
 
-        def picture(seed: int, spp: int, loaded: Any = loaded, settings: Callable[[int], Settings] = settings) -> Any:
-            render = Render(loaded, settings(seed))
+        def picture(seed: int, spp: int, radius: float = 1.0, loaded: Any = loaded, settings: Any = settings) -> Any:
+            render = Render(loaded, settings(seed, radius))
             render.advance(spp)
             return render.image()
 
@@ -267,10 +268,7 @@ def promises(names: list[str], error: float) -> None:
             continue
         judged += 1
         samples = [run.done for run in runs]
-        before = caustics.FOOTPRINT
-        caustics.FOOTPRINT = 0.75 * before
-        truth = picture(1000, MORE * max(samples))
-        caustics.FOOTPRINT = before
+        truth = picture(1000, MORE * max(samples), SHARPER * min(run.radius for run in runs))
         true = [relmse(run.image(), truth) / error for run in runs]
         over = [x * error / run.estimate() for x, run in zip(true, runs, strict=True)]
         same = [relmse(picture(100 + i, n), truth) / error for i, n in enumerate(samples)]

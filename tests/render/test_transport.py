@@ -398,7 +398,11 @@ def test_a_map_gives_the_particles_within_its_radius() -> None:
     place = mi.Point3f(mi.Float(places[0]), mi.Float(places[1]), 0)
     zero = dr.zeros(mi.Spectrum, 300)
     up, every = dr.zeros(mi.Vector3f, 300) + mi.Vector3f(0, 0, 1), dr.full(mi.Bool, True, 300)
-    summed = found.gather(place, up, dr.zeros(mi.Float, 300), zero, lambda p, w, here: p.flux * w, every)
+    summed, above = found.gather(place, up, dr.zeros(mi.Float, 300), zero, lambda p, w, here: p.flux * w, every, 0.5)
     distance2 = ((places[:, :, None] - at[:2, None, kept]) ** 2).sum(0)
-    weight = np.maximum(1 - distance2 / radius**2, 0) * 2 / (np.pi * radius**2)
-    assert np.array(summed)[0] == pytest.approx(weight @ flux[kept], rel=1e-3, abs=1)
+
+    def by(reach: float) -> np.ndarray:
+        return np.maximum(1 - distance2 / reach**2, 0) * 2 / (np.pi * reach**2) @ flux[kept]
+
+    assert np.array(summed)[0] == pytest.approx(by(radius), rel=1e-3, abs=1)
+    assert np.array(above)[0] == pytest.approx(by(radius) - by(0.5 * radius), rel=1e-3, abs=50)

@@ -8,8 +8,10 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import GonioWarning, InputError
-from gonio.render import images, run, until
+from gonio.render import engine, images, run, until
+from gonio.render.integrators import Render, Settings
 from gonio.render.integrators.progressive import SHARE, tiles
+from gonio.render.types import Scene
 from gonio.work import crew, kept
 
 OPTIONS = {"size": (48, 32), "seed": 5}
@@ -68,6 +70,96 @@ def test_noise_is_told_from_two_pictures_though_single_samples_are_bright() -> N
     pairs = [(picture(), picture()) for _ in range(8)]
     true = np.mean([relmse(0.5 * (a + b), truth) for a, b in pairs])
     assert true == pytest.approx(float(np.mean([until.squares(a, b) for a, b in pairs])), rel=0.15)
+
+
+def caustic() -> Scene:
+    """A ring of metal on a floor, which throws a bright curve: `caustics` blurs it more than tests below allow."""
+    mi = engine.load()
+    t = mi.ScalarTransform4f
+    eye, up = t().look_at([0, 3, 0.1], [0, 0, 0], [0, 0, 1]), t().look_at([3, 2, 0], [0, 0, 0], [0, 0, 1])
+    film = {"type": "hdrfilm", "width": 40, "height": 40, "rfilter": {"type": "box"}}
+    light = {"type": "area", "radiance": {"type": "rgb", "value": [15, 12, 10]}}
+    metal = {"type": "twosided", "bsdf": {"type": "conductor"}}
+    return mi.load_dict({
+        "type": "scene",
+        "sensor": {"type": "perspective", "fov": 22, "to_world": eye, "film": film},
+        "floor": {"type": "rectangle", "to_world": t().rotate([1, 0, 0], -90).scale(2), "bsdf": {"type": "diffuse"}},
+        "ring": {"type": "cylinder", "p0": [0, 0, 0], "p1": [0, 0.4, 0], "radius": 0.7, "bsdf": metal},
+        "lamp": {"type": "rectangle", "to_world": up.scale(0.2), "emitter": light},
+    })  # fmt: skip
+
+
+def narrowing(seed: int, error: float = 0.02) -> until.Until:
+    return until.Until(caustic(), Settings("caustics", 4, seed=seed), error, 1 << 12)
+
+
+def test_blur_is_told_from_what_less_of_it_shows() -> None:
+    """Edges between light and dark, with noise; and noise alone, of which none is blur."""
+    rng = np.random.default_rng(4)
+    side, parts = 48, 16  # pixels, and each of them in so many parts
+    fine = rng.choice([0.2, 1.0], (12, 12)).repeat(4 * parts, 0).repeat(4 * parts, 1)
+    fine = np.roll(fine, (parts // 3, parts // 2), (0, 1))
+
+    def picture(radius: float) -> np.ndarray:
+        x = np.fft.fftfreq(side * parts, 1 / side)
+        kernel = np.maximum(1 - (x[:, None] ** 2 + x**2) / radius**2, 0)
+        blurred = np.fft.ifft2(np.fft.fft2(kernel / kernel.sum()) * np.fft.fft2(fine)).real
+        return blurred.reshape(side, parts, side, parts).mean((1, 3))[..., None] * np.ones(3)
+
+    truth = picture(1e-3)
+    for radius in (0.9, 1.5, 2.5):
+        wide, narrow = picture(radius), picture(0.25 * radius)
+        true = relmse(wide, truth)
+        for noise in (0.0, 0.1):
+            noises = noise * rng.standard_normal((4, *wide.shape))
+            a, b = wide + 0.1 * noise * rng.standard_normal((2, *wide.shape))  # of fewer bright particles each
+            found = until.blur_error(a, b, list(wide - narrow + noises))
+            assert true / 1.4 - 4 * found.deviation < found.value < true * 1.4 + 4 * found.deviation
+        nothing = until.blur_error(a, b, list(noises))
+        assert abs(nothing.value) < 4 * nothing.deviation < 0.02
+
+
+def test_caustics_are_blurred_no_more_than_was_promised() -> None:
+    scene, error, pictures = caustic(), 0.02, []
+    for seed in (98, 99):
+        pictures.append(Render(scene, Settings("path", 4, seed=seed)))
+        pictures[-1].advance(1 << 12)
+    truth = 0.5 * (pictures[0].image() + pictures[1].image())
+    own = relmse(pictures[0].image(), pictures[1].image()) / 4  # the error of `truth` itself
+    true = []
+    for seed in range(2):
+        render = narrowing(seed, error)
+        true.append(relmse(finish(render, 64), truth) - own)
+        assert render.estimate() <= error and render.radius < 0.6
+    assert 0.5 * error < np.mean(true) < 1.3 * error
+    blurred = Render(scene, Settings("caustics", 4, seed=5))
+    blurred.advance(1 << 9)
+    assert relmse(blurred.image(), truth) - own > 1.6 * error
+
+
+def test_what_was_too_blurred_is_shown_until_there_is_better() -> None:
+    render, errors = narrowing(1), []
+    first = render.image()
+    while (goal := render.goal) > render.done:
+        render.advance(min(8, goal - render.done))
+        errors.append(render.estimate())
+        if "narrowed" in render.state() and render.done < 48:
+            assert relmse(render.image(), first) == 0.0
+        elif "narrowed" not in render.state():
+            first = render.image()
+    assert min(errors) == errors[-1] and relmse(render.image(), first) > 0.0
+
+
+@pytest.mark.parametrize("at", [13, 21, 90])
+def test_one_that_began_anew_goes_on_to_the_same_bits(tmp_path: Path, at: int) -> None:
+    whole, stopped, again = (narrowing(2, 0.04) for _ in range(3))
+    while stopped.done < at:
+        stopped.advance(min(3, stopped.goal - stopped.done, at - stopped.done))
+    assert stopped.goal > stopped.done
+    kept.write(tmp_path / "c", {}, stopped.state())
+    again.restore(stopped.done, kept.read(tmp_path / "c").arrays)
+    assert np.array_equal(again.image(), stopped.image()) and again.estimate() == stopped.estimate()
+    assert np.array_equal(finish(again), finish(whole, 64)) and again.done == whole.done
 
 
 def test_passes_of_any_size_add_up_to_the_same_bits(scene: Path, tmp_path: Path, shared_out: None) -> None:

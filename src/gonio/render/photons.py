@@ -116,8 +116,10 @@ class PhotonMap:
         zero: Radiance,
         visit: Callable[[Photon, Float, Mask], Radiance],
         active: Mask,
-    ) -> Radiance:
-        """Sum over the particles around a place: `visit(particle, weight by distance in 1/m^2, mask)`.
+        within: float = 0.0,
+    ) -> tuple[Radiance, Radiance]:
+        """Sum over the particles around a place: `visit(particle, weight by distance in 1/m^2, mask)`; and by how much
+        it is above the sum over those `within` that part of the radius, where this is not 0.
 
         The weight is a paraboloid over the disc of the radius, with the integral 1. Where they lie close, every second,
         third, ... one of a row is visited, from one on that the random number `u` chooses, and stands for the others.
@@ -138,7 +140,7 @@ class PhotonMap:
             stride = 1 + (last - first) // VISITED
             return y, z, first + dr.minimum(mi.UInt32(u * mi.Float(stride)), stride - 1), last, stride
 
-        def step(number: UInt, y: UInt, z: UInt, at: UInt, end: UInt, stride: UInt, total: Radiance):  # type: ignore[no-untyped-def]
+        def step(number: UInt, y: UInt, z: UInt, at: UInt, end: UInt, stride: UInt, total: Radiance, above: Radiance):  # type: ignore[no-untyped-def]
             here = at < end
             record = dr.gather(mi.Matrix4f, self.values, at, here)
             near = [record[i // 4, i % 4] for i in range(8)]
@@ -153,19 +155,24 @@ class PhotonMap:
             flux = type(zero)(*rest[4 : 4 + len(zero)])
             photon = Photon(position, other, mi.Vector3f(*rest[:3]), flux, near[7], mi.UInt32(near[6]), rest[3] > 0)
             weight = (1 - distance2 / radius2) * (2 / (dr.pi * radius2)) * mi.Float(stride)
-            total = total + dr.select(here, visit(photon, weight, here), 0)
+            light = dr.select(here, visit(photon, weight, here), 0)
+            total = total + light
+            if within:
+                inner2 = radius2 * (within * within)
+                inner = (1 - distance2 / inner2) * (2 / (dr.pi * inner2)) * mi.Float(stride)
+                above = above + light * (1 - dr.select(distance2 < inner2, inner / weight, 0))
             at = at + stride
             over = at >= end
             following = row(number + 1, over)
             y, z, at, end, stride = (
                 dr.select(over, new, old) for new, old in zip(following, (y, z, at, end, stride), strict=True)
             )
-            return number + dr.select(over, mi.UInt32(1), 0), y, z, at, end, stride, total
+            return number + dr.select(over, mi.UInt32(1), 0), y, z, at, end, stride, total, above
 
         begin = mi.UInt32(dr.select(active, mi.UInt32(0), 4))
-        state = (begin, *row(begin, active), zero)
+        state = (begin, *row(begin, active), zero, type(zero)(zero))
         found = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
-        return found[-1]
+        return found[-2], found[-1]
 
 
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:

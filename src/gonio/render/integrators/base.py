@@ -8,6 +8,8 @@ from types import ModuleType
 from typing import ClassVar
 
 import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError, did_you_mean
 from ...members import Family, subclasses_of
@@ -15,6 +17,8 @@ from .. import sampler
 from ..surfaces import Surfaces
 from ..types import Colour, Float, Hit, Mask, Point, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
 from .sums import Sums
+
+Picture = NDArray[np.float32]
 
 # Dimensions: each decision of a sample has a number of its own, see `sampler`. From FIRST_FREE on they are the
 # integrator's.
@@ -41,6 +45,8 @@ class Settings:
     seed        any integer of 32 bits; the same seed gives the same picture to the bit
     ambient     scene-wide ambient radiance (r, g, b): at every shaded vertex adds `ambient` times the BSDF's own
                 attribute "ambient", where it has one (Phong's ka)
+    radius      of an integrator that blurs: how wide it begins, over what it would choose
+    measures    whether such an integrator also measures its blur
     """
 
     integrator: str = "path"
@@ -48,6 +54,8 @@ class Settings:
     sampler: str = "default"
     seed: int = 0
     ambient: tuple[float, ...] | None = None
+    radius: float = 1.0
+    measures: bool = False
 
     def __post_init__(self) -> None:
         check_sampler(self.sampler)
@@ -98,6 +106,8 @@ class Integrator:
     splats: ClassVar[bool] = False
     blurs: ClassVar[bool] = False
     unit: float = 1.0  # what one of its splats counts
+    shrinking: ClassVar[float] = 0.0  # power of the number of samples by which the radius of a blur goes to 0
+    measured: int = 0  # numbers that it finds of each sample beside its colour, see `differences`
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         self.mi, self.scene, self.sensor, self.settings, self.aovs = mi, scene, sensor, settings, aovs
@@ -126,6 +136,10 @@ class Integrator:
         return [dr.select(si.is_valid(), v, 0) for v in (*self.show(si, key, index), *features)]
 
     # ------------------------------------------------------------------ what it has
+
+    def differences(self, measured: Picture, samples: int) -> list[Picture]:
+        """`Render.differences`, from the mean of what so many samples have measured: (height, width, `measured`)."""
+        return []
 
     def stages(self, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Samples [first, last) cut into what one kernel takes: what it needs is there when it is asked for."""

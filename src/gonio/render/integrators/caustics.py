@@ -15,7 +15,7 @@ from ..photons import Crowding, Photon, PhotonMap
 from ..sources import Targets
 from ..types import BSDFSample, Float, Mask, MitsubaBSDF, Radiance, Scene, Sensor, SurfaceInteraction, UInt
 from . import transport
-from .base import Settings
+from .base import Picture, Settings
 from .particles import FIRST_VERTEX, VERTEX_DIMENSIONS, Flight, Particles
 from .path import Path
 from .transport import ROULETTE, PathState
@@ -24,6 +24,7 @@ SHARED = 4  # samples of a pixel that look at the same map
 PER_PIXEL = 2.0  # particles of a map for each pixel,
 FEWEST, MOST = 1 << 14, 1 << 19  # but so many at least, and at most
 FOOTPRINT = 1.0  # first radius of a search, in pixels as they are seen on the scene on the median
+SHARPER = 0.25  # part of the radius, against which blur is measured
 SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
 CROWD = 4.0  # radii wide: the cubes in which particles are counted
 COLOURS = 4  # wavelengths of a sample in spectral variants
@@ -57,6 +58,7 @@ class _Chains:
     trip    0 of a sample's first trip; 1 where a second is to follow, 2 on that
     odds    how likely a second trip takes the chain from the camera on, over how likely a first one does
     number  [0, 1), by which a second trip chooses
+    blur    how much more light particles have brought so far than those close by have; None where nobody asks
     """
 
     lobe: Float
@@ -64,6 +66,7 @@ class _Chains:
     trip: UInt
     odds: Float
     number: Float
+    blur: Radiance | None
 
 
 class Caustics(Path):
@@ -88,6 +91,7 @@ class Caustics(Path):
     name = "caustics"
     merges: ClassVar[bool] = True
     blurs: ClassVar[bool] = True
+    shrinking: ClassVar[float] = SHRINKING
 
     def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
         super().__init__(mi, scene, sensor, settings, aovs)
@@ -100,7 +104,8 @@ class Caustics(Path):
         self.particles = Particles(self, Targets(mi, self.smooth))
         size = sensor.film().crop_size()
         self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), FEWEST, MOST))
-        self.radius = FOOTPRINT * self._pixel()
+        self.radius = FOOTPRINT * settings.radius * self._pixel()
+        self.measured = 6 if settings.measures else 0
         self._total = dr.opaque(mi.Float, self.count)
         self._forks = self._both_ends()
         self._crowding = Crowding.nowhere(mi)
@@ -235,21 +240,40 @@ class Caustics(Path):
 
     # ------------------------------------------------------------------ paths
 
+    def differences(self, measured: Picture, samples: int) -> list[Picture]:
+        """From a picture with SHARPER of the radius, by the even maps and by the odd ones."""
+        if not self.measured:
+            return []
+        rounds, rest = divmod(samples, 2 * SHARED)
+        even = rounds * SHARED + min(rest, SHARED)
+        weights = samples / max(even, 1), samples / max(samples - even, 1)
+        return [measured[..., :3] * np.float32(weights[0]), measured[..., 3:] * np.float32(weights[1])]
+
     def hue(self, index: UInt, own: Float) -> Float:
         return self._hue(index // SHARED, index) if self.merging and self.mi.is_spectral else own
 
     def carried(self) -> _Chains | None:
         mi = self.mi
-        return _Chains(mi.Float(0), mi.Float(1), mi.UInt32(0), mi.Float(1), mi.Float(0)) if self.merging else None
+        if not self.merging:
+            return None
+        blur = mi.Spectrum(0) if self.measured else None
+        return _Chains(mi.Float(0), mi.Float(1), mi.UInt32(0), mi.Float(1), mi.Float(0), blur)
+
+    def found(self, path: PathState) -> list[Float]:
+        if not self.measured:
+            return super().found(path)
+        odd = (path.index // SHARED & 1) != 0
+        blur = [*self.rgb(path.more.blur, path.ray.wavelengths)]
+        return [*super().found(path), *(dr.select(odd, 0, v) for v in blur), *(dr.select(odd, v, 0) for v in blur)]
 
     def brought(
         self, si: SurfaceInteraction, bsdf: MitsubaBSDF, path: PathState, u: Float, active: Mask
-    ) -> tuple[Radiance, Float]:
-        """The light that particles have brought to a place, toward the path that has come there; and what counts of the
-        light behind mirrors that a path finds from there on."""
+    ) -> tuple[Radiance, _Chains]:
+        """The light that particles have brought to a place, toward the path that has come there; and what the path
+        carries along, with what counts of the light behind mirrors that it finds from there on."""
         mi = self.mi
         if self._map is None:
-            return mi.Spectrum(0), mi.Float(1)
+            return mi.Spectrum(0), path.more
         photons, depth, chains = self._map[1], path.depth, path.more
         active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         normal = mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, si.to_world(si.wi)))
@@ -267,7 +291,10 @@ class Caustics(Path):
             flux = self._turned(photon.flux, path.index)
             return dr.select(here, value * flux * (weight * share / cosine), 0)
 
-        return photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active), counts
+        within = SHARPER if self.measured else 0.0
+        light, above = photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active, within)
+        blur = chains.blur + path.throughput * above if self.measured else None
+        return light, replace(chains, counts=counts, blur=blur)
 
     def _by_path(self, lobe: Float, density: Float, photons: PhotonMap) -> Float:
         """Weight of a path that finds the lamp behind mirrors by itself, beside the particles (power heuristic).
@@ -305,7 +332,7 @@ class Caustics(Path):
         si: SurfaceInteraction,
         bsdf: MitsubaBSDF,
         bs: BSDFSample,
-        kept: Float,
+        kept: _Chains,
     ) -> PathState:
         if self._map is None:
             return following
@@ -315,7 +342,8 @@ class Caustics(Path):
         after = replace(
             chains,
             lobe=dr.select(delta, chains.lobe * dr.square(bs.eta), begun),
-            counts=dr.select(delta, chains.counts, kept),
+            counts=dr.select(delta, chains.counts, kept.counts),
+            blur=kept.blur,
         )
         if not self._forks:
             return replace(following, more=after)
@@ -345,6 +373,8 @@ class Caustics(Path):
         fresh.radiance = dr.select(again, path.radiance, fresh.radiance)
         fresh.more.trip = dr.select(again, self.mi.UInt32(2), fresh.more.trip)
         fresh.more.number = number
+        if self.measured:
+            fresh.more.blur = dr.select(again, path.more.blur, fresh.more.blur)
         return dr.select(begins, fresh, path), begins & ~again
 
     def complete(self, path: PathState) -> Mask:

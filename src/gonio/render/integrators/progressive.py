@@ -72,12 +72,17 @@ class Render:
         self._order = tiles(self.width, self.height)
         self._pixel = engine.own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
-        self._sums = Sums.zeros(mi, NOTHING, 6 if aovs else self.features, self._splatted)
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
         with dr.suspend_grad(), garbage.kept():
             self._integrator = self._program()
+        self._sums = self._nothing(NOTHING)
+
+    def _nothing(self, lanes: int) -> Sums:
+        """Sums of no samples."""
+        features = 6 if self.aovs else self.features
+        return Sums.zeros(self.mi, lanes, 3 + self._integrator.measured, features, self._splatted)
 
     def _program(self) -> Integrator:
         return self.settings.program(self.mi, self.scene, self.sensor, self.settings, self.aovs)
@@ -135,7 +140,7 @@ class Render:
     def state(self) -> dict[str, NDArray[Any]]:
         """The sums so far, as arrays of one entry a lane that stay as they are while more is rendered."""
         if not self._begun:
-            return Sums.zeros(self.mi, len(self._pixel), len(self._sums.features), self._splatted).arrays()
+            return self._nothing(len(self._pixel)).arrays()
         ahead = {} if self._lanes is None else {LANES: np.asarray(self._lanes)}
         return {**self._sums.arrays(), **ahead}
 
@@ -149,17 +154,22 @@ class Render:
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
         self._pixel = engine.own(self.mi.UInt32, self._order[lanes])
-        self._sums = Sums.zeros(self.mi, NOTHING, len(self._sums.features), self._splatted)
+        self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None
 
     def image(self) -> NDArray[np.float32]:
         """The mean of the samples so far: (height, width, 3) float32, linear RGB, row 0 on top."""
-        picture = self._mean(self._sums.radiance)
+        picture = self._mean(self._sums.radiance[:3])
         if self._splatted and self._begun:
             scale = self._integrator.unit / max(self.done, 1)
             splats = [np.array(channel) * scale for channel in self._sums.splats]
             picture += np.stack(splats, -1).reshape(picture.shape).astype(np.float32)
         return picture
+
+    def differences(self) -> list[NDArray[np.float32]]:
+        """How far the picture is from one that is blurred less, told several times by samples of their own; [] where
+        nothing is blurred. Without bias, but noisy; (height, width, 3) each."""
+        return self._integrator.differences(self._mean(self._sums.radiance[3:]), self.done)
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
         """Features of the first hit for a denoiser, averaged over the same samples: {"albedo", "normal"}, (h, w, 3).

@@ -17,7 +17,8 @@ from ..types import Float, Mask, UInt, Whole
 
 @dataclass
 class Sums:
-    """Sums in 64 bits, one entry a lane: radiance, and features of what samples see first.
+    """Sums in 64 bits, one entry a lane: radiance (r, g, b, and what else is of a whole sample), and features of what
+    samples see first.
 
     splats  red, green and blue that particles have brought, one entry a pixel, whole numbers; none where there are none
 
@@ -30,9 +31,9 @@ class Sums:
     splats: list[Whole] = field(default_factory=list)
 
     @staticmethod
-    def zeros(mi: ModuleType, lanes: int, features: int, pixels: int = 0) -> Sums:
-        """`pixels`: of a picture that is splatted, else 0."""
-        found, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (3, features))
+    def zeros(mi: ModuleType, lanes: int, radiance: int, features: int, pixels: int = 0) -> Sums:
+        """Of so many numbers each; `pixels`: of a picture that is splatted, else 0."""
+        found, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (radiance, features))
         splats = [dr.zeros(mi.Int64, pixels) for _ in range(3 if pixels else 0)]
         sums = Sums(found, more, dr.zeros(mi.UInt32, lanes), splats)
         dr.make_opaque(sums)  # zeros as data: else the first pass would be a kernel of its own

@@ -9,7 +9,7 @@ How it is fast, beside what `progressive` does:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -76,7 +76,8 @@ class Transport(Integrator):
     merges          whether particles bring light to vertices too
     depth           the longest path in segments, a method
 
-    and where it has more to do on the way `carried`, `renewed`, `complete`, `met`, `choice`, `brought`, `followed`
+    and where it has more to do on the way `carried`, `renewed`, `complete`, `found`, `met`, `choice`, `brought`,
+    `followed`
     """
 
     samples_lights: ClassVar[bool] = True
@@ -136,7 +137,7 @@ class Transport(Integrator):
             path, begins = self.renewed(self.first(pixel, key, index, begins), path, key, begins)
             path, features = self.extend(path, key)
             ended = self.complete(path)
-            sums = sums.add(self.rgb(path.radiance, path.ray.wavelengths), ended, features, begins)
+            sums = sums.add(self.found(path), ended, features, begins)
             return index + dr.select(ended, mi.UInt32(1), mi.UInt32(0)), path, sums
 
         nothing = dr.zeros(mi.Ray3f), dr.zeros(mi.PreliminaryIntersection3f), mi.Spectrum(0)
@@ -214,6 +215,7 @@ class Transport(Integrator):
             inside = dr.select(si.wi.z * bs.wo.z < 0.0, crossing.beyond, crossing.here)
         kept = None
         if self.merges:
+            path = replace(path, throughput=throughput)  # up to here
             surface = active if crossing is None else active & crossing.surface
             _, u = sampler.independent_pair(key, path.index, dimension + ROULETTE)
             brought, kept = self.brought(si, bsdf, path, u, surface)
@@ -271,6 +273,10 @@ class Transport(Integrator):
     def renewed(self, fresh: PathState, path: PathState, key: UInt, begins: Mask) -> tuple[PathState, Mask]:
         """Where a path has ended, the next one in its place; and whether that is of a new sample."""
         return dr.select(begins, fresh, path), begins
+
+    def found(self, path: PathState) -> list[Float]:
+        """What counts of a sample that is complete: [r, g, b], and what else is measured."""
+        return [*self.rgb(path.radiance, path.ray.wavelengths)]
 
     def complete(self, path: PathState) -> Mask:
         """Whether a sample is complete."""
