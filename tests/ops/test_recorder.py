@@ -171,3 +171,12 @@ def test_what_the_caller_holds_is_not_looked_into() -> None:
     round_and_round: list[object] = []
     round_and_round.append(round_and_round)  # as a notebook's history may
     assert record(lambda a: ops.sqrt(a), a="float").evaluate(a=4.0) == 2.0
+
+
+def test_values_in_tuples_and_dicts_are_named_by_their_place() -> None:
+    def program(a):  # type: ignore[no-untyped-def]
+        found = {"bend": a * 2.0, "pair": (a * 3.0, a * 4.0)}
+        return found["bend"] + found["pair"][0] * found["pair"][1]
+
+    names = {node.name for node in record(program, a="float").entry.nodes}
+    assert {"found.bend", "found.pair.0", "found.pair.1"} <= names

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from gonio.viewer import page as page_file
 from gonio.viewer import stage
-from web_page import WIDE, Page
+from web_page import COARSE, WIDE, Page
 
 import browser
 
@@ -27,7 +27,7 @@ def homework_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def homework_page(chrome: Any, homework_file: Path) -> Iterator[Page]:
-    tab = chrome.new_page(viewport=WIDE)
+    tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)
     yield Page(tab, homework_file)
     tab.close()
 

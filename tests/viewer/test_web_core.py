@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 from gonio.viewer import page as page_file
 from gonio.viewer import stage
-from web_page import PHONE, WIDE, Page, rows_of_balls
+from web_page import COARSE, PHONE, WIDE, Page, rows_of_balls
 
 # --------------------------------------------------------------------------- the file
 
 
 def test_one_file_is_all_it_needs(chrome: Any, homework_file: Path) -> None:
     assert homework_file.stat().st_size <= 1_500_000
-    context = chrome.new_context(viewport=WIDE, offline=True)
+    context = chrome.new_context(viewport=WIDE, device_scale_factor=COARSE, offline=True)
     page = Page(context.new_page(), homework_file)
     page.picture(4)
     asked = [url for url in page.requests if not url.startswith(("file:", "blob:", "data:", "about:"))]
@@ -161,7 +161,7 @@ def test_the_link_holds_the_whole_state(page: Page, chrome: Any) -> None:
     assert "#s=" in link
     state = page.state("valueOf()")
     picture = page.picture(4)
-    tab = chrome.new_page(viewport=WIDE)
+    tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)
     tab.goto(link)
     tab.evaluate("() => gonio.ready")
     other = Page.__new__(Page)
@@ -401,7 +401,7 @@ def test_built_in_shapes_are_shaded(page: Page, mesh: str) -> None:
 
 
 def test_usable_on_a_phone(chrome: Any, homework_file: Path) -> None:
-    context = chrome.new_context(viewport=PHONE, has_touch=True, is_mobile=True)
+    context = chrome.new_context(viewport=PHONE, device_scale_factor=COARSE, has_touch=True, is_mobile=True)
     page = Page(context.new_page(), homework_file)
     assert page.tab.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
     box = page.tab.locator("canvas.picture").bounding_box()
@@ -434,7 +434,7 @@ def test_every_panel_opens_without_a_complaint(page: Page) -> None:
 def test_one_model_without_terms_or_choices(chrome: Any, tmp_path: Path) -> None:
     what = stage.of_models([go.Lambert(albedo=(0.8, 0.4, 0.2))])
     path = page_file.export(what, tmp_path / "lambert.html")
-    tab = chrome.new_page(viewport=WIDE)
+    tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)
     page = Page(tab, path)
     assert tab.locator(".terms [data-value=D]").is_disabled()
     brightest = max(np.max(ball.values["albedo"]) for ball in what.rows[0].balls)
@@ -445,7 +445,7 @@ def test_one_model_without_terms_or_choices(chrome: Any, tmp_path: Path) -> None
 
 def test_nothing_lies_over_three_rows(chrome: Any, tmp_path: Path) -> None:
     what = stage.of_models([go.Conductor(), go.Lambert(), go.Mirror()])
-    tab = chrome.new_page(viewport={"width": 1280, "height": 720})
+    tab = chrome.new_page(viewport={"width": 1280, "height": 720}, device_scale_factor=COARSE)
     page = Page(tab, page_file.export(what, tmp_path / "three.html"))
     tab.evaluate("() => gonio.app.store.set('dock.open', 'lobe')")
     tab.locator(".panel-body[data-panel=lobe]").wait_for(state="visible")
@@ -464,7 +464,7 @@ def test_nothing_lies_over_three_rows(chrome: Any, tmp_path: Path) -> None:
 
 def test_what_is_not_shown_is_told_at_once(chrome: Any, tmp_path: Path) -> None:
     what = dataclasses.replace(stage.of_models([go.Lambert()]), notes=["the texture of albedo is not shown"])
-    tab = chrome.new_page(viewport=WIDE)
+    tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)
     Page(tab, page_file.export(what, tmp_path / "noted.html"))
     tab.get_by_text("1 note").click()
     assert "the texture of albedo is not shown" in tab.locator("dialog[open]").text_content()

@@ -18,6 +18,7 @@ import pytest
 from gonio.render import metrics
 from gonio.viewer import page as page_file
 from gonio.viewer import stage
+from web_page import COARSE
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import browser
@@ -54,7 +55,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
     what = stage.of_models(MODELS)
     path = page_file.export(what, tmp_path_factory.mktemp("page") / "page.html")
     with browser.chromium() as chrome:
-        tab = chrome.new_page(viewport={"width": 1280, "height": 720})
+        tab = chrome.new_page(viewport={"width": 1280, "height": 720}, device_scale_factor=COARSE)
         result = Opened(tab, what)
         tab.on("console", lambda m: result.messages.append(m.text) if m.type == "error" else None)
         tab.on("pageerror", lambda error: result.messages.append(str(error)))
@@ -429,8 +430,8 @@ def test_side_by_side_shows_the_same_place_twice(fresh: Opened, size: tuple[int,
     shown = ink(fresh.tab.screenshot(clip=stage_))
     h, w = shown.shape[:2]
     halves = (shown[: h // 2], shown[h - h // 2 :]) if h > w else (shown[:, : w // 2], shown[:, w - w // 2 :])
-    # the words on the pictures differ: on a phone 8 per cent of the pixels, where other places would differ in 30
-    assert np.mean(np.abs(halves[0] - halves[1]).max(axis=2) > 24) < 0.12
+    # the words on the pictures differ: on a phone 15 per cent of the pixels, where other places would differ in 28
+    assert np.mean(np.abs(halves[0] - halves[1]).max(axis=2) > 24) < 0.2
     assert halves[0].std() > 10
 
 

@@ -15,7 +15,7 @@ from gonio.render import images
 from gonio.viewer import page as page_file
 from gonio.viewer import stage
 from scipy.ndimage import label
-from web_page import WIDE, Page
+from web_page import COARSE, WIDE, Page
 
 DROP = """async ([text]) => {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -51,7 +51,7 @@ def sky() -> np.ndarray:
 def lit_page(chrome: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     folder = tmp_path_factory.mktemp("split")
     models = [go.Conductor(fresnel="one"), go.KullaConty(go.Conductor.preset("Au", ndf="beckmann")), go.Lambert()]
-    tab = chrome.new_page(viewport=WIDE)
+    tab = chrome.new_page(viewport=WIDE, device_scale_factor=COARSE)
     page = Page(tab, page_file.export(stage.of_models(models), folder / "page.html"))
     page.set("s.lights = []; s.solo = 0")
     images.write(folder / "sky.hdr", sky())

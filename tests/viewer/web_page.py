@@ -13,6 +13,7 @@ from gonio.viewer import stage
 
 WIDE = {"width": 800, "height": 420}  # of the window: the picture's part of it is about 480 x 350
 PHONE = {"width": 360, "height": 740}
+COARSE = 0.5  # device pixels per CSS pixel: software draws a quarter of the pixels, and the layout stays as it is
 
 PIXELS = """async (samples) => {
   const picture = await gonio.converge(samples);

@@ -18,7 +18,7 @@ import inspect
 import itertools
 import math
 import sys
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import FrameType
 from typing import Protocol, TypeAlias, TypeGuard
@@ -62,9 +62,38 @@ def _name_locals(function: Function) -> None:
         frame = frame.f_back
     for depth, own in enumerate(reversed(found)):
         for name, value in own.f_locals.items():
-            for path, node in _flatten(value, name) if isinstance(value, Node | tuple | list | dict) else ():
-                if node.function is function and node.depth > depth:
-                    node.name, node.depth = path.strip("_"), depth
+            if isinstance(value, Node):
+                if value.function is function and value.depth > depth:
+                    value.name, value.depth = name.strip("_"), depth
+            elif isinstance(value, _CONTAINERS):
+                _name_parts(function, depth, value, (name,))
+
+
+_CONTAINERS = (tuple, list, dict)
+_PLAIN = (float, int, str, bool, type(None), np.ndarray)  # what holds no value, told at a glance
+
+
+def _name_parts(function: Function, depth: int, value: object, path: tuple) -> None:
+    """`_name_locals` for what a variable holds inside of it, in the order and by the paths of `_flatten`.
+
+    It is called for every value that is made, and finds nothing new in most: a path is put together only where one is
+    named.
+    """
+    pairs: Iterable[tuple[object, object]]
+    if isinstance(value, tuple | list):
+        pairs = zip(getattr(value, "_fields", None) or range(len(value)), value, strict=True)
+    elif isinstance(value, dict):
+        pairs = value.items()
+    elif _is_composite(value):
+        pairs = value.__parts__().items()
+    else:
+        return
+    for key, item in pairs:
+        if isinstance(item, Node):
+            if item.function is function and item.depth > depth:
+                item.name, item.depth = ".".join(map(str, (*path, key))).strip("_"), depth
+        elif not isinstance(item, _PLAIN):
+            _name_parts(function, depth, item, (*path, key))
 
 
 def _logical(op: str) -> Callable[[Node, object], Node]:
