@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
+import gonio as go
 import pytest
 from gonio import cli
 
@@ -65,6 +66,17 @@ def _run(command: str, shown: list[str], capsys: pytest.CaptureFixture[str]) -> 
 
 # every law once more, of another width and by pytest, which has tests of its own (tests/verify/test_pytest_plugin.py)
 AGAIN = {"gonio verify ward.py:Ward --quick -p alpha=.05,.3", "python -m pytest -q test_ward.py"}
+
+
+@pytest.fixture(autouse=True)
+def members() -> Iterator[None]:
+    """What the commands bring into this process goes with the test."""
+    families = (go.BSDF.family, go.NDF.family, go.Masking.family)
+    before = [set(family.all()) for family in families]
+    yield
+    for family, known in zip(families, before, strict=True):
+        for name in set(family.all()) - known:
+            family.remove(name)
 
 
 @pytest.mark.parametrize(
