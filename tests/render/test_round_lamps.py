@@ -108,6 +108,15 @@ def test_a_closed_lamp_sends_the_same_whether_its_inner_side_shines(shape: str) 
     assert found[0] == pytest.approx(found[1], rel=2e-3)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_leaves_a_ball_inward_does_not_leave_it_outward(kind: str) -> None:
+    """A particle begins a step off its surface, which leads out of one that is smaller, at the other side."""
+    for radius in (0.05, 1e-4, 1e-5):
+        lamp = ball(kind, (0, 3, 0), radius, bsdf=grey(0.0))
+        found = [picture([3, 2, 0], [0, 0, 0], 60, name, 2, 4096, floor=FLOOR, lamp=lamp) for name in ("light", "path")]
+        assert found[0].mean() == pytest.approx(found[1].mean(), rel=0.02)
+
+
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize("integrator", ["path", "directSampleLight", "directSampleBSDF"])
 def test_what_is_close_to_a_lamp_hides_it(integrator: str, others: int) -> None:

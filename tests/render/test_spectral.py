@@ -194,6 +194,25 @@ def test_a_lamp_looks_alike_in_rgb_and_by_its_spectrum(tmp_path: Path, light: di
     assert brightest == pytest.approx(light.get("scale", 1.0), rel=0.01), "beside the ball"
 
 
+@pytest.mark.parametrize("dark", ["a sky of no light", "a lamp of no power", "a lamp of 0 by its spectrum"])
+def test_what_is_dark_beside_a_lamp_takes_nothing_from_it(tmp_path: Path, dark: str) -> None:
+    mi.Bitmap(np.zeros((4, 8, 3), np.float32)).write(str(tmp_path / "dark.exr"))
+    above = {"type": "parallelogram", "base": [-1, 2, -1], "edge0": [2, 0, 0], "edge1": [0, 0, 2]}
+    light: dict[str, Any] = {"type": "areaLight", "energy": 0.0, "shape": above}
+    if "sky" in dark:
+        light = {"type": "environmentLight", "texture": {"type": "imageTex", "file": "dark.exr"}}
+    if "spectrum" in dark:
+        light["energy"] = {"type": "d65", "scale": 0.0}
+    scene = ball(1.5, WHITE, 0.2)
+    alone = rendered(tmp_path, scene, spp=64, spectral=True)
+    scene["scene"]["lights"].append(light)
+    for integrator in ("path", "caustics"):
+        with_it = rendered(tmp_path, scene, spp=64, spectral=True, integrator=integrator)
+        assert with_it.mean() == pytest.approx(alone.mean(), rel=0.02)
+    scene["scene"]["lights"] = [light]
+    assert not rendered(tmp_path, scene, spp=4, spectral=True).any()
+
+
 def test_lamps_have_the_chromaticities_of_the_standard_illuminants() -> None:
     observer = spectra._observer()
     for light, x, y in (

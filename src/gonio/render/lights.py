@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import drjit as dr
+import numpy as np
 
 from ..errors import InputError
 from .lamps import Lamps, direction_sample, has_known_sides, rectangle_of, toward
@@ -311,13 +312,13 @@ class Lights:
         rounding.
         """
         mi = self.mi
-        off = self._off(si.p, ds.p)
+        off = self.off(si.p, ds.p)
         normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point has none
         target = mi.Point3f(ds.p - normal * dr.mulsign(off, dr.dot(normal, ds.d)))
         weight = dr.select(ds.delta | (ds.dist > off), weight, 0)
         return LightSample(ds, target, weight, mi.Bool(ds.delta), mi.Float(0))
 
-    def _off(self, p: Point, q: Point) -> Float:
+    def off(self, p: Point, q: Point) -> Float:
         """How far off surfaces a ray between two points begins and ends."""
         reach = dr.maximum(dr.max(dr.abs(p)), dr.max(dr.abs(q)))
         return self.mi.math.RayEpsilon * (1 + reach)
@@ -407,7 +408,7 @@ class Lights:
         at_light.wi = at_light.to_local(-ray.d)
         radiance = self.emitters[0].eval(at_light, active)
         shadow = mi.Ray3f(ray)
-        shadow.maxt = distance - self._off(ray.o, ray(distance))
+        shadow.maxt = distance - self.off(ray.o, ray(distance))
         active &= dr.any(radiance != 0)
         active &= ~self.surfaces.blocked(shadow, active)
         pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
@@ -419,7 +420,10 @@ def _is_black(mi: ModuleType, emitter: Emitter) -> bool:
     if not mi.has_flag(emitter.flags(), mi.EmitterFlags.Infinite):
         return False
     pixels = dict(mi.traverse(emitter)).get("data")
-    return pixels is not None and not dr.any(pixels.array != 0)
+    if pixels is None:
+        return False
+    # in spectral variants three numbers tell a texel's colour, black too, and the last one how bright it is
+    return not np.any(np.array(pixels)[..., 3 if mi.is_spectral else 0 :])
 
 
 def _order(emitter: Emitter) -> tuple[str, list[float]]:

@@ -228,7 +228,7 @@ class Sources:
         wavelengths: Sequence[Float],
         active: Mask,
     ) -> Particle:
-        mi = self.mi
+        mi, lights = self.mi, self.lights
         ps: PositionSample = emitter.get_shape().sample_position(0.0, place, active)
         if self.balls is not None:  # of a sphere that is turned, Mitsuba 3.9 has the normal of one that is not
             ball = dr.gather(mi.Vector4f, self.balls, number, active)
@@ -245,6 +245,9 @@ class Sources:
         cosine = dr.abs(si.wi.z)
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
+        if self.balls is not None:  # into one that is smaller than the step off a surface: out at its other side
+            inward = (ball.w != 0.0) & (si.wi.z * ball.w < 0.0)
+            shines &= ~inward | (abs(ball.w) > lights.off(ps.p, ps.p))
         density = ps.pdf * pdf / dr.maximum(cosine, 1e-12)
         flux = dr.select(shines, emitter.eval(si, shines) / density, 0)
         seen = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))

@@ -21,6 +21,8 @@ SECOND_RADIATION = 1.438776877e7  # nm K, hc/k in Planck's law
 
 def emitted(light: Colour | LightSpectrum) -> PluginDict:
     """A light's radiance as Mitsuba takes it: a spectrum where the variant has them and the light too, else rgb."""
+    if engine.load().is_spectral and not np.any(light.scale if isinstance(light, LightSpectrum) else light):
+        return {"type": "uniform", "value": 0.0}  # no spectrum of Mitsuba's may be 0 all over
     if isinstance(light, LightSpectrum) and engine.load().is_spectral:
         text = ", ".join(f"{value:.9g}" for value in curve(light))
         return {"type": "regular", "wavelength_min": GRID[0], "wavelength_max": GRID[-1], "values": text}
