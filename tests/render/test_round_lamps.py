@@ -146,6 +146,25 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
     assert found[0] == pytest.approx(found[1], rel=4e-3)
 
 
+@pytest.mark.parametrize("others", [0, 1])
+@pytest.mark.parametrize("shape, flipped", [("cube", False), ("rectangle", True), ("sphere", True), ("disk", False)])
+def test_a_lamp_with_a_texture_is_found_as_rays_find_it(shape: str, flipped: bool, others: int) -> None:
+    """Whose sides share their uv, or which is turned inside out: Mitsuba's `area` samples those wrongly."""
+    pixels = np.random.default_rng(3).uniform(0, 8, (4, 4, 3)).astype(np.float32)
+    texture = {"type": "bitmap", "bitmap": mi.Bitmap(pixels), "raw": True, "filter_type": "nearest"}
+    up = 90 if shape != "rectangle" else -90
+    place = T().translate([0, 2, 0]).rotate([1, 0, 0], up).scale(1.5 if shape != "sphere" else 5.5)
+    lamp = {"type": shape, "to_world": place, "flip_normals": flipped, "bsdf": grey(0.0)}
+    lamp["emitter"] = {"type": "area", "radiance": texture}
+    more = {f"m{i}": ball("area", (3, 3, 0), 0.5, bsdf=grey(0.0)) for i in range(others)}
+    found = [
+        picture([4.0, 0.5, 0], [0, 0, 0], 40, integrator, 2, spp=2048, floor=FLOOR, lamp=lamp, **more).mean()
+        for integrator in ("directSampleLight", "directSampleBSDF", "path")
+    ]
+    assert found[1] > 0.02
+    assert found[0] == pytest.approx(found[1], rel=0.01) and found[2] == pytest.approx(found[1], rel=0.01)
+
+
 @pytest.mark.parametrize("p", [(0, 0, 5), (1.2, -0.3, 0.4), (300, 20, -10), (0.3, 0.2, 0.1), (0.6, 0.9, 0.8)])
 def test_a_cap_is_sampled_with_the_density_that_it_tells(p: tuple[float, float, float]) -> None:
     """Moments of directions, weighted by 1 / pdf, are those of all directions that meet the ball."""

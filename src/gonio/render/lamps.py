@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 
 from . import engine
-from .solid_angles import STRAIGHT, Ball, Rectangle, RectangularArea, Seen, SphericalCap
+from .solid_angles import STRAIGHT, Ball, Rectangle, RectangularArea, Seen, SphericalCap, is_sphere
 from .surfaces import reader
 from .types import (
     DirectionSample,
@@ -112,6 +112,19 @@ def has_known_sides(emitter: Emitter) -> bool:
 def shines_evenly(mi: ModuleType, emitter: Emitter) -> bool:
     """Whether a light is one with a surface that sends the same from everywhere on it."""
     return has_known_sides(emitter) and not mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
+
+
+def balls(mi: ModuleType, emitters: Sequence[Emitter]) -> Float | None:
+    """Four numbers for each lamp: the centre of a sphere and its radius, which is negative where the normal points
+    inward; 0 of lamps that are none. None where no lamp is one."""
+    rows, read = np.zeros((len(emitters), 4)), reader(mi)
+    for row, emitter in zip(rows, emitters, strict=True):
+        shape = emitter.get_shape() if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface) else None
+        if shape is not None and is_sphere(mi, shape):
+            to_world = np.array(read(shape)).reshape(4, 4)
+            radius = np.linalg.norm(to_world[:3, 0])
+            row[:] = *to_world[:3, 3], -radius if shape.has_flipped_normals() else radius
+    return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
 
 
 def rectangle_of(mi: ModuleType, shape: Shape) -> Rectangle | None:

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from types import ModuleType
 
 import drjit as dr
 import numpy as np
 
 from ..errors import InputError
-from .lamps import Lamps, direction_sample, has_known_sides, rectangle_of, toward
+from .lamps import Lamps, balls, direction_sample, has_known_sides, rectangle_of, toward
 from .nearby import Nearby
 from .sky import Sky
 from .solid_angles import Ball, Rectangle, SphericalCap, SphericalRectangle, is_rectangle, is_sphere
@@ -125,9 +126,14 @@ _registered: set[str] = set()
 def _area_sample(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
     """A Mitsuba direction sample from a point sampled by area: pdf per steradian = pdf per area * r^2 / |cos|."""
     ds = toward(mi, ps, it)
-    cosine = dr.abs(dr.dot(ds.d, ds.n))
-    ds.pdf = dr.select(cosine > 0, ps.pdf * dr.square(ds.dist) / cosine, 0)
+    ds.pdf = _per_steradian(ps.pdf, ds)
     return ds
+
+
+def _per_steradian(pdf: Float, ds: DirectionSample) -> Float:
+    """A density by area as one by solid angle."""
+    cosine = dr.abs(dr.dot(ds.d, ds.n))
+    return dr.select(cosine > 0, pdf * dr.square(ds.dist) / cosine, 0)
 
 
 class Lights:
@@ -176,6 +182,9 @@ class Lights:
         unknown = [i for i, known in enumerate(self.lamps.known) if not known and i != self.around]
         self.asks = bool(unknown)  # whether there are lights that are to be asked, and of those, any that rays meet
         self.asks_met = any(self.emitters[i].get_shape() is not None for i in unknown) or self.lamps.radiance is None
+        by_area = [_by_area(mi, emitter) for emitter in self.emitters]
+        self.by_area = mi.Bool(by_area) if any(by_area) else None
+        dr.make_opaque(self.by_area)
 
     def _sky(self, beside_lobes: bool) -> Sky | None:
         """The environment's density, where it is one that varies."""
@@ -289,7 +298,7 @@ class Lights:
         known = active & lamps.is_known(row)
         asked = not lamps.kinds or self.asks
         if asked:
-            found = self._ended(si, *emitter.sample_direction(si, u, active & ~known))
+            found = self._ended(si, *self._asked(emitter, index, si, u, active & ~known))
         if not lamps.kinds:
             return found
         ds = lamps.sample(row, si, u)
@@ -298,6 +307,33 @@ class Lights:
             sent = lamps.sent(row, index, ds.n, -ds.d, known)
         light = self._ended(si, ds, dr.select(ds.pdf > 0, sent / ds.pdf, 0))
         return dr.select(known, light, found) if asked else light
+
+    def _asked(
+        self, emitter: Emitter, index: UInt, si: SurfaceInteraction, u: Point, active: Mask
+    ) -> tuple[DirectionSample, Radiance]:
+        """What a light itself samples; where that goes wrong, a point on its area."""
+        if self.by_area is None:
+            own: tuple[DirectionSample, Radiance] = emitter.sample_direction(si, u, active)
+            return own
+        here = dr.gather(self.mi.Bool, self.by_area, index, active)
+        ds, weight = emitter.sample_direction(si, u, active & ~here)
+        near = _area_sample(self.mi, self.on_area(emitter, index, u, here), si)
+        near.emitter = ds.emitter = emitter
+        sent = self._sent(emitter, near, si, here)
+        return dr.select(here, near, ds), dr.select(here & (near.pdf > 0), sent / near.pdf, weight & ~here)
+
+    def on_area(self, emitter: Emitter, index: UInt, u: Point, active: Mask) -> PositionSample:
+        """A point of a lamp, even on its area."""
+        mi = self.mi
+        ps: PositionSample = emitter.get_shape().sample_position(0.0, u, active)
+        if self.balls is not None:  # of a sphere that is turned, Mitsuba 3.9 has the normal of one that is not
+            ball = dr.gather(mi.Vector4f, self.balls, index, active)
+            ps.n = dr.select(ball.w != 0.0, mi.Normal3f((ps.p - mi.Point3f(ball.xyz)) / ball.w), ps.n)
+        return ps
+
+    @cached_property
+    def balls(self) -> Float | None:
+        return balls(self.mi, self.emitters)
 
     def _sent(self, emitter: Emitter, ds: DirectionSample, si: SurfaceInteraction, active: Mask) -> Radiance:
         """What a lamp sends to `si` from a place on it."""
@@ -372,7 +408,14 @@ class Lights:
         lamps = self.lamps
         row = lamps.row(index, active)
         known = active & lamps.is_known(row)
-        density = emitter.pdf_direction(it, ds, active & ~known) if self.asks else self.mi.Float(0)
+        density = self.mi.Float(0)
+        if self.asks:
+            asked = active & ~known
+            here = self.mi.Bool(False) if self.by_area is None else dr.gather(self.mi.Bool, self.by_area, index, asked)
+            density = emitter.pdf_direction(it, ds, asked & ~here)
+            if self.by_area is not None:
+                area = emitter.get_shape().pdf_position(ds, here)
+                density = dr.select(here, _per_steradian(area, ds), density)
         if not lamps.kinds:
             return density
         return dr.select(known, lamps.pdf(row, it.p, ds.dist, dr.abs(dr.dot(ds.d, ds.n))), density)
@@ -424,6 +467,15 @@ def _is_black(mi: ModuleType, emitter: Emitter) -> bool:
         return False
     # in spectral variants three numbers tell a texel's colour, black too, and the last one how bright it is
     return not np.any(np.array(pixels)[..., 3 if mi.is_spectral else 0 :])
+
+
+def _by_area(mi: ModuleType, emitter: Emitter) -> bool:
+    """Whether a light's own samples are wrong: Mitsuba's `area` with a texture looks for places by their uv, which
+    triangles of a mesh may share (a cube is 18 % too dark), and on shapes turned inside out for the wrong side."""
+    shape = emitter.get_shape()
+    varies = mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
+    own = emitter.class_name() == "AreaLight" and shape is not None and varies
+    return own and (shape.is_mesh() or shape.has_flipped_normals())
 
 
 def _order(emitter: Emitter) -> tuple[str, list[float]]:

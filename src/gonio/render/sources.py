@@ -18,16 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from . import engine
 from .lights import Lights
 from .solid_angles import is_sphere
-from .surfaces import reader
 from .types import (
     Emitter,
     Float,
     Mask,
     Point,
-    PositionSample,
     Radiance,
     Scene,
     Sensor,
@@ -146,7 +143,6 @@ class Sources:
         self.kind_of, self.two_sided = mi.UInt32(self.kinds), mi.Bool(sides)
         parallel = [mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection) for emitter in lights.emitters]
         self.parallel = mi.Bool(parallel)
-        self.balls = _balls(mi, lights.emitters)
         box = scene.bbox()
         centre, radius = (np.zeros(3), 1.0)
         if box.valid():
@@ -229,10 +225,7 @@ class Sources:
         active: Mask,
     ) -> Particle:
         mi, lights = self.mi, self.lights
-        ps: PositionSample = emitter.get_shape().sample_position(0.0, place, active)
-        if self.balls is not None:  # of a sphere that is turned, Mitsuba 3.9 has the normal of one that is not
-            ball = dr.gather(mi.Vector4f, self.balls, number, active)
-            ps.n = dr.select(ball.w != 0.0, mi.Normal3f((ps.p - mi.Point3f(ball.xyz)) / ball.w), ps.n)
+        ps = lights.on_area(emitter, number, place, active)
         si = mi.SurfaceInteraction3f(ps, wavelengths) if mi.is_spectral else mi.SurfaceInteraction3f(ps, [])
         two_sided = dr.gather(mi.Bool, self.two_sided, number, active)
         if self.targets is not None:
@@ -245,9 +238,10 @@ class Sources:
         cosine = dr.abs(si.wi.z)
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
-        if self.balls is not None:  # into one that is smaller than the step off a surface: out at its other side
-            inward = (ball.w != 0.0) & (si.wi.z * ball.w < 0.0)
-            shines &= ~inward | (abs(ball.w) > lights.off(ps.p, ps.p))
+        if lights.balls is not None:  # into one that is smaller than the step off a surface: out at its other side
+            radius = dr.gather(mi.Vector4f, lights.balls, number, active).w
+            inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
+            shines &= ~inward | (abs(radius) > lights.off(ps.p, ps.p))
         density = ps.pdf * pdf / dr.maximum(cosine, 1e-12)
         flux = dr.select(shines, emitter.eval(si, shines) / density, 0)
         seen = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
@@ -343,19 +337,6 @@ def _kind(mi: ModuleType, emitter: Emitter) -> int:
         return SURFACE
     what = f"a lamp of the kind {emitter.class_name()}, which sends no particles"
     raise InputError(what, "integrator", "use --integrator path, or a lamp with a surface, a point or an environment")
-
-
-def _balls(mi: ModuleType, emitters: Sequence[Emitter]) -> Float | None:
-    """Four numbers for each lamp: the centre of a sphere and its radius, which is negative where the normal points
-    inward; 0 of lamps that are none. None where no lamp is one."""
-    rows, read = np.zeros((len(emitters), 4)), reader(mi)
-    for row, emitter in zip(rows, emitters, strict=True):
-        shape = emitter.get_shape() if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface) else None
-        if shape is not None and is_sphere(mi, shape):
-            to_world = np.array(read(shape)).reshape(4, 4)
-            radius = np.linalg.norm(to_world[:3, 0])
-            row[:] = *to_world[:3, 3], -radius if shape.has_flipped_normals() else radius
-    return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
 
 
 def _on_disc(mi: ModuleType, u: Point) -> Vector:
