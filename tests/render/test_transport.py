@@ -333,6 +333,15 @@ def test_second_trips_take_nothing_and_add_nothing(name: str) -> None:
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
 
 
+@pytest.mark.parametrize("name", ["ball", "pane"])
+def test_light_from_a_mirror_is_seen_through_a_rough_surface(name: str) -> None:
+    """Particles come to the side of it that is turned away from the camera."""
+    frosted = {"type": "roughdielectric", "alpha": 0.5}
+    pane = {"type": "rectangle", "to_world": T().rotate([0, 1, 0], 20).scale(2), "bsdf": frosted}
+    drawn = before_a_wall(frosted, 0.5) if name == "ball" else before_a_wall(frosted, 0.5, ball=pane)
+    agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
+
+
 def test_second_trips_find_what_first_ones_hardly_do(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = before_a_wall(GLASS, 0.3, wall=None)
     with_them = pictures(drawn, "caustics", 64, 12, 8)
@@ -373,7 +382,8 @@ def test_long_chains_keep_their_weights_finite() -> None:
 
 
 def test_a_map_gives_the_particles_within_its_radius() -> None:
-    """Against a sum over all of them; so many that their keys take more than 16 bits."""
+    """Against a sum over all of them; so many that their keys take more than 16 bits. What has come from below counts
+    on surfaces that face the same way as that of the place, what has come from above on all."""
     rng = np.random.default_rng(7)
     count, radius = 60000, 0.0025  # few enough of a row that none is left out
     at = rng.random((3, count)).astype(np.float32) * [[2], [2], [0]]
@@ -381,7 +391,9 @@ def test_a_map_gives_the_particles_within_its_radius() -> None:
     flux = rng.random(count).astype(np.float32)
     photon = Photon.none(mi)
     photon.position, photon.flux = mi.Point3f(*map(mi.Float, at)), mi.Spectrum(mi.Float(flux))
-    photon.normal, photon.direction = (dr.zeros(mi.Vector3f, count) + mi.Vector3f(0, 0, 1) for _ in range(2))
+    sides = rng.choice([-1.0, 1.0], (2, count)).astype(np.float32)
+    photon.normal, photon.direction = (mi.Vector3f(0, 0, mi.Float(side)) for side in sides)
+    counted = kept & ((sides[0] > 0) | (sides[1] > 0))
     photon.density, photon.depth = dr.zeros(mi.Float, count), dr.zeros(mi.UInt32, count)
     photon.again = dr.zeros(mi.Bool, count)
     halves = np.split(np.arange(count), 2)  # two kinds, as first and second particles are
@@ -398,11 +410,13 @@ def test_a_map_gives_the_particles_within_its_radius() -> None:
     place = mi.Point3f(mi.Float(places[0]), mi.Float(places[1]), 0)
     zero = dr.zeros(mi.Spectrum, 300)
     up, every = dr.zeros(mi.Vector3f, 300) + mi.Vector3f(0, 0, 1), dr.full(mi.Bool, True, 300)
-    summed, above = found.gather(place, up, dr.zeros(mi.Float, 300), zero, lambda p, w, here: p.flux * w, every, 0.5)
-    distance2 = ((places[:, :, None] - at[:2, None, kept]) ** 2).sum(0)
+    summed, above = found.gather(
+        place, up, up, dr.zeros(mi.Float, 300), zero, lambda p, w, here: p.flux * w, every, 0.5
+    )
+    distance2 = ((places[:, :, None] - at[:2, None, counted]) ** 2).sum(0)
 
     def by(reach: float) -> np.ndarray:
-        return np.maximum(1 - distance2 / reach**2, 0) * 2 / (np.pi * reach**2) @ flux[kept]
+        return np.maximum(1 - distance2 / reach**2, 0) * 2 / (np.pi * reach**2) @ flux[counted]
 
     assert np.array(summed)[0] == pytest.approx(by(radius), rel=1e-3, abs=1)
     assert np.array(above)[0] == pytest.approx(by(radius) - by(0.5 * radius), rel=1e-3, abs=50)

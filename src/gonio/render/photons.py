@@ -20,7 +20,7 @@ from .types import Float, Mask, Point, Radiance, UInt, Vector
 
 ROW = 4096  # cells along x that keep apart; what lies further is counted as lying in the last
 LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
-FACING = 0.9  # and cosine of the angle to its normal: what lies around an edge is elsewhere
+FACING = 0.9  # and cosine of the angle between normals: what lies around an edge is elsewhere
 VISITED = 16  # particles of a row, about
 CUBES = 1 << 16  # numbers of a Crowding
 FIELDS = 16  # numbers of a particle, see Photon
@@ -30,7 +30,7 @@ FIELDS = 16  # numbers of a particle, see Photon
 class Photon:
     """A particle at rest.
 
-    position, normal  where it lies, and of which surface
+    position, normal  where it lies, and the geometric normal of the surface there, whatever side it has come to
     direction         where it came from, a unit vector away from the surface
     flux              its share of the light
     density           of étendue at its lamp, `sources.Particle.density`, over the square of the index there
@@ -112,6 +112,7 @@ class PhotonMap:
         self,
         place: Point,
         normal: Vector,
+        back: Vector,
         u: Float,
         zero: Radiance,
         visit: Callable[[Photon, Float, Mask], Radiance],
@@ -120,6 +121,10 @@ class PhotonMap:
     ) -> tuple[Radiance, Radiance]:
         """Sum over the particles around a place: `visit(particle, weight by distance in 1/m^2, mask)`; and by how much
         it is above the sum over those `within` that part of the radius, where this is not 0.
+
+        On surfaces that face the same way they count whichever side they have come to, since a rough one may let light
+        through; on those that face the other way, as parts of one mesh may, if they have come to the side of `back`, a
+        direction toward who looks.
 
         The weight is a paraboloid over the disc of the radius, with the integral 1. Where they lie close, every second,
         third, ... one of a row is visited, from one on that the random number `u` chooses, and stands for the others.
@@ -147,7 +152,10 @@ class PhotonMap:
             position, other = mi.Point3f(*near[:3]), mi.Normal3f(*near[3:6])
             offset = position - place
             distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
-            here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius) & (dr.dot(normal, other) > FACING)
+            here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius)
+            alike, came = dr.dot(normal, other), mi.Vector3f(*(record[2, i] for i in range(3)))
+            beside = dr.dot(normal, back) * dr.dot(other, came) < 0
+            here &= (alike > FACING) | ((alike < -FACING) & beside)
             # rows of other cells may share their memory
             here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
             here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z

@@ -174,7 +174,7 @@ class Caustics(Path):
                 stays &= crossing.surface
             photon = Photon(
                 si.p,
-                mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, -flight.ray.d)),
+                mi.Vector3f(si.n),
                 mi.Vector3f(-flight.ray.d),
                 self._turned(flight.flux * flight.share, COLOURS - turn) / self._total,
                 way.density * dr.square(flight.eta),
@@ -276,7 +276,6 @@ class Caustics(Path):
             return mi.Spectrum(0), path.more
         photons, depth, chains = self._map[1], path.depth, path.more
         active = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        normal = mi.Vector3f(si.n) * dr.sign(dr.dot(si.n, si.to_world(si.wi)))
         # Who has come here by mirrors shares what first particles have brought with second particles.
         by_mirrors = (chains.lobe > 0) & (path.pdf == 0)
         crowd = self._crowding.at(si.p) * dr.inv_pi
@@ -292,7 +291,8 @@ class Caustics(Path):
             return dr.select(here, value * flux * (weight * share / cosine), 0)
 
         within = SHARPER if self.measured else 0.0
-        light, above = photons.gather(si.p, normal, u, mi.Spectrum(0), visit, active, within)
+        back = si.to_world(si.wi)
+        light, above = photons.gather(si.p, mi.Vector3f(si.n), back, u, mi.Spectrum(0), visit, active, within)
         blur = chains.blur + path.throughput * above if self.measured else None
         return light, replace(chains, counts=counts, blur=blur)
 
