@@ -147,13 +147,17 @@ def test_a_ball_with_a_texture_is_found_as_rays_find_it(kind: str) -> None:
 
 
 @pytest.mark.parametrize("others", [0, 1])
-@pytest.mark.parametrize("shape, flipped", [("cube", False), ("rectangle", True), ("sphere", True), ("disk", False)])
+@pytest.mark.parametrize(
+    "shape, flipped",
+    [("cube", False), ("rectangle", True), ("sphere", True), ("sphere", False), ("cylinder", False), ("disk", False)],
+)
 def test_a_lamp_with_a_texture_is_found_as_rays_find_it(shape: str, flipped: bool, others: int) -> None:
-    """Whose sides share their uv, or which is turned inside out: Mitsuba's `area` samples those wrongly."""
+    """Whose sides share their uv, or which is round or turned inside out: Mitsuba's `area` samples those wrongly."""
     pixels = np.random.default_rng(3).uniform(0, 8, (4, 4, 3)).astype(np.float32)
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(pixels), "raw": True, "filter_type": "nearest"}
-    up = 90 if shape != "rectangle" else -90
-    place = T().translate([0, 2, 0]).rotate([1, 0, 0], up).scale(1.5 if shape != "sphere" else 5.5)
+    place = T().translate([0, 2, 0]).rotate([1, 0, 0], -90 if flipped else 90).scale(1.5)
+    if shape in ("sphere", "cylinder"):
+        place = T().translate([0, 2, 0]).rotate([0.62, -0.77, 0.151], 210).scale(5.5 if flipped else 0.8)
     lamp = {"type": shape, "to_world": place, "flip_normals": flipped, "bsdf": grey(0.0)}
     lamp["emitter"] = {"type": "area", "radiance": texture}
     more = {f"m{i}": ball("area", (3, 3, 0), 0.5, bsdf=grey(0.0)) for i in range(others)}

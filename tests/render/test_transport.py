@@ -120,6 +120,22 @@ def test_particles_see_bent_normals_and_rough_glass_as_paths_do() -> None:
     assert sigmas(pictures(drawn, "path", 64, depth=7), pictures(drawn, "light", 256, depth=7)) < 6
 
 
+def test_particles_enter_rough_glass_beside_bent_normals_as_paths_do() -> None:
+    """Once and not out again: a factor of the index that is wrong both ways shows on no closed ball."""
+    rough = {"type": "roughdielectric", "alpha": 0.5, "distribution": "ggx"}
+    drawn = scene({"lamp": LAMP}, BUMPY, size=20, pane=rectangle((0, 0.3, 1.2), 0.7, bsdf=rough))
+    agree(pictures(drawn, "path", 256, 6), pictures(drawn, "light", 1024, 6))
+
+
+def test_particles_behind_a_thin_lens_are_not_seen() -> None:
+    film = {"type": "hdrfilm", "width": 20, "height": 20, "rfilter": {"type": "box"}}
+    eye = T().look_at([0, 1.5, 4], [0, 0, 0], [0, 1, 0])
+    lens = {"type": "thinlens", "fov": 40, "to_world": eye, "aperture_radius": 0.1, "focus_distance": 4, "film": film}
+    wall = {"type": "rectangle", "to_world": T().translate([0, 1, 6]).rotate([0, 1, 0], 180).scale(4), "bsdf": GREY}
+    drawn = scene({"lamp": LAMP, "sky": {"type": "constant", "radiance": rgb(0.3)}}, GREY, sensor=lens, wall=wall)
+    agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
+
+
 def test_particles_of_short_paths_show_the_lamp_alone() -> None:
     drawn = scene(LAMPS["two-sided"], GREY)
     a, b = pictures(drawn, "path", 16, depth=1), pictures(drawn, "light", 64, depth=1)

@@ -136,8 +136,8 @@ class Light(Transport):
         lens = self.mi.Point2f(0.5)
         if self.sensor.needs_aperture_sample():
             lens = self.mi.Point2f(*self.pair(key, low, at + LENS))
-        found: tuple[Record, Radiance] = self.sensor.sample_direction(si, lens, active)
-        return found
+        ds, importance = self.sensor.sample_direction(si, lens, active)
+        return ds, dr.maximum(importance, 0)  # to Mitsuba's thin lens what is behind it sends less than nothing
 
     def _splat(
         self,

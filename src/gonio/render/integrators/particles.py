@@ -137,10 +137,11 @@ class Particles:
         if not self.bent:
             return bsdf.eval(self.context, si, toward, active) * adjoint(si, toward)
         mi = self.mi
+        # As radiance from here: glass scales that by its index, and importance not.
         seen = mi.SurfaceInteraction3f(si)
         seen.wi = toward
         into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(toward)))
-        return bsdf.eval(self.context, seen, si.wi, active) * (out / dr.maximum(into, 1e-12))
+        return bsdf.eval(self.of.context, seen, si.wi, active) * (out / dr.maximum(into, 1e-12))
 
     def go_on(
         self,
