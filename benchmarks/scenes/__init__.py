@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gonio.render.surfaces import whole
 
 Dict = dict[str, Any]
 
@@ -42,7 +43,7 @@ class Scene:
             "film": {**film, "pixel_format": "rgb", "component_format": "float32"},
             "sampler": {"type": sampler, "sample_count": spp or self.spp},
         }
-        return mi.load_dict({"type": "scene", "sensor": sensor, **self.make(mi)})
+        return whole(mi, mi.load_dict({"type": "scene", "sensor": sensor, **self.make(mi)}))
 
 
 SCENES: dict[str, Scene] = {}

@@ -115,6 +115,28 @@ def test_direct_agrees_with_mitsuba(lamp: str) -> None:
     agree(scene, {"type": "direct"}, integrator="direct")
 
 
+@pytest.mark.parametrize("light", [{"type": "constant"}, {"type": "directional", "direction": [0.2, -1.0, 0.1]}])
+def test_what_mitsuba_merges_stands_in_the_way_of_light(light: dict) -> None:
+    """Two sheets of one material are one mesh, which the scene's box leaves out: without it light ends at 2 metres."""
+    sheets = {
+        "floor": rectangle((0, -0.5, 0), 10, angle=-90, bsdf={"type": "diffuse"}),
+        "roof": rectangle((0, 9, 0), 14, angle=90, bsdf={"type": "diffuse"}),
+    }
+    eye = T().look_at([0, 1, 4], [0, 0, 0], [0, 1, 0])
+    film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
+    described = {
+        "type": "scene",
+        "light": light,
+        **sheets,
+        "camera": {"type": "perspective", "to_world": eye, "film": film},
+    }
+    merged, apart = (mi.load_dict(described, optimize=both) for both in (True, False))
+    assert len(merged.shapes()) == 1
+    for name, spp in (("path", 64), ("light", 512), ("caustics", 64)):  # one after another, of one scene
+        found, right = (picture(one, spp, integrator=name, max_depth=3).mean() for one in (merged, apart))
+        assert found == pytest.approx(right, rel=0.02, abs=1e-6)
+
+
 def test_the_comparison_would_see_a_missing_bounce() -> None:
     scene = mi.load_dict(scene_dict(lamp=LAMPS["constant"]))
     with pytest.raises(AssertionError, match="sigma apart"):

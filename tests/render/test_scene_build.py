@@ -180,6 +180,14 @@ def test_transform_scales_then_rotates_then_translates(mi, build):
 # ---------------------------------------------------------------------- lights
 
 
+def test_shapes_of_equal_material_lie_within_the_scene(mi, build):
+    """Mitsuba makes one mesh of them; beyond the scene's box nothing is in the way of a sky."""
+    cube = {"type": "cube", "transform": {"translate": [3, 0, 0]}}
+    sheets = [{"type": "parallelogram", "base": [-9, y, -9], "edge0": [0, 0, 18], "edge1": [18, 0, 0]} for y in (-1, 7)]
+    box = build([cube, *sheets, {"type": "sphere", "center": [0, 0, 0], "radius": 0.5}]).bbox()
+    np.testing.assert_allclose([box.min, box.max], [[-9, -1, -9], [9, 7, 9]])
+
+
 def test_area_light_shines_from_both_sides_of_any_shape(mi, build):
     shapes = [
         {"type": "parallelogram", "base": [0, 0, 0], "edge0": [1, 0, 0], "edge1": [0, 1, 0]},

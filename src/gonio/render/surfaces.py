@@ -114,6 +114,25 @@ class Surfaces:
         return si
 
 
+def whole(mi: ModuleType, scene: Scene) -> Scene:
+    """The scene, or one of the same parts, whose box holds all of its shapes.
+
+    What Mitsuba 3.9 merges, it does for meshes of equal materials by itself, has no box: neither has what holds nothing
+    else, and beyond the box nothing is in the way of a sky or a beam.
+    """
+    meshes = [shape for shape in scene.shapes() if shape.is_mesh()]
+    for shape in meshes:
+        if not shape.bbox().valid():
+            shape.recompute_bbox()
+    box = scene.bbox()
+    if all(box.contains(shape.bbox()) for shape in meshes if shape.bbox().valid()):
+        return scene
+    lights = [emitter for emitter in scene.emitters() if emitter.get_shape() is None]
+    parts = {f"part{i}": part for i, part in enumerate([*scene.shapes(), *lights, *scene.sensors()])}
+    found: Scene = mi.load_dict({"type": "scene", **parts}, parallel=False, optimize=False)
+    return found
+
+
 Matrices = NDArray[np.float64]
 Formula = Callable[[ModuleType, SurfaceInteraction, Hit, Ray, list[Vector], OfVariant], None]
 

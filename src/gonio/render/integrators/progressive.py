@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...work import garbage
 from .. import engine, sampler
+from ..surfaces import whole
 from ..types import Float, Scene, Sensor, UInt
 from .base import Integrator, Settings
 from .sums import Sums
@@ -61,9 +62,9 @@ class Render:
             what = "is polarized" if mi.is_polarized else "works on one ray at a time"
             hint = "load the scene with llvm_ad_rgb or another that is not so, or take Mitsuba's own path"
             raise InputError(f"variant {mi.variant()} {what}", "Render", hint)
-        self.scene, self.settings, self.aovs = scene, settings, aovs
         if sensor is None and not scene.sensors():
             raise InputError("the scene has no camera", "scene.sensors()", "add a sensor, or pass one")
+        self.scene, self.settings, self.aovs = whole(mi, scene), settings, aovs
         self.sensor = sensor if sensor is not None else scene.sensors()[0]
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0

@@ -94,7 +94,11 @@ class _Builder:
         # Mitsuba merges the meshes of a scene by itself, and hands them on in an order of chance: with it would go the
         # order of the lights, and every picture. So they are merged here, and sorted.
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
-        for index, one in enumerate(sorted(merged if isinstance(merged, list) else [merged], key=_order)):
+        merged = merged if isinstance(merged, list) else [merged]
+        for one in merged:
+            if one.is_mesh():
+                one.recompute_bbox()  # which Mitsuba 3.9 forgets, and then so does the scene
+        for index, one in enumerate(sorted(merged, key=_order)):
             scene[one.id() or f"merged{index}"] = one
         found = self.load(scene, "/scene", optimize=False)
         if self.gathered:
