@@ -136,6 +136,30 @@ def test_particles_behind_a_thin_lens_are_not_seen() -> None:
     agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
 
 
+@pytest.mark.parametrize("clip", [{"near_clip": 3.6}, {"far_clip": 4.0}])
+def test_particles_are_seen_between_the_clips_of_the_camera(clip: dict[str, float]) -> None:
+    film = {"type": "hdrfilm", "width": 20, "height": 20, "rfilter": {"type": "box"}}
+    eye = T().look_at([0, 1.5, 4], [0, 0, 0], [0, 1, 0])
+    camera = {"type": "perspective", "fov": 40, "to_world": eye, "film": film, **clip}
+    drawn = scene({"lamp": LAMP, "sky": {"type": "constant", "radiance": rgb(0.3)}}, GREY, sensor=camera)
+    agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
+
+
+@pytest.mark.parametrize("name", ["light", "caustics"])
+def test_particles_pass_instances(name: str) -> None:
+    block = {"type": "cube", "to_world": T().translate([-0.5, -0.2, 0.8]).scale(0.3), "bsdf": GREY}
+    group = {"group": {"type": "shapegroup", "block": block}}
+    copies = {
+        f"copy{x}": {"type": "instance", "to_world": T().translate([x, 0, 0]), "g": {"type": "ref", "id": "group"}}
+        for x in (0, 1)
+    }
+    lamps = {"lamp": LAMP, "sky": {"type": "constant", "radiance": rgb(0.3)}}
+    drawn = scene(
+        lamps, GREY if name == "light" else {"type": "conductor", "material": "Ag"}, size=20, **group, **copies
+    )
+    agree(pictures(drawn, "path", 256, 6), pictures(drawn, name, 512 if name == "light" else 128, 6))
+
+
 def test_particles_of_short_paths_show_the_lamp_alone() -> None:
     drawn = scene(LAMPS["two-sided"], GREY)
     a, b = pictures(drawn, "path", 16, depth=1), pictures(drawn, "light", 64, depth=1)
@@ -280,6 +304,9 @@ def test_what_particles_cannot_do_is_one_clear_error() -> None:
     drawn = scene({"lamp": LAMP}, GREY, size=8)
     with pytest.raises(InputError, match="no features for the denoiser"):
         Render(drawn, Settings("light"), aovs=True)
+    shifted = {"type": "perspective", "principal_point_offset_x": 0.2}
+    with pytest.raises(InputError, match="principal point"):
+        Render(scene({"lamp": LAMP}, GREY, sensor=shifted), Settings("light"))
 
 
 def test_path_says_where_it_starves_and_what_does_not() -> None:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
+from typing import TypeVar
 
 import drjit as dr
 import numpy as np
@@ -28,6 +29,7 @@ from .types import (
     Float,
     Interaction,
     Mask,
+    OfVariant,
     Plugin,
     Point,
     PositionSample,
@@ -36,6 +38,7 @@ from .types import (
     Ray,
     Record,
     Scene,
+    Shape,
     SurfaceInteraction,
     TraversalCallback,
     UInt,
@@ -121,6 +124,7 @@ def register(mi: ModuleType) -> None:
 
 
 _registered: set[str] = set()
+Answer = TypeVar("Answer")
 
 
 def _area_sample(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
@@ -128,6 +132,12 @@ def _area_sample(mi: ModuleType, ps: PositionSample, it: Interaction) -> Directi
     ds = toward(mi, ps, it)
     ds.pdf = _per_steradian(ps.pdf, ds)
     return ds
+
+
+def area_density(shape: Shape, ps: PositionSample, active: Mask) -> Float:
+    """That of the points of a shape that it samples."""
+    density: Float = shape.pdf_position(ps, active)
+    return density
 
 
 def _per_steradian(pdf: Float, ds: DirectionSample) -> Float:
@@ -325,11 +335,30 @@ class Lights:
     def on_area(self, emitter: Emitter, index: UInt, u: Point, active: Mask) -> PositionSample:
         """A point of a lamp, even on its area."""
         mi = self.mi
-        ps: PositionSample = emitter.get_shape().sample_position(0.0, u, active)
+        nothing: PositionSample = dr.zeros(mi.PositionSample3f)
+        ps = self.of_shape(emitter, index, lambda shape, *args: shape.sample_position(0.0, *args), nothing, u, active)
         if self.balls is not None:  # of a sphere that is turned, Mitsuba 3.9 has the normal of one that is not
             ball = dr.gather(mi.Vector4f, self.balls, index, active)
             ps.n = dr.select(ball.w != 0.0, mi.Normal3f((ps.p - mi.Point3f(ball.xyz)) / ball.w), ps.n)
         return ps
+
+    def of_shape(
+        self, emitter: Emitter, index: UInt, ask: Callable[..., Answer], nothing: Answer, *args: OfVariant
+    ) -> Answer:
+        """`ask(shape, *args)` of a lamp's shape; `nothing` of a lamp that has none."""
+        if self.count == 1 or not self.instances:
+            return ask(self.emitters[0].get_shape() if self.count == 1 else emitter.get_shape(), *args)
+
+        # An instance, which a call from the kernel would ask too, has no area.
+        def answer(shape: Shape | None) -> Callable[..., Answer]:
+            return lambda *args: nothing if shape is None else ask(shape, *args)
+
+        found: Answer = dr.switch(index, [answer(one.get_shape()) for one in self.emitters], *args)
+        return found
+
+    @cached_property
+    def instances(self) -> bool:
+        return any(shape.class_name() == "Instance" for shape in self.scene.shapes())
 
     @cached_property
     def balls(self) -> Float | None:
@@ -414,7 +443,7 @@ class Lights:
             here = self.mi.Bool(False) if self.by_area is None else dr.gather(self.mi.Bool, self.by_area, index, asked)
             density = emitter.pdf_direction(it, ds, asked & ~here)
             if self.by_area is not None:
-                area = emitter.get_shape().pdf_position(ds, here)
+                area = self.of_shape(emitter, index, area_density, self.mi.Float(0), ds, here)
                 density = dr.select(here, _per_steradian(area, ds), density)
         if not lamps.kinds:
             return density

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .lights import Lights
+from .lights import Lights, area_density
 from .solid_angles import is_sphere
 from .types import (
     Emitter,
@@ -189,17 +189,18 @@ class Sources:
         """`Particle.density` of the one that would come from the lamp met at `si` by a ray of that direction."""
         mi, lights = self.mi, self.lights
         emitter = si.emitter(self.scene)
-        probability = mi.Float(1)
+        probability, index = mi.Float(1), mi.UInt32(0)
         if lights.count > 1:
             number = dr.reinterpret_array(mi.UInt32, emitter)
             probability = dr.gather(mi.Float, lights.by_pointer, number, active)
+            index = dr.gather(mi.UInt32, lights.number, number, active)
         found = mi.Float(0)
         for one in self.known:
             if one == SURFACE:
                 met = active & si.is_valid()
                 ps = mi.PositionSample3f(si)
                 cosine = dr.abs(dr.dot(direction, si.n))
-                by_area = emitter.get_shape().pdf_position(ps, met)
+                by_area = lights.of_shape(emitter, index, area_density, mi.Float(0), ps, met)
                 pdf = by_area * self._direction_pdf(si, -direction, met) / dr.maximum(cosine, 1e-12)
                 found = dr.select(met, pdf, found)
             if one == INFINITE:

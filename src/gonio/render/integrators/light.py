@@ -54,12 +54,17 @@ class Light(Transport):
         if sensor.class_name() not in CAMERAS:
             what = f"a camera of the kind {sensor.class_name()}, which no point of the scene is connected to"
             raise InputError(what, where, "use a perspective camera, or path")
+        if any(value[0] for name, value in mi.traverse(sensor) if name.startswith("principal_point_offset")):
+            what = "a camera with a principal point that is not in the middle, which Mitsuba does not project by"
+            raise InputError(what, where, "leave it out, or use path")
         self.particles = Particles(self)
         size = sensor.film().crop_size()
         self.pixels = dr.opaque(mi.UInt32, int(size[0]) * int(size[1]))
         self.height = dr.opaque(mi.UInt32, int(size[1]))
         self.far = dr.opaque(mi.Float, 0.5 * float(sensor.far_clip()))
+        self.clips = [dr.opaque(mi.Float, float(clip)) for clip in (sensor.near_clip(), sensor.far_clip())]
         self.eye = mi.Point3f(sensor.world_transform() @ mi.Point3f(0.0))
+        self.ahead = dr.normalize(mi.Vector3f(sensor.world_transform() @ mi.Vector3f(0.0, 0.0, 1.0)))
         self.unit = 1.0 if not self.lights.count else self._brightest() * 2.0**-BITS
         self.per_unit = dr.opaque(mi.Float64, 1.0 / self.unit)
 
@@ -159,10 +164,16 @@ class Light(Transport):
         x, y = mi.Int32(dr.floor(uv.x)), mi.Int32(dr.floor(uv.y))
         active = active & (x >= 0) & (y >= 0) & (x < mi.Int32(self.width)) & (y < mi.Int32(self.height))
         active &= dr.any(value != 0)
+        near, far = self.clips
         if eye is not None:
-            active = self.unoccluded(si, eye, active)
+            depth = dr.dot(si.p - eye, self.ahead)
+            active &= (depth >= near) & (depth <= far)
+            active = self.unoccluded(si, eye + (si.p - eye) * (near / depth), active)
         else:
-            active &= ~self.surfaces.blocked(mi.Ray3f(si.p, away), active)
+            ahead = dr.maximum(dr.dot(away, self.ahead), 1e-6)
+            ray = mi.Ray3f(si.p + away * (near / ahead), away)
+            ray.maxt = (far - near) / ahead
+            active &= ~self.surfaces.blocked(ray, active)
         place = mi.UInt32(y) * self.width + mi.UInt32(x)
         dither = mi.Float64(sampler.independent_pair(key, low, place ^ DITHER)[0])
         colour = [mi.Float64(v) * self.per_unit for v in self.rgb(value, si.wavelengths)]
