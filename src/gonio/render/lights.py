@@ -494,8 +494,9 @@ def _is_black(mi: ModuleType, emitter: Emitter) -> bool:
     pixels = dict(mi.traverse(emitter)).get("data")
     if pixels is None:
         return False
-    # in spectral variants three numbers tell a texel's colour, black too, and the last one how bright it is
-    return not np.any(np.array(pixels)[..., 3 if mi.is_spectral else 0 :])
+    if mi.is_spectral:  # three numbers tell a texel's colour, black too, and the last one how bright it is
+        return not np.any(np.asarray(pixels)[..., 3])
+    return not dr.any(pixels.array != 0)
 
 
 def _by_area(mi: ModuleType, emitter: Emitter) -> bool:

@@ -117,8 +117,8 @@ class Surfaces:
 def whole(mi: ModuleType, scene: Scene) -> Scene:
     """The scene, or one of the same parts, whose box holds all of its shapes.
 
-    What Mitsuba 3.9 merges, it does for meshes of equal materials by itself, has no box: neither has what holds nothing
-    else, and beyond the box nothing is in the way of a sky or a beam.
+    Mitsuba 3.9 merges the meshes of equal material and forgets the box of what it has made, so that this may lie
+    outside of the scene's: and beyond that nothing is in the way of a sky or a beam.
     """
     meshes = [shape for shape in scene.shapes() if shape.is_mesh()]
     for shape in meshes:
