@@ -141,7 +141,9 @@ def test_particles_are_seen_between_the_clips_of_the_camera(clip: dict[str, floa
     film = {"type": "hdrfilm", "width": 20, "height": 20, "rfilter": {"type": "box"}}
     eye = T().look_at([0, 1.5, 4], [0, 0, 0], [0, 1, 0])
     camera = {"type": "perspective", "fov": 40, "to_world": eye, "film": film, **clip}
-    drawn = scene({"lamp": LAMP, "sky": {"type": "constant", "radiance": rgb(0.3)}}, GREY, sensor=camera)
+    lights = {"lamp": LAMP, "sky": {"type": "constant", "radiance": rgb(0.3)}}
+    sheet = rectangle((0.3, 0.9, 2), 0.3, bsdf={"type": "twosided", "side": GREY})  # nearer than the nearer clip
+    drawn = scene(lights, GREY, sensor=camera, sheet=sheet)
     agree(pictures(drawn, "path", 64, 6), pictures(drawn, "light", 512, 6))
 
 

@@ -105,7 +105,7 @@ def register(mi: ModuleType) -> None:
             elif is_sphere(mi, shape):
                 pdf = SphericalCap(mi, Ball.of(mi, shape), it.p).pdf(ds.dist, cosine)
             else:
-                pdf = shape.pdf_position(ds, active) * dr.square(ds.dist) / cosine
+                pdf = _per_steradian(area_density(shape, ds, active), ds)
             return dr.select(active & (cosine > 0), pdf, 0)
 
         def eval_direction(self, it: Interaction, ds: DirectionSample, active: Mask = True) -> Radiance:
