@@ -24,8 +24,8 @@ import numpy as np
 from gonio.instruments.capture import rehearsal
 from gonio.instruments.capture.fitting import across
 from gonio.instruments.capture.run import Capture, capture, plan
-from gonio.models import tree
-from gonio.models.sum import Sum
+from gonio.material import tree
+from gonio.materials.combined.sum import Sum
 
 MIDDLE, RADIUS, AWAY = np.array([0.0, 0.0, 500.0]), 50.0, 400.0
 ANGLES = (15.0, 35.0, 55.0, 75.0, 25.0, 45.0, 65.0, 95.0)  # between lamp and camera, of the eight

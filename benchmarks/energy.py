@@ -21,8 +21,8 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 from gonio.energy.albedo import monte_carlo, quadrature, walk
-from gonio.energy.compensation import comparison
 from gonio.energy.tables import bake
+from gonio.materials.compensated import comparison
 from gonio.ops import backend
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -185,7 +185,7 @@ def sampling() -> None:
                 figure(f"{masking}: independent points, rms over the predicted error", ratio, 1.2, ".2f")
     if REFERENCE.is_dir():
         import mitsuba as mi
-        from gonio.render import engine
+        from gonio.bridge import engine
 
         engine.load("cpu")
         truth = quadrature.moments("ggx", "schlick-ibl", MU, ROUGHNESS**2).whole[::-1]
@@ -298,7 +298,9 @@ def costs(millions: float) -> None:
 
 def ten_balls(spp: int) -> None:
     """The shading balls, 1024 x 512, path: all ten compensated over all ten plain, in turns."""
-    from gonio.render import engine, integrators, scene
+    from gonio import scene
+    from gonio.bridge import engine
+    from gonio.transport import integrators
 
     mi = engine.load("cpu")
     base = json.loads((ROOT / "examples" / "shading-balls" / "scene.json").read_text())

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.measure.fitting import data
-from gonio.measure.fitting.fit import Fit, fit
+from gonio.fitting import data
+from gonio.fitting.fit import Fit, fit
 from scipy.optimize import least_squares
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))

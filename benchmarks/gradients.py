@@ -19,15 +19,15 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from gonio.render import engine
+from gonio.bridge import engine
 from rich.console import Console
 from rich.table import Table
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.render import adapter  # noqa: E402
-from gonio.render.gradients import Along, Gradients  # noqa: E402
-from gonio.render.integrators import Settings  # noqa: E402
+from gonio.bridge import adapter  # noqa: E402
+from gonio.transport.gradients import Along, Gradients  # noqa: E402
+from gonio.transport.integrators import Settings  # noqa: E402
 
 SIZE, SPP, DEPTH, RUNS = (160, 120), 64, 5, 16
 SAMPLERS = ("independent", "stratified", "multijitter", "ldsampler")

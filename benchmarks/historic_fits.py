@@ -16,7 +16,7 @@ from collections import defaultdict
 
 import gonio as go
 import numpy as np
-from gonio.measure.fitting.data import Data, data_of
+from gonio.fitting.data import Data, data_of
 from gonio.measure.tables.half_difference import sampled
 from rich.console import Console
 from rich.table import Table

@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gonio.render import engine
+from gonio.bridge import engine
 from rich.console import Console
 from rich.table import Table
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.render.integrators import Render, Settings, Transport  # noqa: E402
+from gonio.transport.integrators import Render, Settings, Transport  # noqa: E402
 
 WIDTH, HEIGHT, SPP = 1000, 300, 64
 ETA, K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]
@@ -170,7 +170,7 @@ def versus(integrator: str, bsdf: Any, name: str, args: argparse.Namespace, cloc
     field = [Contender(f"Mitsuba, {s}", mitsuba(native, s, integrator)) for s in NATIVE_SAMPLERS]
     field.append(Contender(f"Gonio over {name}", gonio(bsdf, integrator=integrator)))
     if args.denoise and integrator == "path":
-        from gonio.render.denoise import denoise
+        from gonio.pictures.denoise import denoise
 
         field.append(Contender("Gonio, 16 spp, denoised", gonio(bsdf, 16, denoise, integrator="path")))
     compete(field, args.rounds, clock, best)

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.models import guide_search
+from gonio.material import guide_search
 
 FLOOR = 1e-4  # relative, of one sample: 1 % of the light, as much as an 8-bit step
 SIZE = 96

@@ -23,7 +23,7 @@ import gonio as go
 import gonio.mitsuba
 import mitsuba as mi
 import numpy as np
-from gonio.models import BSDF
+from gonio.material import BSDF
 from gonio.verify.severity import Bias
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"

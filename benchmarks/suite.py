@@ -32,16 +32,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gonio.render import engine, passes
+from gonio.bridge import engine
+from gonio.transport import passes
 from rich.console import Console
 from rich.table import Table
 from scipy import stats
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.render import until  # noqa: E402
-from gonio.render.integrators import Render, Settings, caustics  # noqa: E402
 from gonio.render.request import UNTIL_MOST  # noqa: E402
+from gonio.transport import until  # noqa: E402
+from gonio.transport.integrators import Render, Settings, caustics  # noqa: E402
 
 from scenes import SCENES, Scene  # noqa: E402
 

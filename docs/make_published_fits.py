@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import gonio as go
 import numpy as np
-from gonio.models import library
+from gonio.catalog import library
 from gonio.verify import quality
 from gonio.verify.subject import Subject
 from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import gonio as go
-from gonio.render import foreign
+from gonio.bridge import foreign
 from gonio.verify import Report, verify
 from gonio.verify.laws import laws
 from gonio.verify.severity import Grade, percent

@@ -10,7 +10,7 @@ import threading
 import time
 from pathlib import Path
 
-from gonio.render import engine
+from gonio.bridge import engine
 from gonio.viewer import server, stage
 
 ROOT = Path(__file__).parents[1]

@@ -7,7 +7,8 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from gonio.render import engine, images
+from gonio.bridge import engine
+from gonio.pictures import images
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 HERE = Path(__file__).parent

@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))  # `sphere`, `materials`
 
 from gonio import ops
-from gonio.render import engine
+from gonio.bridge import engine
 
 # A shell's background and nohup hand ignored signals down, and who waits for a Ctrl-C here would wait for ever.
 for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.SIG_DFL)):

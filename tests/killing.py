@@ -87,7 +87,7 @@ def command(kind: str, scene: Path, out: str, length: float) -> list[str]:
 
 def content(folder: Path, out: str) -> str:
     """The hash of what a job has written: pixels and tables, not the time that stands beside them."""
-    from gonio.render import images
+    from gonio.pictures import images
 
     found = hashlib.sha256()
     for path in sorted(p for p in folder.rglob("*") if p.is_file() and p.relative_to(folder).parts[0].startswith(out)):

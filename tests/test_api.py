@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gonio import cli, emit, render, verify
 from gonio.errors import GonioWarning, InputError
-from gonio.render import images
+from gonio.pictures import images
 
 FUNCTIONS: dict[str, Callable[..., object]] = {
     "bake": go.bake,

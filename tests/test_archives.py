@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gonio import archives
 from gonio.errors import InputError
-from gonio.render import images
+from gonio.pictures import images
 
 
 def test_arrays_come_back_as_they_were(tmp_path: Path) -> None:

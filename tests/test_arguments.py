@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gonio import arguments, emit, render, verify
 from gonio.errors import InputError
-from gonio.render import images
-from gonio.render.request import check_film
+from gonio.pictures import images
+from gonio.scene.film import check_film
 
 W = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
 NAN = float("nan")

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gonio import cli, llvm
-from gonio.render import images
+from gonio.pictures import images
 
 VERBS = tuple(cli.Verb.family.all())
 
@@ -230,7 +230,7 @@ def test_markup_in_a_message_is_printed_as_it_is(capsys: pytest.CaptureFixture[s
 def test_a_fault_of_our_own_says_how_to_report_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gonio.render import scene as scenes
+    from gonio import scene as scenes
 
     def broken() -> dict[str, object]:
         raise ZeroDivisionError("no luck")
@@ -440,7 +440,7 @@ def test_compare_refuses_what_cannot_be_compared(capsys: pytest.CaptureFixture[s
 
 
 def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[str]) -> None:
-    from gonio.models import models
+    from gonio.material import models
 
     assert gonio("models", "--json") == 0
     assert list(json.loads(capsys.readouterr().out)) == list(models())
@@ -452,7 +452,7 @@ def test_models_and_explain_know_every_material(capsys: pytest.CaptureFixture[st
     assert gonio("explain", "conductor") == 0
     text = capsys.readouterr().out
     assert "alpha" in text and "Mitsuba plugin: gonio_conductor" in text
-    assert "Source: src/gonio/models/conductor.py" in text
+    assert "Source: src/gonio/materials/microfacet/conductor.py" in text
     assert gonio("explain", "phong") == 0
     assert "Breaks reciprocity by nature: " in capsys.readouterr().out
     assert "did you mean 'lambert'?" in failure(capsys, "explain", "lamberd")

@@ -19,8 +19,9 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import GonioWarning, InputError, MachineError
-from gonio.render import checkpoints, passes, run, tiles
-from gonio.render.polarizer import PolarizedRender
+from gonio.render import checkpoints, run, tiles
+from gonio.transport import passes
+from gonio.transport.polarizer import PolarizedRender
 from gonio.work import crew, facts, parts
 from gonio.work.cluster import Cluster
 
@@ -101,7 +102,8 @@ def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_pa
 def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
     two: Cluster, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from gonio.verify import child, trials
+    from gonio.verify import trials
+    from gonio.verify.isolation import child
 
     items = [child.Item("lambert"), child.Item("mirror"), child.Item("phong", ("p=20", "kd=0.6,0.6,0.6"))]
     task = child.Task(items, "quick", 1, ["reciprocity", "energy", "pdf"])

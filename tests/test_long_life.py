@@ -12,7 +12,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio.render import passes
+from gonio.transport import passes
 from gonio.work import garbage
 
 W = np.array([[0.0, 0.6, 0.8], [0.3, 0.0, 0.9539392]])
@@ -38,7 +38,7 @@ def test_materials_go_to_spawned_processes() -> None:
 
 def test_scenes_go_through_pickle(scene: Path) -> None:
     from gonio.render import run
-    from gonio.render.scene import read
+    from gonio.scene import read
 
     description = pickle.loads(pickle.dumps(read(scene)))
     assert description.raw == read(scene).raw and description.path == read(scene).path

@@ -12,9 +12,10 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import cli
+from gonio.bridge import engine
+from gonio.catalog import outside as files
 from gonio.members import Family
-from gonio.models import outside as files
-from gonio.render import engine, images
+from gonio.pictures import images
 
 import outside
 
@@ -176,7 +177,7 @@ def test_a_scene_takes_a_file_where_code_is_allowed(here: Path, capsys: pytest.C
 def test_what_is_registered_is_known_by_name_everywhere(here: Path) -> None:
     (here / "scene.json").write_text(json.dumps(scene({"type": "conductor", "roughness": 0.2, "eta": 1, "k": 2})))
     before = go.render(here / "scene.json")
-    from gonio.models.outside import load
+    from gonio.catalog.outside import load
 
     own = load("ward.py:OwnWard")
     assert go.models()["own-ward"] is own and go.OwnWard is own and "OwnWard" in dir(go)
@@ -230,7 +231,7 @@ def test_a_name_of_gonios_own_is_not_taken(here: Path) -> None:
 
 
 def test_a_saved_file_takes_the_place_of_its_former_self(here: Path) -> None:
-    from gonio.models.outside import load
+    from gonio.catalog.outside import load
 
     first = load("ward.py:OwnWard")
     assert load("ward.py:OwnWard") is first

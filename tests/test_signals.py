@@ -50,7 +50,7 @@ def test_an_ignored_signal_stays_ignored() -> None:
     program = (
         "import os, signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
         "from gonio import cli\n"
-        "from gonio.render.passes import Interrupts\n"
+        "from gonio.transport.passes import Interrupts\n"
         "with Interrupts() as interrupts:\n"
         "    os.kill(os.getpid(), signal.SIGHUP)\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"

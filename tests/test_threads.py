@@ -142,7 +142,7 @@ def test_a_call_waits_until_another_thread_is_done() -> None:
 
 
 def test_a_plugin_of_another_variant_is_refused_in_words() -> None:
-    from gonio.render import engine, foreign
+    from gonio.bridge import engine, foreign
 
     w = np.array([[0.0, 0.0, 1.0]])
     rough = foreign.load({"type": "roughplastic"})

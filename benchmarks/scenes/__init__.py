@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gonio.render.surfaces import whole
+from gonio.transport.surfaces import whole
 
 Dict = dict[str, Any]
 

@@ -12,16 +12,20 @@ so that `import drjit` and `import mitsuba` work after this, and before it too.
 from __future__ import annotations
 
 import contextlib
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
-from . import llvm
+from . import llvm, moved
 from ._version import __version__ as __version__
 from .errors import MachineError
 
 # Before Dr.Jit looks for one. Where there is none, whoever computes on the CPU says so; a GPU does without.
 with contextlib.suppress(MachineError):
     llvm.use()
+
+moved.install()
 
 _PLACES = {
     "errors": ("GonioError", "GonioWarning", "InputError", "MachineError"),
@@ -32,21 +36,24 @@ _PLACES = {
     "optics.masking": ("Masking",),
     "optics.fresnel": ("Fresnel", "Interface", "fresnel"),
     # what a material of one's own is written with
-    "models": (
+    "material": (
         *("Angle", "BSDF", "Breach", "Colour", "Index", "Number", "Parameter", "Preset", "Sample", "Width"),
-        *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "never", "number", "spectrum"),
-        "width",
+        *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number"),
+        *("spectrum", "width"),
     ),
-    "models.library": ("fits", "materials"),
-    "models.notation": ("material",),
+    "catalog.library": ("fits", "materials"),
+    "catalog.notation": ("material",),
     "measure.compression.compress": ("compress",),
-    "measure.fitting.fit": ("fit",),
+    "fitting.fit": ("fit",),
     "energy": ("Albedo", "albedo"),
     "instruments.capture.run": ("capture",),
-    "render": ("resume",),
-    "render.integrators": ("Integrator",),
-    "verify.laws": ("Law",),
+    "instruments.goniometer.run": ("measure",),
+    "render": ("render", "resume"),
     "render.tables": ("bake",),
+    "shaders": ("emit",),
+    "transport.integrators": ("Integrator",),
+    "verify": ("verify",),
+    "verify.laws": ("Law",),
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
@@ -55,46 +62,19 @@ _PLACES = {
     "work.cluster": ("Cluster",),
 }
 _FLAT = {name: place for place, names in _PLACES.items() for name in names}
-_CALLABLE = (
-    "emit",
-    "measure",
-    "models",
-    "render",
-    "verify",
-)  # packages that can be called: go.models()
 _ALIASES = {"cluster": "Cluster", "mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
     from . import ops
-    from .emit import emit
+    from .catalog.library import fits, materials
+    from .catalog.notation import material
     from .energy.albedo import Albedo, albedo
-    from .energy.materials.fdez_aguera import FdezAguera
-    from .energy.materials.kulla_conty import KullaConty
-    from .energy.materials.openpbr import OpenPBR
-    from .energy.materials.random_walk import RandomWalk
-    from .energy.materials.turquin import Turquin
     from .errors import GonioError, GonioWarning, InputError
+    from .fitting.fit import fit
     from .instruments.capture.run import capture
     from .instruments.goniometer.run import measure
-    from .measure.compression.compress import compress
-    from .measure.fitting.fit import fit
-    from .measure.materials.measured import Measured
-    from .members import register
-    from .models import BSDF, Breach, Parameter, Preset, Sample, method, model, models, never
-    from .models.blinn_phong import BlinnPhong
-    from .models.conductor import Conductor
-    from .models.dielectric import Dielectric
-    from .models.film_conductor import FilmConductor
-    from .models.film_dielectric import FilmDielectric
-    from .models.lambert import Lambert
-    from .models.library import fits, materials
-    from .models.metal import Metal
-    from .models.mirror import Mirror
-    from .models.mix import Mix
-    from .models.mix import Mix as mix
-    from .models.notation import material
-    from .models.oren_nayar import OrenNayar
-    from .models.parameters import (
+    from .material import BSDF, Breach, Parameter, Preset, Sample, method, model, models, never
+    from .material.parameters import (
         Angle,
         Colour,
         Index,
@@ -110,18 +90,38 @@ if TYPE_CHECKING:
         spectrum,
         width,
     )
-    from .models.phong import Phong
-    from .models.thin_dielectric import ThinDielectric
-    from .models.two_sided import TwoSided
-    from .models.two_sided import TwoSided as two_sided
+    from .materials.combined.mix import Mix
+    from .materials.combined.mix import Mix as mix
+    from .materials.combined.two_sided import TwoSided
+    from .materials.combined.two_sided import TwoSided as two_sided
+    from .materials.compensated.fdez_aguera import FdezAguera
+    from .materials.compensated.kulla_conty import KullaConty
+    from .materials.compensated.random_walk import RandomWalk
+    from .materials.compensated.turquin import Turquin
+    from .materials.diffuse.lambert import Lambert
+    from .materials.diffuse.oren_nayar import OrenNayar
+    from .materials.empirical.blinn_phong import BlinnPhong
+    from .materials.empirical.phong import Phong
+    from .materials.layered.openpbr import OpenPBR
+    from .materials.measured.measured import Measured
+    from .materials.microfacet.conductor import Conductor
+    from .materials.microfacet.dielectric import Dielectric
+    from .materials.microfacet.film_conductor import FilmConductor
+    from .materials.microfacet.film_dielectric import FilmDielectric
+    from .materials.microfacet.metal import Metal
+    from .materials.microfacet.mirror import Mirror
+    from .materials.microfacet.thin_dielectric import ThinDielectric
+    from .measure.compression.compress import compress
+    from .members import register
     from .ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, get_precision, set_precision
     from .optics.fresnel import Fresnel, Interface, fresnel
     from .optics.indices import indices, refractive_index
     from .optics.masking import Masking
     from .optics.ndf import NDF, Stretched
     from .render import render, resume
-    from .render.integrators import Integrator
     from .render.tables import bake
+    from .shaders import emit
+    from .transport.integrators import Integrator
     from .verify import verify
     from .verify.laws import Law
     from .viewer.contact_sheet import study
@@ -133,29 +133,38 @@ if TYPE_CHECKING:
     from .work.cluster import Cluster as cluster
 
 
-if not TYPE_CHECKING:  # or every misspelt name would be one that a checker believes in
+if not TYPE_CHECKING:  # a type checker would accept every misspelt name
+
+    class _Gonio(ModuleType):
+        """A module whose public functions stay what they are when a subpackage of the same name is imported."""
+
+        def __setattr__(self, name: str, value: object) -> None:
+            if not (name in _FLAT and isinstance(value, ModuleType)):
+                super().__setattr__(name, value)
+
+    sys.modules[__name__].__class__ = _Gonio
 
     def __getattr__(name: str) -> object:
         if name.startswith("_"):
             raise AttributeError(name)
-        if name in _CALLABLE or name == "ops":
-            return import_module("." + name, __name__)
+        if name == "ops":
+            return import_module(".ops", __name__)
         if name in _FLAT:
             return getattr(import_module("." + _FLAT[name], __name__), name)
-        wanted = _ALIASES.get(name, name)
-        if wanted in _FLAT:
-            return __getattr__(wanted)
-        if wanted.islower():  # a submodule on its way in, no material
+        class_name = _ALIASES.get(name, name)
+        if class_name in _FLAT:
+            return __getattr__(class_name)
+        if class_name.islower():  # a submodule that is being imported, no material
             raise AttributeError(f"module 'gonio' has no attribute '{name}'")
-        for cls in import_module(".models", __name__).models().values():
-            if cls.__name__ == wanted:
+        for cls in __getattr__("models")().values():
+            if cls.__name__ == class_name:
                 return cls
         raise AttributeError(f"module 'gonio' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    classes = import_module(".models", __name__).models().values()
-    return sorted([*globals(), *_FLAT, "ops", *_CALLABLE, *_ALIASES, *(cls.__name__ for cls in classes)])
+    classes = import_module(".material", __name__).models().values()
+    return sorted([*globals(), *_FLAT, "ops", *_ALIASES, *(cls.__name__ for cls in classes)])
 
 
 __all__ = [

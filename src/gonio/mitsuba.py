@@ -11,7 +11,7 @@ whenever the variant changes.
 
 from __future__ import annotations
 
-from .render import adapter, engine
+from .bridge import adapter, engine
 
 _mi = engine.load()
 adapter.register(_mi)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from gonio.models.dielectric import Dielectric
+from gonio.materials.microfacet.dielectric import Dielectric
 from gonio.ops import where
 from gonio.optics import fresnel
 from gonio.optics.fresnel.exact import dielectric

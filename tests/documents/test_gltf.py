@@ -11,9 +11,9 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.catalog import documents
+from gonio.catalog.documents import Document, Notation
 from gonio.errors import InputError
-from gonio.models import documents
-from gonio.models.documents import Document, Notation
 
 from gltf_files import ALL, document, glb, meshed, pictured, text
 
@@ -101,7 +101,7 @@ def test_materials_are_named_by_name_or_number(tmp_path: Path, file: Path) -> No
 
 
 def test_a_parameter_may_be_set_beside_a_file(file: Path) -> None:
-    from gonio.models import notation
+    from gonio.catalog import notation
 
     assert notation.named(f"{file}:Plain(alpha=.25)")[0] == go.Metal(r0=(1.0, 1.0, 1.0), alpha=0.25)
 

@@ -10,10 +10,9 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio.documents import materialx
+from gonio.catalog import documents
+from gonio.catalog.documents import Described, Document, materialx
 from gonio.errors import InputError, MachineError
-from gonio.models import documents
-from gonio.models.documents import Described, Document
 
 HEAD = '<?xml version="1.0"?>\n<materialx version="1.39">'
 PAINT = f"""{HEAD}

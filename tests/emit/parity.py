@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import gonio as go
 import numpy as np
-from gonio.emit.program import Program
-from gonio.models import Parameter, binding, tree
+from gonio.material import Parameter, binding, tree
 from gonio.ops import backend
+from gonio.shaders.program import Program
 
 SIDE = 256  # the target is SIDE x SIDE pixels, one draw each
 COUNT = SIDE * SIDE

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gonio.emit import bundle
-from gonio.emit.bundle import layout
-from gonio.emit.languages import languages
+from gonio.shaders import bundle
+from gonio.shaders.bundle import layout
+from gonio.shaders.languages import languages
 from variants import EVERY
 
 import browser

@@ -6,8 +6,8 @@ import functools
 
 import gonio as go
 import pytest
-from gonio.emit import bundle
-from gonio.models.recording import switched_off
+from gonio.material.recording import switched_off
+from gonio.shaders import bundle
 
 from varnished import Varnished
 

@@ -14,9 +14,9 @@ import gonio as go
 import numpy as np
 import parity
 import pytest
-from gonio.emit import bundle
 from gonio.measure.formats.own import Own
 from gonio.measure.tables import angles, half_difference
+from gonio.shaders import bundle
 
 import browser
 

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import gonio as go
 import pytest
-from gonio.emit.languages import Language, languages
+from gonio.shaders.languages import Language, languages
 
 import outside
 
 VULKAN = '''
 """GLSL 4.50 as Vulkan takes it: tables are bound by number."""
 
-from gonio.emit.languages.glsl import GLSL
+from gonio.shaders.languages.glsl import GLSL
 
 
 class VulkanGLSL(GLSL):

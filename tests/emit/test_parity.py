@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import parity
 import pytest
-from gonio.emit import bundle
-from gonio.models.recording import switched_off
+from gonio.material.recording import switched_off
+from gonio.shaders import bundle
 from variants import ALIKE, EVERY, FEW, LEAN
 
 import browser

@@ -13,12 +13,12 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import cli, models, ops
-from gonio.emit import bundle
-from gonio.emit.languages import languages
-from gonio.emit.syntax import literal
-from gonio.emit.textures import pixels
 from gonio.energy.compensation import curves
 from gonio.ops import Table, lookup
+from gonio.shaders import bundle
+from gonio.shaders.languages import languages
+from gonio.shaders.syntax import literal
+from gonio.shaders.textures import pixels
 from variants import COMPENSATED, FEW, GOLD, SHAPES, written
 
 LANGS = tuple(languages())

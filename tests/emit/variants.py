@@ -6,7 +6,7 @@ import functools
 from typing import Any
 
 import gonio as go
-from gonio.emit import bundle
+from gonio.shaders import bundle
 
 import materials
 

@@ -19,7 +19,7 @@ REFERENCE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "kull
 
 def read_png(path):
     import mitsuba as mi
-    from gonio.render import engine
+    from gonio.bridge import engine
 
     engine.load("cpu")
     return np.array(mi.Bitmap(str(path)))

@@ -131,7 +131,7 @@ def test_the_hash_of_formulas_is_kept_until_a_file_changes(folder, monkeypatch):
 
 
 def test_a_distribution_that_changed_in_its_file_makes_new_tables(folder, tmp_path):
-    from gonio.models import outside
+    from gonio.catalog import outside
     from gonio.optics.ndf import NDF
 
     file = tmp_path / "mine.py"

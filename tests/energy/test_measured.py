@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gonio import ops
 from gonio.energy.albedo import quadrature
-from gonio.models import binding
-from gonio.models.base import BSDF, Value, spectrum
+from gonio.material import binding
+from gonio.material.base import BSDF, Value, spectrum
 from gonio.ops import RecordingError, backend
 
 MU = np.array([0.05, 0.1, 0.2, 0.4, 0.7, 0.95, 0.985, 0.996, 1.0])  # Oren-Nayar bends like sin(theta) at the normal
@@ -169,7 +169,7 @@ def test_values_that_vary_and_recording_are_refused():
 
 
 def test_textures_are_refused_when_the_scene_is_built():
-    from gonio.render import adapter, engine
+    from gonio.bridge import adapter, engine
 
     mi = engine.load("cpu")
     adapter.register(mi)

@@ -10,7 +10,7 @@ import pytest
 from gonio import cli
 from gonio.energy.tables import prefilter
 from gonio.energy.tables.baked import load
-from gonio.render import images
+from gonio.pictures import images
 from scipy.ndimage import map_coordinates
 
 HEIGHT, WIDTH = 64, 128

@@ -110,7 +110,8 @@ def scenes() -> list[bytes]:
 
 @target("scene-json", scenes, [b'"type"', b'"material"', b"null", b"[[", b"1e400", b"gonio-mix"])
 def scene_json(data: bytes, folder: Path) -> object:
-    from gonio.render import engine, scene
+    from gonio import scene
+    from gonio.bridge import engine
 
     return scene.build(scene.read(saved(folder / "scene.json", data)), engine.load("cpu"))
 
@@ -135,7 +136,7 @@ def calibrations() -> list[bytes]:
 def calibration_json(data: bytes, folder: Path) -> object:
     import numpy as np
     from gonio.instruments.capture.run import capture
-    from gonio.render import images
+    from gonio.pictures import images
 
     if not (folder / "a.npz").exists():
         images.write(folder / "a.npz", np.full((4, 4, 3), 0.1, np.float32))
@@ -162,14 +163,15 @@ SHAPES = (
 
 
 def _load_xml(path: Path) -> object:
-    from gonio.render import adapter, engine, lights, mitsuba_scene
-    from gonio.render.request import Request
+    from gonio.bridge import adapter, engine
+    from gonio.scene import mitsuba_scene
+    from gonio.transport.lights import lights
 
     mi = engine.load("cpu")
     mi.set_log_level(mi.LogLevel.Error)
     adapter.register(mi)
     lights.register(mi)
-    return mitsuba_scene.load(Request(path), mi)
+    return mitsuba_scene.load(mi, path, {})
 
 
 @target("scene-xml", lambda: [XML % shape for shape in SHAPES], [b"<!--", b"<bsdf>", b'"$spp"', b"&amp;", b"<include"])
@@ -203,14 +205,14 @@ def plies() -> list[bytes]:
 
 @target("obj", lambda: [OBJ], [b"f 1 2 3\n", b"v 1 2\n", b"//", b"-0"])
 def obj(data: bytes, folder: Path) -> object:
-    from gonio.render.scene import meshes
+    from gonio.scene import meshes
 
     return meshes.read_mesh(saved(folder / "a.obj", data), "here")
 
 
 @target("ply", plies, [b"property float x\n", b"property list uchar int i\n", b"element face 9\n", b"double"])
 def ply(data: bytes, folder: Path) -> object:
-    from gonio.render.scene import meshes
+    from gonio.scene import meshes
 
     return meshes.read_mesh(saved(folder / "a.ply", data), "here")
 
@@ -304,7 +306,8 @@ def _pictures(*kinds: str) -> tuple[bytes, ...]:
     """Small pictures of these formats, of several depths and channels."""
     import tempfile
 
-    from gonio.render import engine, images
+    from gonio.bridge import engine
+    from gonio.pictures import images
 
     mi, rng, found = engine.load("cpu"), np.random.default_rng(3), []
     with tempfile.TemporaryDirectory() as name, engine.file_threads():
@@ -338,8 +341,8 @@ def _picture(kind: str, tokens: Sequence[bytes] = (), repair: Callable[[bytes], 
     @target(kind, lambda: _pictures(kind), tokens, repair)
     def read(data: bytes, folder: Path) -> object:
         from gonio.errors import GonioError
-        from gonio.render import images
-        from gonio.render.scene import textures
+        from gonio.pictures import images
+        from gonio.scene import textures
 
         path = saved(folder / f"a.{kind}", data)
         with contextlib.suppress(GonioError):
@@ -382,7 +385,7 @@ def _archives() -> tuple[bytes, ...]:
 
 @target("npz", _archives, [b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06", b"'|O'", b"(4, 5, 3)", b"(1000000000,)"])
 def npz(data: bytes, folder: Path) -> object:
-    from gonio.render import images
+    from gonio.pictures import images
 
     return images.read(saved(folder / "a.npz", data))
 
@@ -504,7 +507,7 @@ def tables(data: bytes, folder: Path) -> object:
     b"two-sided(base=oren-nayar(sigma=.4))", b"alum-bronze", b"chrome:low2012/lowsmooth_E2", b"a.binary",
 ], [b"(", b")", b"=", b",", b"base=", b"alpha=", b"1e999", b"nan", b"preset=", b".py:X"])  # fmt: skip
 def material_notation(data: bytes, folder: Path) -> object:
-    from gonio.models import notation
+    from gonio.catalog import notation
 
     return notation.named(data.decode("utf-8", "surrogateescape"))
 
@@ -527,9 +530,9 @@ def _glb_repaired(data: bytes) -> bytes:
 ], _glb_repaired)  # fmt: skip
 def gltf(data: bytes, folder: Path) -> object:
     """Every material, as a text names it and as a scene holds it."""
-    from gonio.models import notation
-    from gonio.models.documents import Document
-    from gonio.render.scene.reader import read
+    from gonio.catalog import notation
+    from gonio.catalog.documents import Document
+    from gonio.scene.reader import read
 
     path = saved(folder / ("a.glb" if data[:4] == b"glTF" else "a.gltf"), data)
     found = []
@@ -559,7 +562,7 @@ if importlib.util.find_spec("MaterialX"):
         b"<nodegraph name='G'>", b'inherit="S"', b'version="9"', b'xpos="1"', b"<!--", b"<![CDATA[",
     ])  # fmt: skip
     def materialx(data: bytes, folder: Path) -> object:
-        from gonio.models.documents import Document
+        from gonio.catalog.documents import Document
 
         document, path = Document.family.get("materialx"), saved(folder / "a.mtlx", data)
         return [document.read(path, name) for name in document.materials(path)]

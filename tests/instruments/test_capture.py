@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from gonio import measure
 from gonio.errors import InputError
+from gonio.fitting.parameters import Free
 from gonio.instruments.capture import calibration, fitting, geometry, photographs, pixels, planning, rehearsal, run
-from gonio.measure.fitting.parameters import Free
-from gonio.models import tree
-from gonio.models.sum import Sum
-from gonio.render import images
+from gonio.material import tree
+from gonio.materials.combined.sum import Sum
+from gonio.pictures import images
 
 MIDDLE, AWAY, SIZE = np.array([0.0, 0.0, 500.0]), 400.0, 64
 PAINT = Sum(go.Lambert((0.3, 0.2, 0.1)), go.Conductor(eta=1.5, k=0.0, alpha=0.2, fresnel="schlick"))

@@ -20,7 +20,7 @@ from gonio.measure.tables.angles import pairs
 from gonio.measure.tables.base import Measurement
 from gonio.measure.tables.half_difference import HalfDifference, centres
 from gonio.measure.tables.samples import Samples
-from gonio.render import images
+from gonio.pictures import images
 
 SMALL = "gaussian:squares=64"
 VIEWS = [0.0, 20.0, 40.0, 60.0, 75.0]

@@ -16,7 +16,7 @@ from gonio.instruments.surfaces.gaussian import Gaussian
 from gonio.instruments.surfaces.heightfield import Heightfield
 from gonio.instruments.surfaces.spheres import SIDE, Spheres
 from gonio.instruments.surfaces.vgroove import VGroove
-from gonio.render import images
+from gonio.pictures import images
 
 
 def heights(folder: Path, values: np.ndarray, name: str = "heights.exr") -> str:

@@ -9,12 +9,12 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
+from gonio.fitting import batch, data, solver
+from gonio.fitting.fit import fit, modelled
+from gonio.fitting.parameters import free_of, start_of
+from gonio.materials.combined.sum import Sum
 from gonio.measure import format_of
-from gonio.measure.fitting import batch, data, solver
-from gonio.measure.fitting.fit import fit, modelled
-from gonio.measure.fitting.parameters import free_of, start_of
 from gonio.measure.tables.half_difference import HalfDifference, sampled
-from gonio.models.sum import Sum
 
 SHAPE = (24, 24, 36)
 METAL = go.Conductor.preset("Au", alpha=0.2)

@@ -9,10 +9,10 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import measure
+from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.measure import compare
 from gonio.measure.warp import Warp
-from gonio.models import notation
 from gonio.ops import backend
 from gonio.verify import verify
 
@@ -50,7 +50,7 @@ def test_a_table_is_recorded_as_it_is_computed(suffix: str, files: dict[str, str
 
 @pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl"])
 def test_a_shader_carries_the_tables(language: str, files: dict[str, str]) -> None:
-    from gonio.emit.bundle import bundle
+    from gonio.shaders.bundle import bundle
 
     made = bundle(go.Measured(files[".binary"]), language)
     sizes = {name.rpartition("_")[0]: values.shape for name, values in made.tables.items()}
@@ -68,7 +68,7 @@ def test_a_file_is_a_material_wherever_one_is_named(files: dict[str, str]) -> No
 
 
 def test_a_scene_takes_a_file_of_its_own_folder_only(scene: Path, files: dict[str, str]) -> None:
-    from gonio.render import scene as scenes
+    from gonio import scene as scenes
 
     text = json.loads((scene / "scene.json").read_text())
     (scene / "gold.binary").write_bytes(Path(files[".binary"]).read_bytes())

@@ -8,7 +8,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.models import guide_search
+from gonio.material import guide_search
 from gonio.ops import backend, dot, exp, sqr, vec3, where
 from gonio.verify import verify
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
-from gonio.models import binding
+from gonio.material import binding
 from gonio.ops import backend
 
 from materials import SMALL

@@ -8,7 +8,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio.models import library, notation
+from gonio.catalog import library, notation
 from gonio.verify import quality
 from gonio.verify.subject import Subject
 
@@ -83,7 +83,7 @@ def test_scenes_take_names(scene: Path) -> None:
     raw = json.loads((scene / "scene.json").read_text())
     raw["scene"]["shapes"][0]["material"] = {"type": "chrome:low2012/cooktorrance_E2"}
     (scene / "scene.json").write_text(json.dumps(raw))
-    from gonio.render.scene.reader import read
+    from gonio.scene.reader import read
 
     material = read(scene / "scene.json").contents.shapes[0].material
     assert material.model is go.model("cook-torrance") and material.preset == "chrome:low2012/cooktorrance_E2"
@@ -93,7 +93,7 @@ def test_a_misspelt_name_in_a_scene_is_told_with_its_place(scene: Path) -> None:
     raw = json.loads((scene / "scene.json").read_text())
     raw["scene"]["shapes"][0]["material"] = {"type": "alum-bronz"}
     (scene / "scene.json").write_text(json.dumps(raw))
-    from gonio.render.scene.reader import read
+    from gonio.scene.reader import read
 
     with pytest.raises(go.InputError, match="did you mean 'alum-bronze'") as error:
         read(scene / "scene.json")

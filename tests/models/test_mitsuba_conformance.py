@@ -36,7 +36,7 @@ BAR = 1e-4
 @pytest.fixture(scope="module")
 def native() -> Any:
     """eval and pdf of a native plugin: dict -> ((N, 3), (N,)) for WO, WI."""
-    from gonio.render import engine
+    from gonio.bridge import engine
 
     mi = engine.load()
     import drjit as dr

@@ -120,8 +120,8 @@ def test_a_bump_is_the_slope_of_its_heights_over_lengths_of_the_surface(bumps: P
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
-    from gonio.render import adapter
-    from gonio.render.scene import textures
+    from gonio.bridge import adapter
+    from gonio.scene import textures
 
     adapter.register(mi)
     level = {name: textures.bitmap(mi, np.full((2, 2, 1), value, np.float32), "bilinear", "repeat")

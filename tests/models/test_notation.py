@@ -5,9 +5,9 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
+from gonio.catalog import notation
 from gonio.errors import InputError
-from gonio.models import notation
-from gonio.models.base import BSDF, Value, number, spectrum
+from gonio.material.base import BSDF, Value, number, spectrum
 
 
 def same(a: BSDF, b: BSDF) -> bool:

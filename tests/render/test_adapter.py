@@ -9,7 +9,7 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio.render import engine
+from gonio.bridge import engine
 
 from sphere import at, random_directions, random_numbers
 
@@ -408,7 +408,7 @@ def test_another_scene_with_other_values_compiles_no_kernel() -> None:
 
 
 def test_registering_again_changes_nothing() -> None:
-    from gonio.render import adapter
+    from gonio.bridge import adapter
 
     for _ in range(3):
         adapter.register(mi)

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 from gonio import cli
-from gonio.render import bench, engine
+from gonio.bridge import engine
+from gonio.render import bench
 
 
 def test_the_table_has_rays_a_material_and_integrators_beside_mitsubas(

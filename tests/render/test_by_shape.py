@@ -10,11 +10,11 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio.render import engine
-from gonio.render.scene import read
+from gonio.bridge import engine
+from gonio.scene import read
 
 mi = engine.load()
-build = importlib.import_module("gonio.render.scene.build")  # the function of that name hides it
+build = importlib.import_module("gonio.scene.build")  # the function of that name hides it
 
 Material = dict[str, Any]
 

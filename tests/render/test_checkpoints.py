@@ -11,8 +11,11 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import GonioWarning, InputError
-from gonio.render import checkpoints, engine, images, passes, run
+from gonio.pictures import images
+from gonio.render import checkpoints, run
+from gonio.transport import passes
 from gonio.work import facts, kept
 
 
@@ -238,9 +241,9 @@ from test_run import XML  # noqa: E402
 
 @pytest.mark.parametrize("integrator", [None, "path"])
 def test_a_mitsuba_scene_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str | None) -> None:
-    from gonio.render import mitsuba_scene
+    from gonio.transport import mitsuba_render
 
-    monkeypatch.setattr(mitsuba_scene, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
+    monkeypatch.setattr(mitsuba_render, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
     xml = tmp_path / "ball.xml"
     xml.write_text(XML)
     whole = go.render(xml, spp=8, integrator=integrator)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from gonio.render import engine, sky
+from gonio.bridge import engine
+from gonio.transport.lights import sky
 
 
 @pytest.mark.parametrize("count", [2, sky.SHORT, 256])

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from gonio.errors import InputError, MachineError
-from gonio.render import denoise, metrics
+from gonio.pictures import denoise, metrics
 
 
 @pytest.fixture

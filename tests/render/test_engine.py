@@ -7,7 +7,8 @@ from pathlib import Path
 
 import drjit as dr
 import numpy as np
-from gonio.render import engine, images
+from gonio.bridge import engine
+from gonio.pictures import images
 
 import one_cpu
 

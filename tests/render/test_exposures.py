@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.render import exposures
+from gonio.pictures import exposures
 
 
 def picture(*shares: tuple[float, float]) -> exposures.RGB:

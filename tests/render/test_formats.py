@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, formats, images, run
+from gonio.pictures import formats, images
+from gonio.render import run
 
 
 def radiance(width: int, height: int, lines: bytes) -> bytes:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gonio.errors import InputError, MachineError
-from gonio.render import images
+from gonio.pictures import images
 
 SETTINGS: images.Metadata = {"scene": 'kd "müll"', "spp": 64, "seed": 3, "time": 1.25, "integrator": "path"}
 

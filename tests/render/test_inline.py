@@ -6,7 +6,9 @@ import gonio as go
 import drjit as dr
 import numpy as np
 import pytest
-from gonio.render import engine, inline, surfaces
+from gonio.bridge import engine
+from gonio.transport import surfaces
+from gonio.transport.fast import inline
 
 RAYS = 50_000
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, lights
-from gonio.render.integrators import Integrator, Render, Settings, progressive, transport
-from gonio.render.integrators.base import SAMPLERS
+from gonio.transport.integrators import Integrator, Render, Settings, progressive, transport
+from gonio.transport.integrators.base import SAMPLERS
+from gonio.transport.lights import lights
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from gonio.render import engine, lights, solid_angles
+from gonio.bridge import engine
+from gonio.transport.lights import lights, solid_angles
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

@@ -214,8 +214,9 @@ def test_more_media_than_a_path_can_count_are_one_clear_error(tmp_path: Path) ->
 
 
 def test_scenes_without_absorption_or_priorities_ask_for_no_media(tmp_path: Path) -> None:
-    from gonio.render import engine, scene
-    from gonio.render.integrators import Render, Settings
+    from gonio import scene
+    from gonio.bridge import engine
+    from gonio.transport.integrators import Render, Settings
 
     rendered(tmp_path, [slab(-1, 1)], spp=1)
     render = Render(scene.build(scene.read(tmp_path / "scene.json"), engine.load()), Settings("path"))

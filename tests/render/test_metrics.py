@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.render import metrics
+from gonio.pictures import metrics
 
 
 @pytest.fixture

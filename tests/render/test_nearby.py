@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gonio.render import engine, nearby
-from gonio.render.integrators import Render, Settings
+from gonio.bridge import engine
+from gonio.transport.fast import nearby
+from gonio.transport.integrators import Render, Settings
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

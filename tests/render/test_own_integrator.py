@@ -11,15 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, images, integrators, run
+from gonio.pictures import images
+from gonio.render import run
+from gonio.transport import integrators
 
 mi = engine.load()
 
 OCCLUSION = '''
 import drjit as dr
-from gonio.render.integrators import Integrator, Transport
-from gonio.render.integrators.base import FIRST_FREE
+from gonio.transport.integrators import Integrator, Transport
+from gonio.transport.integrators.base import FIRST_FREE
 
 
 class Occlusion(Integrator):

@@ -6,7 +6,8 @@ import gonio as go
 import drjit as dr
 import numpy as np
 import pytest
-from gonio.render import engine, surfaces
+from gonio.bridge import engine
+from gonio.transport import surfaces
 
 
 def _placed(mi, rng, *scale):

@@ -8,8 +8,8 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.optics.fresnel import waves
-from gonio.render import engine
 
 from sphere import random_directions, random_numbers
 

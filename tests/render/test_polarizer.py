@@ -10,8 +10,10 @@ import gonio as go
 import mitsuba as mi
 import numpy as np
 import pytest
+from gonio import scene
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, run, scene
+from gonio.render import run
 
 ETA = 1.5
 SIZE = (24, 16)

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gonio.render import adapter, engine, lights
-from gonio.render.integrators import Render, Settings
+from gonio.bridge import adapter, engine
+from gonio.transport.integrators import Render, Settings
+from gonio.transport.lights import lights
 
 mi = engine.load()
 lights.register(mi)

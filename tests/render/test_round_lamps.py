@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from gonio.render import engine, inline, lights, solid_angles
-from gonio.render.integrators import Render, Settings
+from gonio.bridge import engine
+from gonio.transport.fast import inline
+from gonio.transport.integrators import Render, Settings
+from gonio.transport.lights import lights, solid_angles
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

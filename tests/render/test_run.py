@@ -12,8 +12,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import InputError, MachineError
-from gonio.render import denoise, engine, images, mitsuba_scene, passes, run
+from gonio.pictures import denoise, images
+from gonio.render import run
+from gonio.transport import mitsuba_render, passes
 
 PIXELS = 300_000
 
@@ -263,7 +266,7 @@ def test_a_mitsuba_scene_renders_with_gonio_materials(xml: Path, tmp_path: Path)
 
 
 def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mitsuba_scene, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
+    monkeypatch.setattr(mitsuba_render, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
 
     def rendered(seed: int) -> np.ndarray:
         prepared = run.prepare(run.Request(xml, spp=6, seed=seed))
@@ -340,7 +343,7 @@ def test_pictures_of_one_channel_become_grey() -> None:
     sensor = SimpleNamespace(film=Film, sampler=lambda: SimpleNamespace(sample_count=lambda: 1))
     scene = SimpleNamespace(sensors=lambda: [sensor], integrator=lambda: None)
     mi = SimpleNamespace(render=lambda *a, **k: np.array([[[1.0], [2.0]]], np.float32))
-    render = mitsuba_scene.MitsubaRender(mi, scene, spp=1)  # type: ignore[arg-type]
+    render = mitsuba_render.MitsubaRender(mi, scene, spp=1)  # type: ignore[arg-type]
     render.advance(1)
     assert render.image().tolist() == [[[1, 1, 1], [2, 2, 2]]]
 

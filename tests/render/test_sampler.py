@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from gonio.render import engine, sampler
+from gonio.bridge import engine
+from gonio.transport import sampler
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

@@ -10,8 +10,10 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio import scene
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, run, scene
+from gonio.render import run
 
 
 def scene_with(shapes: list, lights: list | None = None, **changes: Any) -> dict:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gonio import scene
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, scene
-from gonio.render.scene import meshes, textures
+from gonio.scene import meshes, textures
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from gonio import scene
 from gonio.errors import InputError
-from gonio.render import scene
-from gonio.render.scene.text import MAX_DEPTH
+from gonio.scene.text import MAX_DEPTH
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -112,7 +112,7 @@ def test_samples_and_sampler_types(tmp_path):
 
 
 def test_every_model_is_a_type_and_the_lab_s_names_keep_their_meaning(tmp_path):
-    from gonio.models import models
+    from gonio.material import models
 
     for name, model in models().items():
         inner = {p.name: {"type": "gonio-conductor"} for p in model.parameters().values() if p.kind == "bsdf"}
@@ -522,7 +522,7 @@ def test_damaged_text_reads_or_is_refused_but_nothing_else(tmp_path, data):
 
 @pytest.mark.shared
 def test_the_course_s_scenes_read_and_build_unmodified():
-    from gonio.render import engine
+    from gonio.bridge import engine
 
     folder = REPOSITORY.parent / "shared" / "scenes"
     if not folder.is_dir():

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gonio.render import engine, sky
-from gonio.render.integrators import Render, Settings
+from gonio.bridge import engine
+from gonio.transport.integrators import Render, Settings
+from gonio.transport.lights import sky
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

@@ -10,12 +10,13 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio import scene
+from gonio.bridge import adapter, engine
+from gonio.bridge.adapter.variant import SEPARATES
 from gonio.errors import InputError
-from gonio.render import adapter, engine, scene
-from gonio.render.adapter.variant import SEPARATES
-from gonio.render.integrators import Render, Settings
-from gonio.render.scene import spectra
-from gonio.render.scene.values import Blackbody, Daylight, Led
+from gonio.scene import spectra
+from gonio.scene.values import Blackbody, Daylight, Led
+from gonio.transport.integrators import Render, Settings
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

@@ -8,11 +8,12 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import engine, lights
-from gonio.render.integrators import Render, Settings
-from gonio.render.integrators.caustics import Caustics
-from gonio.render.photons import Photon, PhotonMap
+from gonio.transport.integrators import Render, Settings
+from gonio.transport.integrators.caustics import Caustics
+from gonio.transport.lights import lights
+from gonio.transport.photons import Photon, PhotonMap
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

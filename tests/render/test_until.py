@@ -8,11 +8,14 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.bridge import engine
+from gonio.bridge.types import Scene
 from gonio.errors import GonioWarning, InputError
-from gonio.render import engine, images, run, until
-from gonio.render.integrators import Render, Settings, caustics
-from gonio.render.integrators.progressive import SHARE, tiles
-from gonio.render.types import Scene
+from gonio.pictures import images
+from gonio.render import run
+from gonio.transport import until
+from gonio.transport.integrators import Render, Settings, caustics
+from gonio.transport.integrators.progressive import SHARE, tiles
 from gonio.work import crew, kept
 
 OPTIONS = {"size": (48, 32), "seed": 5}

@@ -10,8 +10,9 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio.render import adapter, engine, integrators
-from gonio.render.adapter.variant import Variant
+from gonio.bridge import adapter, engine
+from gonio.bridge.adapter.variant import Variant
+from gonio.transport import integrators
 
 from sphere import random_directions, random_numbers
 
@@ -273,7 +274,7 @@ assert abs(value[1 % len(value)][0] / expected - 1) < 0.02, (value, expected)
 def test_a_preset_sets_choices_and_numbers_of_a_plugin() -> None:
     from collections.abc import Mapping
 
-    from gonio.models import BSDF, Preset, choice, spectrum
+    from gonio.material import BSDF, Preset, choice, spectrum
 
     class Paint(BSDF):
         """A diffuse surface that is matte or dead."""

@@ -11,8 +11,8 @@ import gonio as go
 import numpy as np
 from gonio import ops
 from drjit.llvm.ad import Array3f, Float
-from gonio.emit import bundle
-from gonio.models.microfacet import Terms
+from gonio.materials.microfacet.microfacet import Terms
+from gonio.shaders import bundle
 from numpy.typing import NDArray
 
 Numbers = NDArray[np.floating]

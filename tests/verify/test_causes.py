@@ -10,11 +10,12 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.models import Sample
-from gonio.models.base import Value, number
+from gonio.material import Sample
+from gonio.material.base import Value, number
 from gonio.ops import abs, dot, safe_div, sqr, vec3, where
 from gonio.optics import frame
-from gonio.verify import crowding, verify
+from gonio.verify import verify
+from gonio.verify.forensics import crowding
 from gonio.verify.laws import laws
 from gonio.verify.laws import pdf as pdf_law
 from gonio.verify.subject import of

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import gonio as go
 import numpy as np
 import pytest
-from gonio.models import Sample
+from gonio.material import Sample
 from gonio.ops import where
 from gonio.verify import severity, verify
 from gonio.verify.severity import Bias, Grade

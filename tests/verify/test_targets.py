@@ -8,7 +8,8 @@ from pathlib import Path
 import gonio as go
 import pytest
 from gonio.cli import main
-from gonio.verify import targets, verify, watch
+from gonio.verify import targets, verify
+from gonio.verify.isolation import watch
 
 HEAD = "import gonio as go\nfrom gonio.ops import where, inv_pi\n\n\n"
 GOOD = """class Good(go.BSDF):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gonio.render import metrics
-from gonio.render.images import Picture
+from gonio.pictures import metrics
+from gonio.pictures.images import Picture
 from gonio.viewer import error_map
 
 

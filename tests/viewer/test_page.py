@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from gonio import cli
 from gonio.errors import InputError, MachineError
-from gonio.models import models
+from gonio.material import models
 from gonio.optics import indices
 from gonio.viewer import lab_scene, page, stage
 

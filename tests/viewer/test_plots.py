@@ -8,8 +8,9 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
+from gonio.catalog import notation
 from gonio.errors import InputError
-from gonio.models import models, notation
+from gonio.material import models
 from gonio.viewer import curves, fresnel_figure, lobes, plots
 
 METAL = '{"type": "conductor", "preset": "Au", "alpha": 0.3}'

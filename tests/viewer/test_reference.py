@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.ops.backend import drjit
-from gonio.render import integrators
+from gonio.transport import integrators
 from gonio.viewer import messages, stage
 from gonio.viewer.reference import Reference
 

@@ -1,7 +1,7 @@
 """The page's panels: what they plot is what the models say, read back as floats from the browser.
 
 The page is the one that `gonio view --export` writes, opened from disk. Its evaluator runs the emitted shaders; here
-their numbers meet the float64 of Python, and the page's metrics those of `gonio.render.metrics`.
+their numbers meet the float64 of Python, and the page's metrics those of `gonio.pictures.metrics`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio.render import metrics
+from gonio.pictures import metrics
 from gonio.viewer import page as page_file
 from gonio.viewer import stage
 from web_page import COARSE

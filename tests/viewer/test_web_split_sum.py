@@ -11,7 +11,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.energy.tables import prefilter
-from gonio.render import images
+from gonio.pictures import images
 from gonio.viewer import page as page_file
 from gonio.viewer import stage
 from scipy.ndimage import label

@@ -8,7 +8,7 @@ Offers = list[tuple[str, str]]  # what may stand here, and what it is
 
 
 def materials(incomplete: str) -> Offers:
-    from ..models import models
+    from ..material import models
 
     return _starting(incomplete, {name: _first_line(cls) for name, cls in models().items()})
 
@@ -22,7 +22,7 @@ def materials_and_distributions(incomplete: str) -> Offers:
 
 
 def languages(incomplete: str) -> Offers:
-    from ..emit.languages import languages
+    from ..shaders.languages import languages
 
     return _starting(incomplete, {name: language.title for name, language in languages().items()})
 
@@ -41,7 +41,7 @@ def laws(incomplete: str) -> Offers:
 
 def presets(context: typer.Context, incomplete: str) -> Offers:
     """The presets of the material that is named earlier on the line; without one, those of all."""
-    from ..models import models
+    from ..material import models
 
     first = next(iter(context.params.values()), None)
     names = [first] if isinstance(first, str) else first if isinstance(first, list) else []

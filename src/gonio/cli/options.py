@@ -14,7 +14,7 @@ from typer import Argument, Option
 from . import completion
 
 if TYPE_CHECKING:
-    from ..models import BSDF
+    from ..material import BSDF
     from ..render.run import Request
 
 Model = Annotated[
@@ -45,7 +45,7 @@ class Material:
 
     def texts(self, models: Sequence[str]) -> list[str]:
         """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share what they have."""
-        from ..models import notation
+        from ..catalog import notation
 
         shared = [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
         if not shared:
@@ -63,8 +63,8 @@ class Material:
     def instead_of(self, scene: Path) -> BSDF | None:
         """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
         is no material's name. Raises InputError for parameters without a material."""
+        from ..catalog import notation, outside
         from ..errors import InputError
-        from ..models import notation, outside
 
         text = str(scene)
         head = text.partition("(")[0]
@@ -125,7 +125,8 @@ class Rendering:
     ) -> Request:
         """The request to render a scene, or a material on a ball. Raises InputError for a size or an exposure that is
         none."""
-        from ..render import exposures, run
+        from ..pictures import exposures
+        from ..render import run
 
         return run.Request(
             Path(material.name) if material else scene,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
-    from ..render.passes import Progress
+    from ..transport.passes import Progress
 
 
 def print_warnings(warnings: tuple[str, ...]) -> None:

@@ -17,19 +17,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import files
+from .. import files, scene
+from ..bridge import engine
+from ..bridge.types import MitsubaBSDF
+from ..catalog import notation
 from ..errors import InputError, did_you_mean
-from ..measure.fitting.fit import NORMAL_95, moving_of, notes_on
-from ..measure.fitting.parameters import CHANNELS, Free, start_of, with_values
-from ..measure.fitting.solver import Linearized, columns_of, solve
-from ..models import BSDF, notation, tree
+from ..fitting.fit import NORMAL_95, moving_of, notes_on
+from ..fitting.parameters import CHANNELS, Free, start_of, with_values
+from ..fitting.solver import Linearized, columns_of, solve
+from ..material import BSDF, tree
 from ..owner import public
-from ..render import engine, images, scene
-from ..render.gradients import Along, Gradients, material_at, place_of
-from ..render.integrators import Render, Settings
-from ..render.scene.build import Built
-from ..render.scene.schema import SceneDescription
-from ..render.types import MitsubaBSDF
+from ..pictures import images
+from ..scene.build import Built
+from ..scene.derivatives import material_at, place_of
+from ..scene.schema import SceneDescription
+from ..transport.gradients import Along, Gradients
+from ..transport.integrators import Render, Settings
 from ..work import garbage
 
 Floats = NDArray[np.float64]

@@ -7,10 +7,8 @@ compare.convert("gold.binary", "gold.bsdf").error    in another format, and how 
 from __future__ import annotations
 
 import os
-from importlib import import_module
 from pathlib import Path
 
-from .._callable import make_callable
 from ..errors import InputError, did_you_mean
 from .formats.base import Format, by_suffix, contents
 from .tables.base import Measurement
@@ -75,11 +73,3 @@ def read(file: str | os.PathLike[str]) -> Measurement:
     while len(_read) > KEPT:
         _read.pop(next(iter(_read)))
     return known[1]
-
-
-def _measured(*args: object, **options: object) -> object:
-    """`go.measure(...)`: the virtual goniometer's, found by its name when it is called, as its room stands above."""
-    return import_module("..instruments.goniometer.run", __name__).measure(*args, **options)
-
-
-make_callable(__name__, _measured)

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .._callable import make_callable
 from ..owner import public
 
 if TYPE_CHECKING:
-    from ..models import BSDF
-    from .exposures import RGB, Exposure
+    from ..material import BSDF
+    from ..pictures.exposures import RGB, Exposure
     from .request import Request
 
 
@@ -71,7 +70,7 @@ def render(
                    "....albedo.r" along one. Materials that are equal are one, and move together
     Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
     """
-    from ..models import BSDF
+    from ..material import BSDF
     from . import run
 
     request = run.Request(
@@ -97,7 +96,7 @@ def render(
         until_error=until_error,
         gradient=tuple(gradient),
     )
-    return _picture(request, level=6)  # past the checks, the lock and the call of the module
+    return _picture(request, level=5)  # past the checks and the lock
 
 
 @public
@@ -136,8 +135,10 @@ def _picture(request: Request, level: int) -> RGB:
     """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
     import warnings
 
+    from ..bridge import engine
     from ..errors import GonioWarning
-    from . import checkpoints, engine, images, run
+    from ..pictures import images
+    from . import checkpoints, run
 
     notices: list[str] = []
     output, exposure = request.output, request.exposure
@@ -160,6 +161,3 @@ def _picture(request: Request, level: int) -> RGB:
     for notice in notices:
         warnings.warn(notice, GonioWarning, stacklevel=level)
     return picture if not request.gradient else run.with_slopes(prepared, picture)
-
-
-make_callable(__name__, render)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from types import ModuleType
 
-from . import engine
-from .types import MitsubaBSDF, PluginDict, Scene
+from ..bridge import engine
+from ..bridge.types import MitsubaBSDF, PluginDict, Scene
 
 LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU is done with a million before Python has launched the next
 SIZE, SPP = {"llvm": 256, "cuda": 1024}, 16
@@ -39,8 +39,9 @@ def measure(device: str = "cpu") -> tuple[str, list[Row]]:
     lanes, size = (by_kind[mi.variant()[:4]] for by_kind in (LANES, SIZE))
     import drjit as dr
 
-    from . import adapter, lights
-    from .integrators import Render, Settings
+    from ..bridge import adapter
+    from ..transport.integrators import Render, Settings
+    from ..transport.lights import lights
 
     adapter.register(mi)
     lights.register(mi)

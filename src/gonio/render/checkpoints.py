@@ -20,12 +20,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..bridge import engine
+from ..catalog import notation
 from ..errors import GonioError, InputError
-from ..models import BSDF, notation
+from ..material import BSDF
+from ..transport.passes import Progress, Renders
 from ..work import facts, garbage, kept
 from ..work.kept import Arrays, Facts
-from . import engine
-from .passes import Progress, Renders
 from .request import Request
 
 if TYPE_CHECKING:

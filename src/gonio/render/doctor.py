@@ -13,8 +13,10 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 
-from .. import __version__, llvm
-from . import denoise, engine
+from .. import llvm
+from .._version import __version__
+from ..bridge import engine
+from ..pictures import denoise
 
 # Rays through Embree or OptiX, a Gonio material by its plugin, a compiled kernel: all that a render needs.
 _TRIAL = """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,17 +10,13 @@ from pathlib import Path
 
 from .. import files
 from ..errors import InputError
-from ..models import BSDF
-from . import denoise, exposures, images
-
-# Per pixel: 9 sums in float64, twice (before and after a pass), lane order, picture as float64 and float32, the
-# file's bytes. It is the estimate by which a film is refused as too large.
-BYTES_PER_PIXEL = 250
+from ..material import BSDF
+from ..pictures import denoise, exposures, images
+from ..scene.film import check_film
 
 MOST = 1 << 30  # samples a pixel, and segments: kernels count them in 32 bits
 UNTIL_MOST = 1 << 16  # samples per pixel until an error is reached, where nobody says how many at most
 MOST_THREADS = 1024
-LONGEST_SIDE = 1 << 16  # of a film, pixels
 
 
 @dataclass(frozen=True)
@@ -96,26 +91,3 @@ def parse_size(text: str) -> tuple[int, int]:
     if not match:
         raise InputError(f"'{text}' is no size", "--size", "give width x height in pixels, such as 640x480")
     return int(match[1]), int(match[2])
-
-
-def check_film(size: tuple[int, int], where: str) -> None:
-    """Raise InputError for a film without pixels, or one that one sample per pixel would not fit the memory."""
-    width, height = size
-    if width < 1 or height < 1:
-        raise InputError(f"a film of {width}x{height} has no pixels", where, "give 1x1 or more")
-    needed = width * height * BYTES_PER_PIXEL
-    if needed > memory():
-        gib = 1 << 30
-        what = f"a film of {width}x{height} needs about {needed / gib:.0f} GiB"
-        raise InputError(f"{what}, this machine has {memory() / gib:.0f} GiB", where, "give a smaller size")
-    if max(width, height) > LONGEST_SIDE:
-        what = f"a film of {width}x{height} is longer than {LONGEST_SIDE} pixels"
-        raise InputError(what, where, "give a smaller size")
-
-
-def memory() -> int:
-    """Bytes of memory in this machine; a guess of 8 GiB where the system does not tell."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return 8 << 30

@@ -16,17 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..bridge import engine
 from ..errors import InputError, did_you_mean
+from ..pictures import denoise, images
+from ..scene import mitsuba_scene
+from ..scene.film import check_film
+from ..transport.mitsuba_render import MitsubaRender
+from ..transport.passes import Interrupts, Progress, Renders, run
 from ..work import crew, facts, garbage
-from . import checkpoints, denoise, engine, images, mitsuba_scene
+from . import checkpoints
 from .checkpoints import Keeper, Sources
-from .passes import Interrupts, Progress, Renders, run
-from .request import UNTIL_MOST, Request, check_film, parse_size
+from .request import UNTIL_MOST, Request, parse_size
 
 if TYPE_CHECKING:
-    from . import integrators, until
-    from .integrators import Settings
-    from .types import Scene
+    from ..bridge.types import Scene
+    from ..transport import integrators, until
+    from ..transport.integrators import Settings
 
 __all__ = ["Prepared", "Request", "Result", "finished", "parse_size", "prepare", "render", "run"]
 
@@ -93,7 +98,8 @@ def _nearby(path: Path) -> str:
 
 
 def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
-    from . import integrators, polarizer, scene
+    from .. import scene
+    from ..transport import integrators, polarizer
 
     overrides: dict[str, object] = dict(request.overrides)
     if request.size is not None:
@@ -126,7 +132,8 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     built = scene.built(description, mi, gathers=not request.gradient)
     render: Renders
     if request.gradient:
-        from .gradients import Gradients, along
+        from ..scene.derivatives import along
+        from ..transport.gradients import Gradients
 
         render = Gradients(built.scene, settings, [along(description, built, path) for path in request.gradient])
     elif degrees is None:
@@ -147,7 +154,7 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
 
 def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.Render | until.Until:
     """A render by one of Gonio's own integrators."""
-    from . import integrators, until
+    from ..transport import integrators, until
 
     if request.until_error is None:
         return integrators.Render(built, settings, aovs=request.denoise)
@@ -202,7 +209,7 @@ def _code_of(program: type) -> str:
 
 def _settings(scene: Settings, request: Request) -> Settings:
     """The command line's wishes over the scene's."""
-    from .integrators.base import Integrator, check_sampler
+    from ..transport.integrators.base import Integrator, check_sampler
 
     if request.integrator is not None:
         Integrator.family.get(request.integrator, "--integrator")
@@ -219,7 +226,7 @@ def _settings(scene: Settings, request: Request) -> Settings:
 
 def _own(settings: Settings) -> dict[str, images.Value]:
     """What a picture says about one of our own integrators."""
-    from . import sampler
+    from ..transport import sampler
 
     found: dict[str, images.Value] = {
         "integrator": settings.integrator,
@@ -246,7 +253,9 @@ def _metadata(request: Request, mi: ModuleType, **how: images.Value) -> dict[str
 
 
 def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
-    from . import adapter, integrators, lights
+    from ..bridge import adapter
+    from ..transport import integrators
+    from ..transport.lights import lights
 
     if request.integrator is None:
         options = {"--max-depth": request.max_depth, "--sampler": request.sampler}
@@ -259,7 +268,14 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
         raise InputError(what, "gradient", "give a folder or a .json")
     adapter.register(mi)
     lights.register(mi)
-    scene = mitsuba_scene.load(request, mi)
+    scene = mitsuba_scene.load(
+        mi,
+        request.scene,
+        request.overrides,
+        allow_outside=request.allow_outside,
+        size=request.size,
+        own_integrator=request.integrator is None,
+    )
     output = request.output or Path(request.scene.stem + ".exr")
     images.check_writable(output)
     sensor = scene.sensors()[0]
@@ -273,7 +289,7 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
         how, all_ = _own(settings), _how(settings, request)
     else:
         seed = request.seed or 0
-        render = mitsuba_scene.MitsubaRender(mi, scene, spp, seed)
+        render = MitsubaRender(mi, scene, spp, seed)
         how = {
             "integrator": f"mitsuba:{scene.integrator().class_name()}",
             "sampler": f"mitsuba:{sensor.sampler().class_name()}",
@@ -302,7 +318,8 @@ def work(
     long       seconds that such a job must take; a minute where None
     tell       called at the start with what was found
     """
-    from . import integrators, tiles, until
+    from ..transport import integrators, until
+    from . import tiles
 
     request, (width, height) = prepared.request, prepared.size
     path = request.checkpoint or temporary
@@ -357,7 +374,8 @@ def by_crew(
     finished: Callable[[int], None] = lambda index: None,
 ) -> str:
     """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
-    from . import integrators, tiles
+    from ..transport import integrators
+    from . import tiles
 
     jobs = []
     for one in prepared:

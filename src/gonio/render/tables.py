@@ -19,14 +19,15 @@ from typing import Any
 import numpy as np
 
 from .. import files
+from ..catalog import notation, outside
 from ..energy.tables import bake as baking
 from ..energy.tables import prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, models, notation, outside
+from ..material import BSDF, models
 from ..optics.ndf import distributions
 from ..owner import public
-from . import images
+from ..pictures import images
 
 
 @public

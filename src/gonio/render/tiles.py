@@ -23,13 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..transport import passes
+from ..transport.integrators import Render
+from ..transport.integrators.progressive import LANES
+from ..transport.passes import Progress
+from ..transport.polarizer import PolarizedRender
 from ..work import crew, facts
 from ..work.kept import Arrays, Facts
-from . import checkpoints, passes
-from .integrators import Render
-from .integrators.progressive import LANES
-from .passes import Progress
-from .polarizer import PolarizedRender
+from . import checkpoints
 from .request import Request
 
 if TYPE_CHECKING:

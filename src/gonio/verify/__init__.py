@@ -12,8 +12,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .._callable import make_callable
-
 _PLACES = {"EFFORTS": "effort", "Card": "verdict", "Report": "report", "Verdict": "verdict", "verify": "run"}
 
 if TYPE_CHECKING:
@@ -30,5 +28,3 @@ else:
 
 
 __all__ = ["EFFORTS", "Card", "Report", "Verdict", "verify"]
-
-make_callable(__name__, lambda *args, **options: import_module(".run", __name__).verify(*args, **options))

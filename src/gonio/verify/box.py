@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..models import BSDF, Parameter, tree
-from ..models.parameters import pair_of
+from ..material import BSDF, Parameter, tree
+from ..material.parameters import pair_of
 from . import directions
 from .effort import Effort
 from .subject import Fault, Subject

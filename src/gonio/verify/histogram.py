@@ -22,7 +22,7 @@ import numpy as np
 from ..energy.albedo.cells import Seen, product, rim, step_aside
 from ..ops import backend
 from ..ops.backend import Array, Types
-from ..render.sampler import mix, unit
+from ..transport.sampler import mix, unit
 from . import directions, statistics
 from .subject import Subject, guarded
 

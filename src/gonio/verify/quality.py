@@ -15,8 +15,9 @@ import warnings
 
 import numpy as np
 
+from ..catalog import notation
 from ..errors import GonioError, GonioWarning, InputError
-from ..models import BSDF, models, notation
+from ..material import BSDF, models
 from . import directions
 from .subject import Fault, Subject
 from .subject import of as subject_of

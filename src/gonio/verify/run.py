@@ -12,17 +12,18 @@ from typing import NamedTuple
 
 from .. import members
 from ..errors import GonioWarning, InputError
-from ..models import BSDF
+from ..material import BSDF
 from ..owner import public
-from . import box, diagnosis, directions, quality, statistics, subject
+from . import box, directions, quality, statistics, subject
 from .box import Place
 from .ci.outputs import Outputs
 from .effort import EFFORTS, ELSEWHERE, Effort
+from .forensics import diagnosis
+from .isolation.watch import limited
 from .laws import Law, chosen
 from .report import SIGNIFICANCE, Report
 from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, Finding, Verdict
-from .watch import limited
 
 DEFAULT_SEED = 1
 # what is asked of a subject besides the laws
@@ -88,7 +89,7 @@ def verify(
         own = any(name in one for one in all_ if isinstance(one, str) for name in members.registered)
         isolated = all(isinstance(one, str) for one in all_) and not own and bool(sys.executable)
     if isolated:
-        from . import child
+        from .isolation import child
 
         asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.object_(one) for one in all_]
         task = child.Task(asked_of, effort, seed, names)

@@ -19,11 +19,13 @@ from typing import Any
 
 import numpy as np
 
+from ..catalog import notation
 from ..errors import GonioError, InputError
-from ..models import BSDF, Breach, Parameter, Sample, models, notation, tree
-from ..models.sample import SampleArrays
+from ..material import BSDF, Breach, Parameter, Sample, models, tree
+from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
-from . import directions, severity, watch
+from . import directions, severity
+from .isolation import watch
 
 
 class Fault(Exception):

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from ..catalog import library, notation, outside
 from ..errors import InputError
-from ..models import library, notation, outside
 from .subject import Subject
 
 STEPS = 5  # of a sweep
@@ -57,12 +57,12 @@ def _sweep(text: str) -> tuple[str, list[str]]:
 
 def _build(target: str, given: dict[str, str]) -> Subject:
     if target.startswith("mitsuba:"):
-        from ..render import foreign
+        from ..bridge import foreign
 
         values = {key: _property(value) for key, value in given.items()}
         return Subject(foreign.plugin(target.removeprefix("mitsuba:"), values), target, values)
     if outside.names_code(target):
-        from ..render import foreign
+        from ..bridge import foreign
 
         properties = {key: _property(value) for key, value in given.items()}
         plugin = foreign.plugin_in(target, properties)
@@ -103,7 +103,8 @@ def _property(text: str) -> Any:
 
 
 def _from_file(target: str, given: dict[str, str]) -> Subject:
-    from ..render import foreign
+    from ..bridge import foreign
+    from ..scene import mitsuba_scene
 
     values = {key: _property(value) for key, value in given.items()}
     path = Path(target)
@@ -113,7 +114,7 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
         if path.suffix.lower() == ".xml":
             if values:
                 raise InputError("parameters of an XML file cannot be set", "--param", "change the file")
-            return Subject(foreign.load_file(path), target)
+            return Subject(mitsuba_scene.load_bsdf(path), target)
         text = path.read_text(encoding="utf-8")
     else:
         text = target

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
-from . import diagnosis, directions
+from . import directions
+from .forensics import diagnosis
 from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, KNOWN, NOT_APPLICABLE, PASS, Card, Verdict
 

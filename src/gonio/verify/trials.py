@@ -16,16 +16,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..models import outside
+from ..catalog import outside
 from ..work import crew, facts, parts
 from ..work.kept import Arrays
-from . import child, statistics
+from . import statistics
+from .isolation import child
 from .report import SIGNIFICANCE, Report
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from .child import Item, Progress, Task
+    from .isolation.child import Item, Progress, Task
     from .verdict import Card
 
 

@@ -20,10 +20,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bridge import engine
+from ..catalog import notation
 from ..errors import GonioWarning, InputError
-from ..models import notation
 from ..owner import public
-from ..render import checkpoints, engine, exposures, images, passes, run
+from ..pictures import exposures, images
+from ..render import checkpoints, run
+from ..transport import passes
 from ..work import crew, parts
 from . import figures
 from .figures import Drawing

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models import BSDF
+from ..material import BSDF
 
 Floats = NDArray[np.floating]
 

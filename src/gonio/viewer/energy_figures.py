@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import files
 from ..energy.tables.baked import Baked, load
-from ..render import images
+from ..pictures import images
 from . import figures
 
 if TYPE_CHECKING:

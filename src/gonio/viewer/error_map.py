@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..owner import public
-from ..render import images, metrics
+from ..pictures import images, metrics
 from . import figures
 
 _DPI = 100

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fitting.fit import Fit
 from ..measure import read
-from ..measure.fitting.fit import Fit
 from ..measure.tables.base import Measurement
 from ..measure.tables.half_difference import pair_at
 from . import figures

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..material import BSDF
 from ..measure.tables.half_difference import pair_at
-from ..models import BSDF
 from . import figures
 
 if TYPE_CHECKING:

@@ -11,12 +11,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import scene
+from ..catalog import documents, notation
 from ..errors import InputError
-from ..models import BSDF, documents, notation, tree
-from ..render import scene
-from ..render.scene import schema, spectra, textures
-from ..render.scene.materials import BY_TYPE, MaterialPart
-from ..render.scene.values import ImageTexture
+from ..material import BSDF, tree
+from ..scene import schema, spectra, textures
+from ..scene.materials import BY_TYPE, MaterialPart
+from ..scene.values import ImageTexture
 from .stage import CAMERA, SUN, Ball, Camera, Light, Material, Row, Stage, Value, replaced
 
 Vector: TypeAlias = "NDArray[np.float64]"

@@ -6,7 +6,7 @@ import inspect
 import textwrap
 from dataclasses import asdict, dataclass
 
-from ..models import BSDF
+from ..material import BSDF
 
 _WIDTH = 100
 

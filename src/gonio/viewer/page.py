@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..emit import bundle as written_for
 from ..energy.tables import bake
 from ..errors import InputError, MachineError
-from ..models import BSDF, tree
-from ..models.recording import switched_off
+from ..material import BSDF, tree
+from ..material.recording import switched_off
 from ..owner import alone
+from ..shaders import bundle as written_for
 from . import panels, stage
 from .stage import PresetData, Stage, Value
 

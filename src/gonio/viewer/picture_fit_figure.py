@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..instruments.pictures import PictureFit
-from ..render import exposures, images
+from ..pictures import exposures, images
 from . import figures
 from .figures import Drawing
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..catalog import notation, outside
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, notation, outside
+from ..material import BSDF
 from ..owner import public
 from . import curves, energy_figures, figures, fresnel_figure, image_slices, lobes
 from .curves import Curve

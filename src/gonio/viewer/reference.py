@@ -29,11 +29,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bridge import adapter, engine
+from ..bridge.types import MitsubaBSDF, OfVariant, Plugin, PluginDict, Scene, Sensor, Shape
 from ..errors import InputError
-from ..models import BSDF, tree
-from ..render import adapter, engine, foreground, integrators, lights
-from ..render.scene import textures
-from ..render.types import MitsubaBSDF, OfVariant, Plugin, PluginDict, Scene, Sensor, Shape
+from ..material import BSDF, tree
+from ..scene import textures
+from ..transport import foreground, integrators
+from ..transport.lights import lights
 from . import messages, stage
 from .stage import Stage
 

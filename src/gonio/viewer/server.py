@@ -41,8 +41,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
+from ..bridge import engine
 from ..errors import GonioError, InputError, MachineError
-from ..render import engine
 from . import messages, page
 from .session import Renderer, Session
 from .stage import Stage

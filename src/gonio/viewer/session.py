@@ -14,9 +14,9 @@ from pathlib import Path
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .._version import __version__
+from ..bridge import engine
 from ..errors import GonioError, InputError
 from ..owner import COMPUTING, settle
-from ..render import engine
 from . import messages, page
 from .reference import Pixels, Reference
 from .stage import Stage

@@ -17,8 +17,9 @@ from typing import NotRequired, TypeAlias, TypedDict
 
 import numpy as np
 
+from ..catalog import notation, outside
 from ..errors import InputError, did_you_mean
-from ..models import BSDF, Parameter, model, notation, outside, tree
+from ..material import BSDF, Parameter, model, tree
 from ..ops import backend
 from .watch import Code
 

@@ -20,8 +20,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Generic, TypeVar
 
+from ..catalog import outside
 from ..errors import GonioError
-from ..models import outside
 
 POLL_SECONDS = 0.03
 STOP_SECONDS = 5.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 from numbers import Integral
 from typing import TYPE_CHECKING
 
+from ..catalog import notation
 from ..errors import InputError, MachineError
-from ..models import BSDF, notation, tree
+from ..material import BSDF, tree
 from ..owner import alone
 from . import page, stage
 

@@ -6,9 +6,9 @@ import gonio as go
 import drjit as dr
 from gonio import ops
 from gonio.energy.compensation import missing
-from gonio.energy.materials import kulla_conty
-from gonio.energy.materials._compensated import lobe_ratio
-from gonio.models.binding import bound_copy
+from gonio.material.binding import bound_copy
+from gonio.materials.compensated import kulla_conty
+from gonio.materials.compensated._compensated import lobe_ratio
 from gonio.ops import backend
 from gonio.optics import frame
 

@@ -5,8 +5,8 @@ from typing import ClassVar
 import gonio as go
 import numpy as np
 from gonio import ops
-from gonio.energy.materials.kulla_conty import KullaConty
-from gonio.models.mix import Mix
+from gonio.materials.combined.mix import Mix
+from gonio.materials.compensated.kulla_conty import KullaConty
 from gonio.optics import frame, warp
 from gonio.optics.ndf import distribution
 

@@ -6,8 +6,8 @@ import gonio as go
 import drjit as dr
 import numpy as np
 from gonio import ops
-from gonio.models.conductor import Conductor
-from gonio.models.dielectric import Dielectric
+from gonio.materials.microfacet.conductor import Conductor
+from gonio.materials.microfacet.dielectric import Dielectric
 from gonio.optics import frame, warp
 
 

@@ -5,8 +5,9 @@ from typing import ClassVar
 import gonio as go
 import drjit as dr
 from gonio import ops
-from gonio.models import microfacet
+from gonio.materials.microfacet import microfacet
 from gonio.optics import frame, warp
+from gonio.optics.roughness import widths
 
 
 class _Metal(go.BSDF):
@@ -241,7 +242,7 @@ class GlassMatched(go.Dielectric):
     kind: ClassVar[str] = "transmitting"
 
     def _widths(self):
-        return microfacet.widths(self.alpha)
+        return widths(self.alpha)
 
     @property
     def delta(self):

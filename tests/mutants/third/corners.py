@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import gonio as go
 from gonio import ops
-from gonio.models.dielectric import Dielectric
+from gonio.materials.microfacet.dielectric import Dielectric
 from gonio.optics import frame, warp
 from gonio.optics.ndf import distribution
 

@@ -4,7 +4,7 @@
  *
  * Both pictures are what the screen shows, as linear RGB in [0, 1]. The eye's contrast sensitivity blurs both, colours
  * are compared in an L*a*b* with Hunt's adjustment, and edges and points that differ raise the result.
- * The same constants and border rule as gonio.render.metrics.
+ * The same constants and border rule as gonio.pictures.metrics.
  */
 
 /** The usual desk: a 3840-pixel monitor, 0.7 m wide, seen from 0.7 m (section 6 of the paper). */

@@ -1,6 +1,6 @@
 /**
  * How far the raster picture is from the reference: RMSE and relMSE, over the pixels that count.
- * The same definitions as gonio.render.metrics, which `gonio compare` prints.
+ * The same definitions as gonio.pictures.metrics, which `gonio compare` prints.
  */
 
 /** relMSE divides by r^2 + this: a black reference pixel does not rule the mean. */

@@ -53,8 +53,8 @@ def capture(
       gonio capture photographs -m lambert+ggx -o paint.json --next 2
       gonio capture a.png b.png --calibration rig.json -o paint.binary
     """
+    from ...catalog import notation
     from ...instruments.capture import run
-    from ...models import notation
 
     fixed = dict(notation.assignment(one) for one in param or ())
     target = None if output is None else run.check_output(output)

@@ -37,8 +37,8 @@ def compensation(
     """
     import numpy as np
 
-    from ...energy.compensation import comparison
-    from ...models import notation
+    from ...catalog import notation
+    from ...materials.compensated import comparison
 
     if output is not None:
         from ... import files

@@ -34,8 +34,8 @@ def convert(
       gonio convert gold.binary gold.bsdf
       gonio convert paint.mtlx paint.json
     """
+    from ...catalog import documents
     from ...measure import names_table
-    from ...models import documents
 
     if documents.names_document(source) or documents.names_document(str(output)):
         notices = documents.convert(source, output)
@@ -55,7 +55,7 @@ def convert(
         how = "resampled" if made.resampled else "the same values"
         print(f"{made.path}  {made.size / 1e6:.2f} MB, {made.kind}, {how}: {100.0 * made.error:.2g} % off on average")
         return
-    from ...render import exposures, images
+    from ...pictures import exposures, images
 
     shown = images.convert(Path(source), output, exposures.parse(exposure))
     if as_json:

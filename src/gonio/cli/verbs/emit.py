@@ -44,7 +44,7 @@ def emit(
       gonio emit openpbr -p coat_weight=1 --lean
     """
     from ... import files
-    from ...emit import bundle as make_bundle
+    from ...shaders import bundle as make_bundle
 
     if output is not None:  # before anything is computed or written
         files.check_file(output)

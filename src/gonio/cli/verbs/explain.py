@@ -17,7 +17,7 @@ def explain(model: Model, as_json: Json = False) -> None:
     Example:
       gonio explain conductor
     """
-    from ...models import notation
+    from ...catalog import notation
     from ...viewer import manual
 
     page = manual.page(notation.class_named(model))

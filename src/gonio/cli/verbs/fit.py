@@ -63,8 +63,8 @@ def fit(
         return
     if not data:
         raise InputError("no files of measurements given", "gonio fit", "or give --from picture.exr --scene scene.json")
-    from ...measure.fitting import batch
-    from ...models import notation
+    from ...catalog import notation
+    from ...fitting import batch
 
     fixed = dict(notation.assignment(one) for one in param or ())
     files = batch.files_of(data)
@@ -106,10 +106,10 @@ def _to_picture(
     output: Path | None,
     as_json: bool,
 ) -> None:
+    from ...catalog import notation
     from ...errors import InputError
+    from ...fitting import batch
     from ...instruments import pictures
-    from ...measure.fitting import batch
-    from ...models import notation
     from ...viewer import figures
 
     if model is not None and len(model) > 1:

@@ -26,7 +26,7 @@ def models(
       gonio models --quality
       gonio models --library
     """
-    from ...models import models
+    from ...material import models
 
     if library:
         _library(as_json)
@@ -48,7 +48,7 @@ def models(
 
 
 def _library(as_json: bool) -> None:
-    from ...models import library
+    from ...catalog import library
 
     published = library.published()
     rows = {name: library.fits(name) for name in library.materials()}

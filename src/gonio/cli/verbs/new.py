@@ -56,7 +56,7 @@ def new(
 
 def _names(name: str) -> tuple[str, str]:
     """Of "crushed-velvet" the file's name, crushed_velvet, and the class's, CrushedVelvet."""
-    from ...models import models
+    from ...material import models
 
     fine = re.fullmatch(r"[A-Za-z][\w-]*", name, re.ASCII)
     words = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name) if fine else []

@@ -18,7 +18,7 @@ from ..signals import exit_code, words
 from .base import PICTURES, verb
 
 if TYPE_CHECKING:
-    from ...render.exposures import Exposure
+    from ...pictures.exposures import Exposure
     from ...render.run import Request, Result
 
 

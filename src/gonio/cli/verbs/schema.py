@@ -36,7 +36,7 @@ def schema(
 
         text = report.text()
     else:
-        from ...render import scene
+        from ... import scene
 
         text = json.dumps(scene.json_schema(), indent=2) + "\n"
     if output is None:

@@ -92,8 +92,8 @@ def verify(
         return
     # Nothing heavy before the first process has started: it takes as long as all else together.
     from ...errors import InputError
-    from ...verify import child
     from ...verify.ci.outputs import Outputs
+    from ...verify.isolation import child
 
     if quick and deep:
         raise InputError("quick and deep together", "--quick", "give one of them")

@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ... import _html
 from ...errors import InputError, did_you_mean
-from ...models import BSDF, tree
-from ...models.microfacet import SMOOTH
-from ...models.parameters import pair_of
+from ...material import BSDF, tree
+from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, backend
+from ...optics.roughness import SMOOTH
 from ...owner import public
 from . import cubature, quadrature
 

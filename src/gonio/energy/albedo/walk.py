@@ -18,12 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...models.microfacet import widths
 from ...ops import Direction, Pair, Scalar, backend, dot, maximum, sqrt, vec3, where
 from ...ops.backend import Array
 from ...ops.graph import Node, RecordingError
 from ...optics import frame, fresnel
 from ...optics.ndf import distribution
+from ...optics.roughness import widths
 
 MOST_BOUNCES = 128  # at alpha = 1 less than 1e-9 of the light is left after these
 FLAT = 1e-6  # below this |w.z| a walker stays at its height

@@ -16,8 +16,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...models import BSDF, Microsurface
-from ...models.microfacet import widths
+from ...material import BSDF, Microsurface
 from ...ops import (
     Direction,
     Mask,
@@ -38,6 +37,7 @@ from ...ops import (
 )
 from ...ops.backend import Array
 from ...optics import frame
+from ...optics.roughness import widths
 from ..bend import form_of, knee
 from . import curves, lobe
 from .reflecting import has_two_widths

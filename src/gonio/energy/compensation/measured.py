@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError
-from ...models import BSDF, Parameter, binding
+from ...material import BSDF, Parameter, binding
 from ...ops import (
     Node,
     RecordingError,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...errors import InputError
-from ...models import BSDF
+from ...material import BSDF
 from .glass import glass
 from .lobe import MissingEnergy
 from .measured import measured

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...models import BSDF, Microsurface
-from ...models.microfacet import SMOOTH, widths
-from ...models.parameters import pair_of
+from ...material import BSDF, Microsurface
+from ...material.parameters import pair_of
 from ...ops import backend, function, inset, lookup, maximum, minimum, sqr, sqrt, where
 from ...ops.backend import Array
 from ...ops.types import Direction, Mode, Pair, Scalar, Spectrum
 from ...optics import frame
+from ...optics.roughness import SMOOTH, widths
 from ..bend import form_of, knee
 from . import curves, lobe
 

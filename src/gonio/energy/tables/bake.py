@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import GonioWarning, InputError, did_you_mean
-from ...models import BSDF
-from ...models.parameters import pair_of
+from ...material import BSDF
+from ...material.parameters import pair_of
 from ...ops import backend
 from ...optics.ndf import distribution
 from ...work import crew, parts

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...models import Microsurface
-from ...models.microfacet import widths
+from ...material import Microsurface
 from ...ops import Direction, Scalar, Spectrum, Table, inset, lookup, maximum, sqrt
+from ...optics.roughness import widths
 from .. import cache
 from ..albedo import quadrature
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...measure.fitting.fit import NORMAL_95
+from ...fitting.fit import NORMAL_95
 from . import pixels
 from .fitting import Fitted
 from .pixels import Chosen, Scene

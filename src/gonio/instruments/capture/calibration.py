@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
+from ...bridge.types import Json
 from ...errors import InputError
-from ...render.scene.reader import explain
-from ...render.scene.text import read_json
-from ...render.scene.values import NonNegative, Number, Part, Positive, Vector, Whole, invalid, rgb
-from ...render.types import Json
+from ...scene.reader import explain
+from ...scene.text import read_json
+from ...scene.values import NonNegative, Number, Part, Positive, Vector, Whole, invalid, rgb
 
 NAME = "calibration.json"  # in a folder of photographs
 Floats = NDArray[np.float64]

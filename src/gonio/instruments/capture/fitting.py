@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...measure.fitting import fit as tables
-from ...measure.fitting.data import Data
-from ...measure.fitting.fit import Fit
-from ...measure.fitting.parameters import CHANNELS, Free, ranges, start_of, with_drjit, with_values
-from ...measure.fitting.solver import Linearized, columns_of, solve
-from ...models import BSDF
+from ...fitting import fit as tables
+from ...fitting.data import Data
+from ...fitting.fit import Fit
+from ...fitting.parameters import CHANNELS, Free, ranges, start_of, with_drjit, with_values
+from ...fitting.solver import Linearized, columns_of, solve
+from ...material import BSDF
 from ...ops import backend
 from . import geometry
 from .calibration import Floats, Uncertainty

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...render import formats, images
+from ...pictures import formats, images
 from .calibration import Calibration, Exposure, Shot
 
 Floats = NDArray[np.float64]

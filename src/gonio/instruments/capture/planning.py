@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError
-from ...measure.fitting.fit import NORMAL_95
-from ...measure.fitting.parameters import Free, ranges, start_of
-from ...models import BSDF
+from ...fitting.fit import NORMAL_95
+from ...fitting.parameters import Free, ranges, start_of
+from ...material import BSDF
 from . import pixels
 from .calibration import Floats
 from .fitting import Faults, Problem, inverse_of, middle_of

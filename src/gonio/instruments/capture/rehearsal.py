@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from ... import files
+from ...bridge.types import Json
 from ...errors import InputError
-from ...models import BSDF
+from ...material import BSDF
 from ...owner import public
-from ...render import images, run
+from ...pictures import images
+from ...render import run
 from ...render.request import Request
-from ...render.types import Json
 from .calibration import NAME, Calibration, Floats, made
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ... import files
 from ...errors import InputError
+from ...fitting.fit import Fit, moving_of
+from ...material import BSDF
 from ...measure import format_of
-from ...measure.fitting.fit import Fit, moving_of
-from ...models import BSDF
 from ...owner import public
 from . import advice, fitting, geometry, pixels, planning
 from . import calibration as calibrations

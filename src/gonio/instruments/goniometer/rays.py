@@ -8,10 +8,10 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models import BSDF, guide_search
+from ...bridge import engine
+from ...bridge.types import Scene
+from ...material import BSDF, guide_search
 from ...ops import backend
-from ...render import engine
-from ...render.types import Scene
 from ..surfaces.base import Patch
 
 Floats = NDArray[np.float64]

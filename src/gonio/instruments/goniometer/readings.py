@@ -13,10 +13,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...bridge import engine
+from ...catalog.notation import written
 from ...errors import InputError
-from ...models import BSDF
-from ...models.notation import written
-from ...render import engine
+from ...material import BSDF
 from ...work import garbage
 from ..surfaces.base import Surface
 from . import rays

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from ... import files
 from ...arguments import shown
+from ...catalog import notation, outside
 from ...errors import InputError
+from ...material import BSDF, is_model
 from ...measure import colours
 from ...measure.tables.base import Measurement
-from ...models import BSDF, is_model, notation, outside
 from ...owner import public
 from ..surfaces import base as surfaces
 from ..surfaces.base import Surface

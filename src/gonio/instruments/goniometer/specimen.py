@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...catalog.notation import written
 from ...errors import InputError
-from ...models import BSDF
-from ...models.notation import written
+from ...material import BSDF
 
 Floats = NDArray[np.float64]
 GROUPS = 8  # independent parts of a measurement, whose spread is its standard error

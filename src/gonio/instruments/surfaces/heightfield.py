@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...errors import InputError
-from ...render import images
+from ...pictures import images
 from .base import Floats, Patch, Surface, of_heights, parameter
 
 LEAST, MOST = 4, 1024  # pixels along a side

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from ...models import guide_search
-from ...models.guide import Guide
+from ...material import guide_search
+from ...material.guide import Guide
 from ...ops import Direction, Scalar, Spectrum, where
 from .base import Measurement, above
 
 
 class Guided(Measurement):
-    """What is sampled by a guide (`gonio.models.guide`) found from its own values."""
+    """What is sampled by a guide (`gonio.material.guide`) found from its own values."""
 
     transmits = False
 

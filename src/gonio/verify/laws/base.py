@@ -10,7 +10,7 @@ import numpy as np
 from ...members import Family, instances_of
 from .. import directions
 from ..effort import Effort
-from ..ratio import Cause, Ratio
+from ..forensics.ratio import Cause, Ratio
 from ..severity import Bias
 from ..subject import Fault, Subject
 from ..verdict import Finding

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ...bridge.answers import Answer
 from ...errors import InputError
-from ...models import BSDF, tree
+from ...material import BSDF, tree
 from ...ops import Mode, Precision, backend
-from ...render.answers import Answer
 from .. import box, directions, severity
 from ..effort import Effort
-from ..ratio import Cause, Ratio
+from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject, guarded
 from ..verdict import Finding
 from .base import Law, pair_in_words, pairs

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...models import BSDF, binding, tree
+from ...material import BSDF, binding, tree
 from ...ops import backend
 from .. import directions, lobes, severity, statistics
 from ..effort import Effort
+from ..forensics.ratio import Cause
 from ..lobes import Lobes
-from ..ratio import Cause
 from ..subject import Subject, guarded
 from ..verdict import DoesNotApply, Finding, Trial
 from .base import Law

@@ -9,13 +9,13 @@ import numpy as np
 
 from ...energy.albedo import cubature
 from ...errors import InputError
-from ...models import BSDF
+from ...material import BSDF
 from ...ops import Mode, backend
 from .. import directions, histogram, lobes, severity, statistics
-from ..causes import place_of
 from ..effort import Effort
 from ..figures import AlbedoCurves
-from ..ratio import SPREAD, Cause, factor_key, written
+from ..forensics.causes import place_of
+from ..forensics.ratio import SPREAD, Cause, factor_key, written
 from ..subject import Subject, guarded
 from ..verdict import Finding, Trial
 from .base import Law

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError
-from ...models import BSDF, Parameter, binding, tree
+from ...material import BSDF, Parameter, binding, tree
 from ...ops import backend
 from ..effort import Effort
-from ..ratio import Ratio
+from ..forensics.ratio import Ratio
 from ..severity import Bias
 from ..subject import Subject, guarded
 from ..verdict import DoesNotApply, Finding

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import directions, severity
 from ..effort import Effort
-from ..ratio import Cause
+from ..forensics.ratio import Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, rounding, worst_of

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...models import BSDF, models
+from ...material import BSDF, models
 from .. import directions, severity
 from ..effort import Effort
-from ..ratio import SPREAD, Cause
+from ..forensics.ratio import SPREAD, Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
 from .base import Law, pair_in_words, pairs, relative, worst_of

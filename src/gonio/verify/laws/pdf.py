@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import crowding, directions, histogram, severity
-from ..causes import nothing_below
+from .. import directions, histogram, severity
 from ..effort import Effort
 from ..figures import SampleCells
-from ..ratio import Cause
+from ..forensics import crowding
+from ..forensics.causes import nothing_below
+from ..forensics.ratio import Cause
 from ..subject import Subject
 from ..verdict import Finding, Trial
 from .base import Law, pair_in_words, pairs, where_found

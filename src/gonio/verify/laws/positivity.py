@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...models import BSDF, binding
+from ...material import BSDF, binding
 from ...ops import Precision, backend
 from .. import box, directions, severity
-from ..causes import place_of
 from ..effort import Effort
-from ..ratio import Cause
+from ..forensics.causes import place_of
+from ..forensics.ratio import Cause
 from ..subject import Fault, Subject, guarded
 from ..verdict import Finding
 from .base import Law, pair_in_words, pairs, where_found

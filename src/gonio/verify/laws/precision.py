@@ -8,10 +8,10 @@ import numpy as np
 
 from ... import ops
 from .. import severity
-from ..causes import place_of
 from ..effort import Effort
 from ..figures import RoundingErrors
-from ..ratio import Cause
+from ..forensics.causes import place_of
+from ..forensics.ratio import Cause
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding
 from .base import ALLOWED, Law, pair_in_words, pairs, relative, rounding, worst_of

@@ -8,9 +8,9 @@ import numpy as np
 
 from .. import directions, severity, statistics
 from ..effort import Effort
-from ..factors import index_below
 from ..figures import ReciprocityMap
-from ..ratio import Cause, Ratio
+from ..forensics.factors import index_below
+from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject
 from ..verdict import DoesNotApply, Finding, Trial
 from .base import Law, pair_in_words, pairs, relative, rounding, worst_of

@@ -9,7 +9,7 @@ import numpy as np
 from ...ops import Precision
 from .. import directions, severity, statistics
 from ..effort import Effort
-from ..ratio import Cause, Ratio
+from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject
 from ..verdict import Finding, Trial
 from .base import Law, pair_in_words, relative, rounding, worst_of

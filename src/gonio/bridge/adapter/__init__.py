@@ -1,0 +1,64 @@
+"""Every Gonio model as a Mitsuba plugin, by one generic adapter: `conductor` becomes `gonio_conductor`, and so on.
+
+A plugin's properties carry the names of the model's parameters. Every plugin takes two properties more: `two_sided`
+(shade both sides; no nested call as in Mitsuba's own `twosided`) and, where the model has presets, `preset`.
+
+In polarized variants a plugin hands out Mueller matrices of what single facets have reflected or refracted; all else
+leaves unpolarized.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from ...errors import InputError
+from ...material import BSDF, models
+from ..types import OfVariant, Plugin, Properties
+from .material import plugin_name
+from .plugin import plugin_class
+
+__all__ = ["plugin_name", "register", "register_model"]
+
+_classes: dict[str, OfVariant] = {}  # variant -> class of the plugins
+_models: dict[str, type[BSDF]] = {}  # plugin -> model, the newest of that name
+
+
+def register(mi: ModuleType) -> None:
+    """Register every model with the current variant, now and whenever another one joins the family."""
+    BSDF.family.watch(_joined)
+    if mi.variant() is not None:
+        for name, model in models().items():
+            _register(mi, plugin_name(name), model)
+
+
+def register_model(mi: ModuleType, model: type[BSDF]) -> str:
+    """The name of a model's plugin, which a class of the user's own gets here; call `register` first."""
+    if models().get(model.name) is model:
+        return plugin_name(model.name)
+    name = f"gonio_own_{model.name.replace('-', '_')}"
+    _register(mi, name, model)
+    return name
+
+
+def _joined(name: str, model: type[BSDF]) -> None:
+    import mitsuba as mi
+
+    _register(mi, plugin_name(name), model)
+
+
+def _register(mi: ModuleType, name: str, model: type[BSDF]) -> None:
+    variant = mi.variant()
+    _models[name] = model
+    if variant.startswith("scalar"):
+        mi.register_bsdf(name, _refused)
+        return
+    if variant not in _classes:
+        _classes[variant] = plugin_class(mi)
+    mi.register_bsdf(name, lambda props: _classes[variant](props, _models[name]))
+
+
+def _refused(props: Properties) -> Plugin:
+    import mitsuba as mi
+
+    what = f"variant {mi.variant()} works on one ray at a time, Gonio's materials on arrays"
+    raise InputError(what, str(props.plugin_name()), "set llvm_ad_rgb, or another that starts with llvm or cuda")

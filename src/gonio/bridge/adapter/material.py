@@ -1,0 +1,160 @@
+"""A material in a Mitsuba scene: parameters read from a plugin's properties, and bound at the points that rays hit."""
+
+from __future__ import annotations
+
+import warnings
+
+import drjit as dr
+
+from ...errors import InputError, did_you_mean
+from ...material import BSDF, binding, guide_search, tree
+from ...materials.combined.two_sided import TwoSided
+from ..native import Native
+from ..types import Float, Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
+from .slots import NamedPreset, Slot
+from .variant import Variant
+
+
+def plugin_name(model_name: str) -> str:
+    """Name of a model's plugin: "blinn-phong" is `gonio_blinn_phong`."""
+    return "gonio_" + model_name.replace("-", "_")
+
+
+class PlacedMaterial:
+    """A material and where its values come from.
+
+    model    the material with plain values that tell its facts: of a texture the range, of a plugin of Mitsuba's inside
+             it what stands for that
+    slots    where each numeric parameter's value comes from
+    inner    plugins of the materials inside it: Mitsuba's, and Gonio's with their placed materials
+    derived  what it derives from its parameters, found once, where these are the same at every hit
+    """
+
+    def __init__(self, variant: Variant, props: Properties, model: type[BSDF]) -> None:
+        self.variant, self.name = variant, plugin_name(model.name)
+        preset = _preset(props, model)
+        sides = props.get("two_sided", False)
+        if not isinstance(sides, bool):
+            raise InputError(f"'{sides}' given, true or false expected", f"{self.name}.two_sided")
+        self.slots: dict[str, Slot] = {}
+        self.inner: dict[str, tuple[MitsubaBSDF, PlacedMaterial | Native]] = {}
+        values: dict[str, OfVariant] = {}
+        for name, parameter in model.parameters().items():
+            where = f"{self.name}.{name}"
+            if parameter.inner:
+                self.inner[name] = self._child(props, name)
+                held = self.inner[name][1]
+                values[name] = held.model if isinstance(held, PlacedMaterial) else held
+            elif parameter.numeric:
+                self.slots[name] = Slot(variant, props, parameter, where, preset)
+                values[name] = self.slots[name].plain
+            else:
+                values[name] = props.get(name, preset.values.get(name, parameter.default))
+                parameter.check(values[name], where)
+        unknown = list(props.unqueried())
+        if unknown:
+            hint = did_you_mean(unknown[0], [*model.parameters(), "two_sided"])
+            raise InputError(f"unknown property '{unknown[0]}'", self.name, hint)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the slots have warned
+            self.model: BSDF = model(**values)
+        if variant.channels != 3 and any(inner.only_rgb for _, inner in tree.walk(self.model)):
+            what = f"{self.model.name} knows red, green and blue only, this is {variant.mi.variant()}"
+            raise InputError(what, self.name, "render in an RGB variant, such as llvm_ad_rgb")
+        for name in ("absorption", "priority"):
+            if name in self.slots and self.slots[name].varies:
+                raise InputError("a texture given, and the inside has no place on the surface", f"{self.name}.{name}")
+        self.sides = TwoSided(self.model) if sides and not self.model.transmits else None
+        self.derived: OfVariant = None
+        self.derive()
+
+    def _child(self, props: Properties, name: str) -> tuple[MitsubaBSDF, PlacedMaterial | Native]:
+        child = props.get(name, None)
+        if not isinstance(child, self.variant.mi.BSDF):
+            raise InputError(f"no material '{name}' given", self.name)
+        return child, getattr(child, "placed", None) or Native(child)
+
+    def derive(self) -> None:
+        """Find once what the model derives from values that are the same at every hit."""
+        self.derived = None
+        if self.varies and self.model.needs_uniform:
+            what = "this base is measured: it takes colours and numbers, no texture, unlike conductor and dielectric"
+            raise InputError(what, f"{self.name}.base")
+        guide_search.prepare(self.model)  # integrators ask inside loops
+        if self.model.derives and not self.varies:
+            self.derived = binding.settled(self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True))
+
+    @property
+    def varies(self) -> bool:
+        """Whether a parameter, here or further in, has not the same value at every hit: textures, and spectra, which
+        are looked up at a ray's wavelengths."""
+        return (
+            self._by_wavelength
+            or any(slot.textures or slot.curves for slot in self.slots.values())
+            or any(isinstance(held, Native) or held.varies for _, held in self.inner.values())
+        )
+
+    @property
+    def _by_wavelength(self) -> bool:
+        """Whether the model is told the rays' wavelengths."""
+        return self.variant.spectral and self.model.reads_wavelengths
+
+    @property
+    def disperses(self) -> bool:
+        """Whether an index, here or further in, depends on the wavelength."""
+        return any(slot.curves for slot in self.slots.values()) or any(
+            isinstance(held, PlacedMaterial) and held.disperses for _, held in self.inner.values()
+        )
+
+    def at(
+        self,
+        si: SurfaceInteraction,
+        active: Mask,
+        separates: bool = False,
+        outer: Float | None = None,
+        inner: bool = False,
+    ) -> BSDF:
+        """The model, its parameters bound to their values at a surface interaction.
+
+        separates  whether an index that depends on the wavelength is that of the first of the ray's
+        outer      index outside of the surface, over which those of the inside are then
+        inner      it is part of another material, which alone decides whether both sides are shaded
+        """
+        values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
+        for name, (_, held) in self.inner.items():
+            values[name] = (
+                held.at(si, active) if isinstance(held, Native) else held.at(si, active, separates, outer, True)
+            )
+        if self._by_wavelength:
+            values["wavelengths"] = self.variant.spectrum(si.wavelengths)
+        if self.model.reads_surface:
+            x, y = si.sh_frame.s, si.sh_frame.t
+            values["surface"] = (dr.dot(si.dp_du, x), dr.dot(si.dp_dv, x), dr.dot(si.dp_dv, y))
+        # what was derived once is that of the index over the vacuum's
+        bound = binding.bound_copy(self.model, values, self.derived if outer is None else None)
+        return binding.bound_copy(self.sides, {"base": bound}) if self.sides is not None and not inner else bound
+
+    def traverse(self, callback: TraversalCallback) -> None:
+        """Tell Mitsuba of every value that may be changed."""
+        flag = self.variant.mi.ParamFlags.Differentiable
+        for slot in self.slots.values():
+            for name, value in {**slot.values, **slot.textures}.items():
+                callback.put(name, value, flag)
+        for name, (plugin, _) in self.inner.items():
+            callback.put(name, plugin, flag)
+
+    def changed(self) -> None:
+        """Values have been changed."""
+        for slot in self.slots.values():
+            dr.make_opaque(*slot.values.values())
+        self.derive()
+
+
+def _preset(props: Properties, model: type[BSDF]) -> NamedPreset:
+    """The preset that is named; one without values where none is."""
+    known = model.presets()
+    if "preset" not in props or not known:
+        return NamedPreset("", {})
+    made = model.preset(props["preset"])
+    key = next(key for key, preset in known.items() if all(getattr(made, n) == v for n, v in preset.values.items()))
+    return NamedPreset(key, known[key].values)

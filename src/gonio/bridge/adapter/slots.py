@@ -1,0 +1,140 @@
+"""Where the values of a plugin's parameters come from: numbers and colours that Dr.Jit holds, or textures.
+
+A number or colour is opaque (a changed value compiles nothing); anything else is a texture that is looked up at each
+hit. Widths may be given as `alpha`, or as `alpha_x` and `alpha_y`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, TypeAlias
+
+import drjit as dr
+import numpy as np
+
+from ... import ops
+from ...errors import InputError
+from ...material import Parameter
+from ...material.parameters import IndexParameter
+from ...optics.dispersion import DispersiveIndex
+from ..types import Float, Mask, OfVariant, Properties, SurfaceInteraction, Texture
+from .variant import Variant
+
+Plain: TypeAlias = OfVariant  # a number, a colour or a pair of widths, as a material's constructor takes them
+
+
+class NamedPreset(NamedTuple):
+    """The short name of a preset, and its values."""
+
+    name: str
+    values: Mapping[str, Plain]
+
+
+class Slot:
+    """A numeric parameter of a plugin.
+
+    values    opaque values by property ("alpha", or "alpha_x" and "alpha_y")
+    textures  the others
+    curves    those of an index that depends on the wavelength: eta by nanometre
+    plain     numbers that tell the parameter's range (of a texture: from the lowest to the highest)
+    """
+
+    def __init__(self, variant: Variant, props: Properties, parameter: Parameter, where: str, preset: NamedPreset):
+        self.variant, self.parameter, self.where = variant, parameter, where
+        self.values: dict[str, Float] = {}
+        self.textures: dict[str, Texture] = {}
+        self.curves: dict[str, Float] = {}
+        self.names = self._names(props)
+        plain = [self._read(props, name, preset) for name in self.names]
+        self.plain: Plain = (plain[0], plain[1]) if len(plain) == 2 else plain[0]
+
+    def _names(self, props: Properties) -> list[str]:
+        name = self.parameter.name
+        both = [f"{name}_x", f"{name}_y"]
+        if self.parameter.kind != "alpha" or not any(one in props for one in both):
+            return [name]
+        if not all(one in props for one in both) or name in props:
+            raise InputError(f"give {name}, or both {both[0]} and {both[1]}", self.where)
+        return both
+
+    def _read(self, props: Properties, name: str, preset: NamedPreset) -> Plain:
+        """Read one property, the preset's value, or the default, into `values` or `textures`."""
+        parameter, variant = self.parameter, self.variant
+        kinds = variant.mi.Properties.Type
+        if name in props:
+            given = props.type(name)
+            if given == kinds.String and isinstance(parameter, IndexParameter):
+                return self._constant(name, parameter.taken(str(props[name]), self.where))
+            if given == kinds.String:
+                raise InputError(f"'{props[name]}' given, a number or a texture expected", self.where)
+            if given in (kinds.Float, kinds.Integer):
+                return self._constant(name, float(props[name]))
+            if given == kinds.Color and not variant.spectral:
+                return self._constant(name, np.asarray(props[name], dtype=float).ravel())
+            return self._texture(name, props.get_unbounded_texture(name))
+        if parameter.required and name not in preset.values:
+            raise InputError("missing", self.where, parameter.doc)
+        value = preset.values.get(name, parameter.default)
+        if np.ndim(value) == 0 or not variant.spectral:
+            return self._constant(name, value)
+        if np.min(value) < 0.0:
+            what = f"{np.min(value):g} given, and spectral variants have no spectrum of a negative colour"
+            raise InputError(what, self.where, "render it in an RGB variant, such as llvm_ad_rgb")
+        measured = variant.measured(preset.name, name) if name in preset.values else None
+        self.textures[name] = variant.through_rgb(value) if measured is None else measured
+        return value
+
+    def _constant(self, name: str, value: Plain) -> Plain:
+        self.parameter.check(value, self.where)
+        if self.parameter.kind == "angle" and value == 0:
+            return value  # no rotation at all
+        if self.variant.spectral and isinstance(value, DispersiveIndex) and value.constants.disperses:
+            self.curves[name] = self.variant.dispersion(value.constants)
+        if self.parameter.kind == "spectrum":
+            self.values[name] = self.variant.constant(value)
+        else:
+            self.values[name] = self.variant.mi.Float(float(value))
+        dr.make_opaque(self.values[name])
+        return value
+
+    def _texture(self, name: str, texture: Texture) -> Plain:
+        if self.parameter.kind == "spectrum":
+            colour = self.variant.uniform(texture)
+            if colour is not None:
+                self.values[name] = colour
+                return np.broadcast_to(np.asarray(colour).ravel(), 3)
+        self.textures[name] = texture
+        span = getattr(texture, "span", None)  # one of ours knows its own
+        if span is not None:
+            for plain in span:
+                self.parameter.check(plain if self.parameter.kind == "spectrum" else float(plain[0]), self.where)
+            return span if self.parameter.kind == "spectrum" else span[:, 0]
+        span = np.array([max(self.parameter.low, 0.0), min(self.parameter.high, 1.0)])
+        return np.tile(span[:, None], 3) if self.parameter.kind == "spectrum" else span
+
+    @property
+    def varies(self) -> bool:
+        """Whether it has other values elsewhere on the surface."""
+        return any(texture.is_spatially_varying() for texture in self.textures.values())
+
+    def at(
+        self, si: SurfaceInteraction, active: Mask, separates: bool = False, outer: Float | None = None
+    ) -> OfVariant:
+        """The bound value at a surface interaction: as `Parameter.bind` would have it.
+
+        separates  whether an index is that of the ray's first wavelength, or one for all of them
+        outer      what an index is divided by
+        """
+        kind = self.parameter.kind
+        found = dict(self.values)
+        for name, curve in self.curves.items() if separates else ():
+            found[name] = self.variant.looked_up(curve, si.wavelengths[0], active)
+        for name, texture in self.textures.items():
+            found[name] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
+        if outer is not None and isinstance(self.parameter, IndexParameter):
+            return found[self.parameter.name] / outer
+        if kind == "alpha":
+            return ops.vec2(found[self.names[0]], found[self.names[-1]])
+        if kind == "angle":
+            return ops.vec2(*reversed(ops.sincos(*found.values()))) if found else None
+        return found[self.parameter.name]

@@ -1,0 +1,246 @@
+"""Mitsuba's BSDFs by name, by dictionary, or from files, as materials.
+
+    rough = foreign.load({"type": "roughplastic", "alpha": 0.2})
+    rough.eval(wo, wi)
+    rougher = tree.replace(rough, {"alpha": 0.4})
+
+Numbers and albedos among a plugin's properties are the material's parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import ClassVar
+
+import numpy as np
+
+from ..catalog import outside
+from ..errors import InputError, did_you_mean
+from ..material import number, spectrum
+from . import adapter, engine
+from .native import Native
+from .types import MitsubaBSDF, OfVariant, PluginDict
+
+# Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are read from the plugin as they are
+SMALLEST_ALPHA = 1e-3  # Mitsuba's pages: "smooth" below, and another plugin; its float32 code ends near here
+ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")
+
+
+# Ranges and defaults of the numbers among the properties of Mitsuba's own plugins, (default, low, high), from their
+# pages in Mitsuba's documentation (version 3.9, "BSDFs"). A property that is not here has no range that is known, and
+# is judged at the value that it has.
+_SHARE = (0.0, 0.0, 1.0)
+_PRINCIPLED = {"roughness": (0.5, 0.0, 1.0)} | dict.fromkeys(
+    ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness"), _SHARE
+)
+RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
+    "blendbsdf": {"weight": (0.5, 0.0, 1.0)},
+    "mask": {"opacity": (0.5, 0.0, 1.0)},
+    "principled": {**_PRINCIPLED, "metallic": _SHARE, "clearcoat": _SHARE, "clearcoat_gloss": _SHARE},
+    "principledthin": {**_PRINCIPLED, "diff_trans": (0.0, 0.0, 2.0)},
+    "roughconductor": {"alpha": (0.1, 0.0, 1.0)},
+    "roughdielectric": {"alpha": (0.1, 0.0, 1.0)},
+    "roughplastic": {"alpha": (0.1, 0.0, 1.0)},
+}
+
+
+class _Described(Native):
+    """A BSDF that is built from a dictionary, and built anew where a parameter changes."""
+
+    description: ClassVar[PluginDict] = {}
+    plugin: ClassVar[PluginDict] = {}  # of an instance: the description with the values of its parameters
+
+    @property
+    def by_nature(self) -> Mapping[str, str]:
+        """Laws that plugins of this kind break by what they are meant to be, with the reasons."""
+        return _BY_NATURE.get(str(self.description.get("type", "")), {})
+
+    @property
+    def held(self) -> dict[str, Native]:
+        """The BSDFs inside, as materials of their own."""
+        return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
+
+    def anew(self) -> Native:
+        """The plugin built once more."""
+        return load(self.plugin)
+
+    def around_diffuse(self) -> Native:
+        """The same around plain diffuse ones."""
+        return load({**self.description, **dict.fromkeys(self.held, _DIFFUSE)})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        changed = {}
+        for name, parameter in self.parameters().items():
+            value = np.asarray(getattr(self, name), float)
+            if value.ndim > (name in ALBEDOS):
+                raise InputError(f"{len(value)} rows given, one value expected", name, "a plugin holds no arrays")
+            if not np.array_equal(value, np.asarray(parameter.default)):
+                rgb = {"type": "rgb", "value": np.broadcast_to(value, 3).tolist()}
+                changed[name] = rgb if name in ALBEDOS else float(value)
+        object.__setattr__(self, "plugin", {**self.description, **changed})
+        object.__setattr__(self, "bsdf", _built(self.plugin))
+
+
+def load(description: PluginDict) -> Native:
+    """The BSDF of a dictionary as `mi.load_dict` takes it; InputError where Mitsuba refuses it."""
+    kind = str(description.get("type", ""))
+    fields: dict[str, OfVariant] = {}
+    known = RANGES.get(kind, {})
+    if any(name.startswith("alpha_") for name in description):
+        known = {name: ends for name, ends in known.items() if name != "alpha"}  # one width, or two
+    given = {**{name: ends[0] for name, ends in known.items()}, **_colours(_built(description)), **description}
+    for name, value in given.items():
+        if name in ALBEDOS and isinstance(value, int | float | tuple):
+            low, high = (0.0, 1.0) if kind in _NESTS else (-np.inf, np.inf)
+            fields[name] = spectrum(value, "a property of the plugin", low=low, high=high)
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            _, low, high = known.get(name, (0.0, -np.inf, np.inf))
+            if name.startswith("alpha") and kind in _NESTS:
+                low, high = SMALLEST_ALPHA, 1.0
+            fields[name] = number(value, "a property of the plugin", low=low, high=high)
+    space = {**fields, "description": description, "__annotations__": dict.fromkeys(fields, "object")}
+    return type(f"Mitsuba{kind.title()}", (_Described,), space)()
+
+
+def _built(description: PluginDict) -> MitsubaBSDF:
+    """The plugin itself."""
+    mi = mitsuba()
+    kind = str(description.get("type", ""))
+    try:
+        with engine.file_threads():
+            bsdf = mi.load_dict(description, parallel=False)
+    except Exception as error:
+        raise _refused(error, kind) from None
+    if not isinstance(bsdf, mi.BSDF):
+        raise InputError(f"'{kind}' is a {type(bsdf).__name__}, a BSDF expected", f"mitsuba:{kind}")
+    return bsdf
+
+
+def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
+    """The albedos that a plugin holds as one number or colour each."""
+    import mitsuba as mi
+
+    held = mi.traverse(bsdf)
+    found = {}
+    for name in ALBEDOS:
+        if f"{name}.value" in held:
+            values = np.asarray(held[f"{name}.value"], float).ravel()
+            found[name] = float(values[0]) if values.size == 1 else tuple(map(float, values))
+    return found
+
+
+def _is_bsdf(value: object) -> bool:
+    """Whether a property describes a BSDF; textures and spectra are dictionaries as well."""
+    if not isinstance(value, Mapping):
+        return False
+    try:
+        _built(dict(value))
+    except InputError:
+        return False
+    return True
+
+
+def plugins() -> list[str]:
+    """Names of the BSDF plugins that Mitsuba brings along."""
+    return sorted(_NESTS)
+
+
+# Mitsuba does not tell a plugin's kind without building it; what each needs to be built is written down here
+_DIFFUSE = {"type": "diffuse"}
+_NESTS: dict[str, PluginDict] = {
+    "blendbsdf": {"weight": 0.5, "a": _DIFFUSE, "b": {"type": "roughconductor"}},
+    "bumpmap": {"bsdf": _DIFFUSE},
+    "circular": {},
+    "conductor": {},
+    "dielectric": {},
+    "diffuse": {},
+    "hair": {},
+    "mask": {"opacity": 0.5, "bsdf": _DIFFUSE},
+    "measured": {},
+    "measured_polarized": {},
+    "normalmap": {"normalmap": {"type": "rgb", "value": [0.5, 0.5, 1.0]}, "bsdf": _DIFFUSE},
+    "null": {},
+    "plastic": {},
+    "polarizer": {},
+    "pplastic": {},
+    "principled": {},
+    "principledthin": {},
+    "retarder": {},
+    "roughconductor": {},
+    "roughdielectric": {},
+    "roughplastic": {},
+    "thindielectric": {},
+    "twosided": {"bsdf": {"type": "roughconductor"}},
+}
+
+# A frame that is turned away from the surface's knows a direction of its own, and cosines that are not the surface's
+# (Veach1997, section 5.3): what Mitsuba's manual calls an approximation that these two plugins are made of.
+_TURNED_FRAME = {
+    "isotropy": "the normal it is shaded with is tilted to one side: it turns with the surface",
+    "reciprocity": "the cosine of wi is that of another normal than the surface's (Veach1997, section 5.3)",
+    "energy": "what the tilted frame reflects to below the surface is cut off in one direction only",
+}
+_BY_NATURE: dict[str, dict[str, str]] = {
+    "bumpmap": _TURNED_FRAME,
+    "normalmap": _TURNED_FRAME,
+    "hair": {
+        "reciprocity": "where wo's ray meets the fibre, its offset, is fixed: light that comes back has another",
+        "isotropy": "a fibre has an axis",
+    },
+}
+
+
+def plugin(name: str, properties: Mapping[str, object]) -> Native:
+    """A plugin by name with the properties given; BSDFs of BSDFs get plain ones inside."""
+    more: PluginDict = {}
+    if name == "bumpmap" and "texture" not in properties:
+        ramp = np.linspace(0.0, 0.2, 16, dtype=np.float32)
+        heights = mitsuba().Bitmap(np.ascontiguousarray(ramp[None, :, None]))
+        more = {"texture": {"type": "bitmap", "bitmap": heights, "raw": True}}
+    return load({"type": name, **_NESTS.get(name, {}), **more, **properties})
+
+
+_registered: dict[Path, dict[str, object]] = {}  # what the files registered that were run, by path
+
+
+def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
+    """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
+    the file registers none of that name."""
+    path = Path(target.rpartition(":")[0]).expanduser().resolve()
+    name = target.rpartition(":")[2]
+    if not path.is_file() or b"register_bsdf" not in path.read_bytes():
+        return None
+    mi = mitsuba()
+    register, seen = mi.register_bsdf, _registered.setdefault(path, {})
+
+    def noted(kind: str, make: object, *more: object) -> None:
+        seen[kind] = make
+        register(kind, make, *more)
+
+    vars(mi)["register_bsdf"] = noted
+    try:
+        module = outside.module_of(path, "TARGET")
+    finally:
+        vars(mi)["register_bsdf"] = register
+    kind = name if name in seen else next((k for k, make in seen.items() if make is vars(module).get(name)), None)
+    return None if kind is None else load({"type": kind, **properties})
+
+
+def mitsuba() -> ModuleType:
+    mi = engine.load()
+    if not mi.variant().startswith("llvm_"):
+        raise InputError(f"variant {mi.variant()} is set, an LLVM one expected", "mitsuba", "verify in another process")
+    adapter.register(mi)
+    mi.set_log_level(mi.LogLevel.Error)
+    return mi
+
+
+def _refused(error: Exception, name: str) -> InputError:
+    text = " ".join(str(error).split())
+    if "not found" in text and ("Plugin" in text or "plugin" in text):
+        return InputError(f"Mitsuba has no plugin '{name}'", f"mitsuba:{name}", did_you_mean(name, plugins()))
+    # Mitsuba prefixes source lines and the object's description; the last sentence says what it is about
+    return InputError(f"Mitsuba refuses it: {text[-200:] if len(text) > 200 else text}", f"mitsuba:{name}")

@@ -1,0 +1,405 @@
+"""glTF 2.0: metallic-roughness with Khronos' extensions, in Gonio's materials (Khronos2021, appendix B)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from ...errors import InputError
+from . import Described, Document, Notation
+from .gltf_file import LARGEST, GltfFile, Json
+
+WHITE = (1.0, 1.0, 1.0)
+NARROWEST = 2e-3  # width under a sheen, whose sum has no mirrors
+HIGHEST_INDEX = 3.0  # of a coat
+D_LINE, F_LINE, C_LINE = 0.5876, 0.4861, 0.6563  # um, by which Abbe's number is defined
+
+# What other files may ask for, which has nothing to do with materials or is read here
+KNOWN = {
+    *(
+        f"KHR_materials_{name}"
+        for name in (
+            "anisotropy", "clearcoat", "dispersion", "emissive_strength", "ior", "iridescence", "sheen", "specular",
+            "transmission", "unlit", "variants", "volume",
+        )
+    ),
+    "KHR_lights_punctual", "KHR_mesh_quantization", "KHR_node_visibility", "EXT_mesh_gpu_instancing",
+}  # fmt: skip
+TELLS = "KHR_materials_diffuse_transmission"  # read, and said that it is not carried
+
+
+class Gltf(Document):
+    """glTF's materials (.gltf, .glb)."""
+
+    name: ClassVar[str] = "gltf"
+    suffixes: ClassVar[tuple[str, ...]] = (".gltf", ".glb")
+
+    def materials(self, path: Path) -> list[str]:
+        return _names(GltfFile(path))
+
+    def read(self, path: Path, name: str) -> Described:
+        file = GltfFile(path)
+        return _Material(file, _names(file).index(name)).described()
+
+    def image(self, path: Path, index: str) -> bytes:
+        file = GltfFile(path)
+        at = f"/images/{index}"
+        if not index.isdigit() or int(index) >= len(file.items("images")):
+            raise InputError(f"no picture '{index}' in it", f"{path}#{at}")
+        image = file.items("images")[int(index)]
+        uri = image.get("uri")
+        if isinstance(uri, str):
+            return file.data(uri, f"{at}/uri")
+        return file.view(file.index(image, "bufferView", "bufferViews", at))
+
+
+def _names(file: GltfFile) -> list[str]:
+    """A material's name where it is the only one of it, else its number."""
+    given = [str(material.get("name", "")) for material in file.items("materials")]
+    count: dict[str, int] = {}
+    for name in given:
+        count[name] = count.get(name, 0) + 1
+    plain = {name for name, times in count.items() if name and times == 1 and not name.isdigit()}
+    return [name if name in plain else str(index) for index, name in enumerate(given)]
+
+
+class _Material:
+    """One material of a file on its way into Gonio's words.
+
+    A layered material as the specification has it, from the bottom: a dielectric, which is a clear layer over a diffuse
+    one or transmits; mixed with a metal; under sheen; under a clear coat; with holes.
+    """
+
+    def __init__(self, file: GltfFile, index: int) -> None:
+        self.file, self.at = file, f"/materials/{index}"
+        self.own = file.items("materials")[index]
+        self.extensions = file.member(self.own, "extensions", self.at)
+        self.notices: list[str] = []
+        required = file.root.get("extensionsRequired", [])
+        if not isinstance(required, list):
+            file.fail("a list expected", "/extensionsRequired")
+        for name in required:
+            if name not in KNOWN:
+                hint = "save it without this extension"
+                file.fail(f"it requires the extension {str(name)[:60]}, which is not read", "/extensionsRequired", hint)
+        for name in self.extensions:
+            if name not in KNOWN | {TELLS}:
+                self.notices.append(f"the extension {name[:60]} is not read: the material is without it")
+        self._read()
+
+    # ------------------------------------------------------------------ reading
+
+    def extension(self, name: str) -> tuple[Json, str]:
+        """An extension of the material, empty where it has none, and its place."""
+        key = f"KHR_materials_{name}"
+        return self.file.member(self.extensions, key, f"{self.at}/extensions"), f"{self.at}/extensions/{key}"
+
+    def _read(self) -> None:
+        file, at = self.file, f"{self.at}/pbrMetallicRoughness"
+        pbr = file.member(self.own, "pbrMetallicRoughness", self.at)
+        *base, self.alpha_factor = file.colour(pbr, "baseColorFactor", (*WHITE, 1.0), at)
+        self.base_texture = self.texture(pbr, "baseColorTexture", at, srgb=True)
+        self.base = self.coloured(self.base_texture, tuple(base))
+        both = self.texture(pbr, "metallicRoughnessTexture", at)
+        self.metallic = self.scaled(both, "b", file.number(pbr, "metallicFactor", 1.0, at, 0.0, 1.0))
+        self.roughness = self.scaled(both, "g", file.number(pbr, "roughnessFactor", 1.0, at, 0.0, 1.0))
+
+        values, at = self.extension("ior")
+        self.index = file.number(values, "ior", 1.5, at, 0.0, LARGEST)
+        values, at = self.extension("specular")
+        self.specular = file.number(values, "specularFactor", 1.0, at, 0.0, 1.0)
+        self.specular_colour = file.colour(values, "specularColorFactor", WHITE, at, LARGEST)
+        self.leave(values, at, "specularTexture", "specularColorTexture")
+        values, at = self.extension("transmission")
+        through = self.texture(values, "transmissionTexture", at)
+        self.transmission = self.scaled(through, "r", file.number(values, "transmissionFactor", 0.0, at, 0.0, 1.0))
+        values, at = self.extension("volume")
+        self.thickness = file.number(values, "thicknessFactor", 0.0, at, 0.0, LARGEST)
+        self.distance = (
+            file.number(values, "attenuationDistance", math.inf, at, 0.0, LARGEST)
+            if ("attenuationDistance" in values)
+            else math.inf
+        )
+        self.attenuation = file.colour(values, "attenuationColor", WHITE, at)
+        self.leave(values, at, "thicknessTexture")
+        values, at = self.extension("dispersion")
+        self.dispersion = file.number(values, "dispersion", 0.0, at, 0.0, LARGEST)
+        values, at = self.extension("anisotropy")
+        self.anisotropy = file.number(values, "anisotropyStrength", 0.0, at, 0.0, 1.0)
+        self.turn = file.number(values, "anisotropyRotation", 0.0, at, -LARGEST, LARGEST)
+        self.leave(values, at, "anisotropyTexture")
+        values, at = self.extension("iridescence")
+        self.iridescence = file.number(values, "iridescenceFactor", 0.0, at, 0.0, 1.0)
+        self.film_index = file.number(values, "iridescenceIor", 1.3, at, 1.0, LARGEST)
+        file.number(values, "iridescenceThicknessMinimum", 100.0, at, 0.0, LARGEST)
+        self.film = file.number(values, "iridescenceThicknessMaximum", 400.0, at, 0.0, LARGEST)
+        self.leave(values, at, "iridescenceTexture", "iridescenceThicknessTexture")
+        values, at = self.extension("sheen")
+        self.sheen = file.colour(values, "sheenColorFactor", (0.0, 0.0, 0.0), at)
+        self.sheen_roughness = file.number(values, "sheenRoughnessFactor", 0.0, at, 0.0, 1.0)
+        self.leave(values, at, "sheenColorTexture", "sheenRoughnessTexture")
+        values, at = self.extension("clearcoat")
+        over = self.texture(values, "clearcoatTexture", at)
+        self.clearcoat = self.scaled(over, "r", file.number(values, "clearcoatFactor", 0.0, at, 0.0, 1.0))
+        self.clearcoat_roughness = file.number(values, "clearcoatRoughnessFactor", 0.0, at, 0.0, 1.0)
+        self.leave(values, at, "clearcoatRoughnessTexture", "clearcoatNormalTexture")
+        self._rest()
+
+    def _rest(self) -> None:
+        """What is no part of a scattering function, or has no word here."""
+        file, at = self.file, self.at
+        normal = self.texture(self.own, "normalTexture", at)
+        scale = file.number(file.member(self.own, "normalTexture", at), "scale", 1.0, at, -LARGEST, LARGEST)
+        self.normal = None if normal is None else {"file": normal["file"], **({"scale": scale} if scale != 1.0 else {})}
+        self.mode = self.own.get("alphaMode", "OPAQUE")
+        if self.mode not in ("OPAQUE", "MASK", "BLEND"):
+            file.fail(f"'{str(self.mode)[:20]}' given, OPAQUE, MASK or BLEND expected", f"{at}/alphaMode")
+        self.cutoff = file.number(self.own, "alphaCutoff", 0.5, at, 0.0, LARGEST)
+        emission = file.colour(self.own, "emissiveFactor", (0.0, 0.0, 0.0), at)
+        values, place = self.extension("emissive_strength")
+        strength = file.number(values, "emissiveStrength", 1.0, place, 0.0, LARGEST)
+        if any(emission) and strength:
+            light = ", ".join(f"{strength * part:.4g}" for part in emission)
+            self.notices.append(f"it emits [{light}]: a material of Gonio's only scatters, give the shape an areaLight")
+        self.leave(self.own, at, "occlusionTexture")
+        values, place = self.extension("diffuse_transmission")
+        if file.number(values, "diffuseTransmissionFactor", 0.0, place, 0.0, 1.0) > 0.0:
+            file.colour(values, "diffuseTransmissionColorFactor", WHITE, place)
+            self.notices.append("diffuse transmission is not carried: that light is reflected")
+
+    def leave(self, of: Mapping[str, object], at: str, *textures: str) -> None:
+        """Say of textures that they are left out."""
+        for key in textures:
+            if self.texture(of, key, at) is not None:
+                self.notices.append(f"{key} is left out: the factor stands alone")
+
+    def texture(self, of: Mapping[str, object], key: str, at: str, srgb: bool = False) -> Notation | None:
+        """A picture as scenes name one; None where there is none."""
+        if key not in of:
+            return None
+        file, at = self.file, f"{at}/{key}"
+        info = file.member(of, key, at)
+        texture = file.items("textures")[file.index(info, "index", "textures", at)]
+        transform = file.member(info, "extensions", at).get("KHR_texture_transform")
+        if file.whole(info, "texCoord", at, 0):
+            self.notices.append(f"{key} lies over a second set of coordinates, and is left out")
+            return None
+        if transform:
+            self.notices.append(f"{key} is taken without its transform")
+        if "source" not in texture:
+            self.notices.append(f"{key} has a picture that only an extension names, and is left out")
+            return None
+        number = file.index(texture, "source", "images", at)
+        image = file.items("images")[number]
+        found: Notation = {"type": "imageTex", "file": self._picture(image, number)}
+        if srgb:
+            found["colorSpace"] = "srgb"
+        if "sampler" in texture:
+            sampler = file.items("samplers")[file.index(texture, "sampler", "samplers", at)]
+            if sampler.get("magFilter") == 9728:
+                found["filter"] = "nearest"
+            if sampler.get("wrapS", 10497) != sampler.get("wrapT", 10497):
+                self.notices.append(f"{key} is wrapped along v as along u")
+            wrap = {33071: "clamp", 33648: "mirror"}.get(file.whole(sampler, "wrapS", at, 10497))
+            if wrap:
+                found["wrap"] = wrap
+        return found
+
+    def _picture(self, image: Json, number: int) -> str:
+        """A picture's file, from where the glTF lies; FILE#NUMBER where it is inside."""
+        at, uri = f"/images/{number}", image.get("uri")
+        if uri is None:
+            self.file.index(image, "bufferView", "bufferViews", at)
+            return f"{self.file.path.name}#{number}"
+        if not isinstance(uri, str):
+            self.file.fail("a text expected", f"{at}/uri")
+        if uri.startswith("data:"):
+            self.file.data(uri, f"{at}/uri")
+            return f"{self.file.path.name}#{number}"
+        return self.file.beside(uri, f"{at}/uri").relative_to(self.file.path.parent.resolve()).as_posix()
+
+    # ------------------------------------------------------------------ values
+
+    def coloured(self, texture: Notation | None, factor: tuple[float, ...]) -> object:
+        return list(factor) if texture is None else {**texture, "factor": list(factor)}
+
+    def scaled(self, texture: Notation | None, channel: str, factor: float) -> object:
+        return factor if texture is None or not factor else {**texture, "channel": channel, "factor": factor}
+
+    def widths(self, anisotropic: bool = True) -> Notation:
+        """`alpha` of the roughness, or the dial where a picture holds that."""
+        if isinstance(self.roughness, dict):
+            if self.anisotropy:
+                self.say("the anisotropy is left out, as the roughness is a picture")
+            return {"roughness": self.roughness}
+        alpha = float(self.roughness) ** 2  # type: ignore[arg-type]
+        if any(self.sheen):
+            alpha = max(alpha, NARROWEST)
+        if not self.anisotropy or not anisotropic:
+            return {"alpha": alpha}
+        along = alpha + (1.0 - alpha) * self.anisotropy**2
+        turned = {"rotation": math.remainder(self.turn, math.tau)} if self.turn else {}
+        return {"alpha": [along, alpha], **turned}
+
+    def say(self, notice: str) -> None:
+        if notice not in self.notices:
+            self.notices.append(notice)
+
+    # ------------------------------------------------------------------ layers
+
+    def described(self) -> Described:
+        if "KHR_materials_unlit" in self.extensions:
+            self.say("it is unlit, shown as painted whatever the light: here it is a matt surface of that colour")
+            found: Notation = {"type": "lambert", "albedo": self.base}
+        else:
+            found = self._coated(self._sheened(self._body()))
+        found = self._holed(found)
+        if self.normal is not None:
+            found["normalmap"] = self.normal
+        return Described(found, tuple(self.notices))
+
+    def _body(self) -> Notation:
+        metallic, through = self.metallic, self.transmission
+        if metallic == 1.0:
+            return self._metal()
+        dielectric = self._opaque() if through == 0.0 else self._clear()
+        if isinstance(through, dict) or 0.0 < float(through) < 1.0:  # type: ignore[arg-type]
+            dielectric = _mixed(self._opaque(), dielectric, through)
+        return dielectric if metallic == 0.0 else _mixed(dielectric, self._metal(), metallic)
+
+    def _metal(self) -> Notation:
+        plain: Notation = {"type": "metal", "r0": self.base, **self.widths()}
+        if not self.iridescence:
+            return plain
+        if isinstance(self.base, dict):
+            self.say("the film is left out, as its metal's colour is a picture")
+            return plain
+        # a metal is known by its reflectance alone; so the specification takes an index without loss
+        roots = [math.sqrt(min(r, 0.9999)) for r in self.base]  # type: ignore[attr-defined]
+        filmed: Notation = {"type": "film-conductor", "eta": [(1.0 + r) / (1.0 - r) for r in roots], "k": 0.0}
+        filmed |= {**self.widths(), **self._film()}
+        return filmed if self.iridescence == 1.0 else _mixed(plain, filmed, self.iridescence)
+
+    def _film(self) -> Notation:
+        if self.film > 3000.0 or self.film_index > HIGHEST_INDEX:
+            self.say("the film is held at 3000 nm and an index of 3")
+        return {"thickness": min(self.film, 3000.0), "film_eta": min(self.film_index, HIGHEST_INDEX)}
+
+    def _opaque(self) -> Notation:
+        """A clear layer over a diffuse one, whose colour is what is seen of it."""
+        if self.iridescence:
+            self.say("the film is left out over the diffuse part")
+        matt: Notation = {"type": "lambert", "albedo": self.base}
+        index = self._index()
+        if index - 1.0 < 1e-4:
+            return matt
+        if isinstance(self.roughness, dict):
+            alpha: object = {**self.roughness, "mean": True}
+            self.say("the clear layer has one roughness, the picture's mean: its tables are of one width")
+        else:
+            alpha = self.roughness
+            if self.anisotropy:
+                self.say("the anisotropy is left out over the diffuse part")
+        width: Notation = {"roughness": alpha} if isinstance(alpha, dict) else self.widths(anisotropic=False)
+        return {"type": "coat", "base": matt, "index": index, "bounces": "white", **width}
+
+    def _index(self) -> float:
+        """The index that reflects as much from above as ior and specular say."""
+        grey = sum(self.specular_colour) / 3.0
+        if len(set(self.specular_colour)) > 1:
+            self.say("specularColorFactor is taken as its mean: a clear layer reflects without colour")
+        if self.index == 0.0:
+            r0 = 1.0
+        elif self.index < 1.0:
+            self.file.fail(
+                f"ior {self.index:g} given, 0 or 1 and more expected", f"{self.at}/extensions/KHR_materials_ior"
+            )
+        else:
+            r0 = ((self.index - 1.0) / (self.index + 1.0)) ** 2
+        r0 = min(r0 * grey, 1.0) * self.specular
+        root = math.sqrt(r0)
+        index = (1.0 + root) / max(1.0 - root, 1e-6)
+        if self.specular < 1.0 and r0 > 0.0:
+            self.say("specularFactor is taken as a lower index: where light grazes, all of it is still reflected")
+        if index > HIGHEST_INDEX:
+            self.say(f"the index {index:.3g} is held at {HIGHEST_INDEX:g}")
+        return min(index, HIGHEST_INDEX)
+
+    def _clear(self) -> Notation:
+        """Glass: a solid where it has a volume, else a sheet."""
+        index = self._index()
+        tint = {} if self.base == list(WHITE) else {"albedo": self.base}
+        if tint:
+            self.say("the base colour of what transmits tints its reflection too")
+        if not self.thickness:
+            if self.roughness != 0.0:
+                self.say("a thin sheet is smooth: its roughness is left out")
+            return {"type": "thin-dielectric", "eta": index, **tint}
+        glass: Notation = {"type": "dielectric", "eta": self._dispersing(index), **tint, **self.widths()}
+        if self.iridescence:
+            glass = {**glass, "type": "film-dielectric", **self._film()}
+        if math.isfinite(self.distance) and self.distance > 0.0:
+            dark = [max(-math.log(max(part, 1e-6)), 0.0) / self.distance for part in self.attenuation]
+            glass["absorption"] = dark
+        return glass
+
+    def _dispersing(self, index: float) -> object:
+        """Cauchy's formula through the index at 587.6 nm, with V = 20 / dispersion."""
+        if not self.dispersion or self.iridescence:
+            if self.dispersion:
+                self.say("the dispersion is left out under a film")
+            return index
+        b = (index - 1.0) * self.dispersion / 20.0 / (F_LINE**-2 - C_LINE**-2)
+        return f"cauchy({index - b / D_LINE**2:.9g}, {b:.9g})"
+
+    def _sheened(self, body: Notation) -> Notation:
+        """Fibres on top; below them is left what they do not reflect on average."""
+        if not any(self.sheen):
+            return body
+        alpha = self.sheen_roughness**2
+        if alpha < ALBEDOS[0][0]:
+            alpha = ALBEDOS[0][0]
+            self.say(f"the sheen's roughness is held at {math.sqrt(alpha):.2g}, where its model starts to keep energy")
+        kept = 1.0 - max(self.sheen) * float(np.interp(alpha, *ALBEDOS))
+        below = _mixed({"type": "lambert", "albedo": 0.0}, body, kept)
+        return {"type": "sum", "a": {"type": "sheen-charlie", "albedo": list(self.sheen), "alpha": alpha}, "b": below}
+
+    def _coated(self, body: Notation) -> Notation:
+        if self.clearcoat == 0.0:
+            return body
+        if self.transmission != 0.0:
+            self.say("the clear coat is left out: a coat's base must not transmit")
+            return body
+        alpha = self.clearcoat_roughness**2
+        coated: Notation = {"type": "coat", "base": body, "index": 1.5, "alpha": alpha, "bounces": "white"}
+        return coated if self.clearcoat == 1.0 else _mixed(body, coated, self.clearcoat)
+
+    def _holed(self, found: Notation) -> Notation:
+        if self.mode == "OPAQUE":
+            return found
+        opacity: object = self.alpha_factor
+        if self.base_texture is not None:
+            opacity = {**self.base_texture, "colorSpace": "raw", "channel": "a", "factor": self.alpha_factor}
+            if self.mode == "MASK":
+                self.say("the mask's edge is soft: alphaCutoff has no word")
+        elif self.mode == "MASK":
+            opacity = 1.0 if self.alpha_factor >= self.cutoff else 0.0
+        if opacity == 1.0:
+            return found
+        both = found if self.transmission != 0.0 else {"type": "two-sided", "base": found}
+        return {"type": "opacity", "base": both, "opacity": opacity}
+
+
+def _mixed(a: Notation, b: Notation, weight: object) -> Notation:
+    return {"type": "mix", "a": a, "b": b, "weight": weight}
+
+
+# Of white `sheen-charlie`: (alpha, what it reflects of light from all around), measured by go.albedo
+ALBEDOS = (
+    (0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0),
+    (0.0624, 0.0777, 0.1010, 0.1226, 0.1615, 0.1954, 0.2244, 0.2486, 0.2681, 0.2830, 0.2934, 0.2996),
+)

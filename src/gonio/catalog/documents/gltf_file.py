@@ -1,0 +1,281 @@
+"""A glTF 2.0 file as JSON whose numbers can be trusted: .gltf with what lies beside it, or .glb (Khronos2021, sec. 4).
+
+Nothing is believed: sizes are compared with the files they speak of, indices with the lists they point into, and what a
+file names must lie in its own folder.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NoReturn, TypeAlias
+from urllib.parse import unquote
+
+from ...errors import InputError
+
+Json: TypeAlias = "dict[str, object]"
+
+MOST = 1 << 30  # bytes of a file: more is no material's
+MOST_JSON = 64 << 20
+MOST_ITEMS = 1_000_000  # of a list, so that a check takes a second at most
+LARGEST = 1e18  # as a scene's numbers
+_JSON, _BIN = 0x4E4F534A, 0x004E4942
+_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_PARTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+class GltfFile:
+    """A file that was checked as a whole.
+
+    path  it lies there
+    root  its JSON
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self._where = path, str(path)
+        data = self._bytes_of(path)
+        self._chunk: bytes | None = None
+        self._lists: dict[str, list[Json]] = {}
+        if data[:4] == b"glTF" or path.suffix.lower() == ".glb":
+            text, self._chunk = self._chunks(data)
+        else:
+            text = data
+        self.root = self._parsed(text)
+        self._check()
+
+    # ------------------------------------------------------------------ what the JSON holds
+
+    def fail(self, what: str, at: str = "", hint: str = "") -> NoReturn:
+        """InputError at a place in the file."""
+        raise InputError(what, f"{self._where}#{at}" if at else self._where, hint)
+
+    def items(self, key: str) -> list[Json]:
+        """A list of objects at the top level, empty where there is none."""
+        if key not in self._lists:
+            found = self.root.get(key, [])
+            if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+                self.fail("a list of objects expected", f"/{key}")
+            self._lists[key] = found
+        return self._lists[key]
+
+    def member(self, of: Mapping[str, object], key: str, at: str) -> Json:
+        """A member that is an object, empty where there is none."""
+        found = of.get(key, {})
+        if not isinstance(found, dict):
+            self.fail("an object expected", f"{at}/{key}")
+        return found
+
+    def number(self, of: Mapping[str, object], key: str, default: float, at: str, low: float, high: float) -> float:
+        """A member that is a number from low to high."""
+        found = of.get(key, default)
+        if isinstance(found, bool) or not isinstance(found, int | float):
+            self.fail("a number expected", f"{at}/{key}")
+        if not low <= found <= high:  # a number of a thousand digits can be compared, and not be written
+            self.fail(f"{str(found)[:20]} is out of range: {low:g} to {high:g} expected", f"{at}/{key}")
+        return float(found)
+
+    def colour(
+        self, of: Mapping[str, object], key: str, default: tuple[float, ...], at: str, high: float = 1.0
+    ) -> tuple[float, ...]:
+        """A member that is a list of as many numbers as the default, from 0 to `high`."""
+        found = of.get(key, list(default))
+        if not isinstance(found, list) or len(found) != len(default):
+            self.fail(f"a list of {len(default)} numbers expected", f"{at}/{key}")
+        return tuple(self.number({str(i): part}, str(i), 0.0, f"{at}/{key}", 0.0, high) for i, part in enumerate(found))
+
+    def whole(
+        self, of: Mapping[str, object], key: str, at: str, default: int | None = None, high: int = 1 << 40
+    ) -> int:
+        """A member that is a whole number from 0 to `high`; an error where it is missing and has no default."""
+        found = of.get(key, default)
+        if isinstance(found, bool) or not isinstance(found, int) or found < 0:
+            self.fail("a whole number of 0 or more expected", f"{at}/{key}")
+        if found > high:
+            self.fail(f"{str(found)[:20]} given, at most {high} expected", f"{at}/{key}")
+        return found
+
+    def index(self, of: Mapping[str, object], key: str, into: str, at: str) -> int:
+        """A member that is an index into a list at the top level."""
+        count = len(self.items(into))
+        found = self.whole(of, key, at)
+        if found >= count:
+            self.fail(f"there is no {into} {found}, of {count}", f"{at}/{key}")
+        return found
+
+    # ------------------------------------------------------------------ bytes
+
+    def view(self, index: int) -> bytes:
+        """The bytes of a buffer view, which `_check` has found within its buffer."""
+        view = self.items("bufferViews")[index]
+        at = f"/bufferViews/{index}"
+        data = self._buffer(self.index(view, "buffer", "buffers", at))
+        start = self.whole(view, "byteOffset", at, 0)
+        return data[start : start + self.whole(view, "byteLength", at)]
+
+    def beside(self, uri: str, at: str) -> Path:
+        """The file of a relative address. InputError where it lies outside the folder, or there is none."""
+        hint = "give a file beside it, or put the data into the file"
+        if ":" in uri.split("/")[0] or uri.startswith(("//", "\\")):
+            self.fail(f"'{uri[:60]}' is no file beside it", at, hint)
+        try:
+            folder = self.path.parent.resolve()
+            found = (folder / unquote(uri)).resolve()
+            inside, there = found.is_relative_to(folder), found.is_file()
+        except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, links in a circle
+            self.fail(f"no usable file name: {error}", at, hint)
+        if not inside:
+            self.fail(f"'{uri[:60]}' lies outside its folder", at, hint)
+        if not there:
+            self.fail(f"'{uri[:60]}' does not exist", at, "keep a .gltf together with its files, or use .glb")
+        return found
+
+    def data(self, uri: str, at: str) -> bytes:
+        """What a data: address holds."""
+        head, comma, text = uri.partition(",")
+        if not comma or not head.endswith(";base64"):
+            self.fail("a data address without ';base64,'", at)
+        try:
+            return base64.b64decode(text, validate=True)
+        except (binascii.Error, ValueError):
+            self.fail("no base64", at)
+
+    def _buffer(self, index: int) -> bytes:
+        buffer, at = self.items("buffers")[index], f"/buffers/{index}"
+        uri = buffer.get("uri")
+        if uri is None:
+            if index or self._chunk is None:
+                self.fail("a buffer without data", at)
+            return self._chunk
+        if not isinstance(uri, str):
+            self.fail("a text expected", f"{at}/uri")
+        return self.data(uri, f"{at}/uri") if uri.startswith("data:") else self._bytes_of(self.beside(uri, f"{at}/uri"))
+
+    def _size(self, index: int) -> int:
+        """How many bytes a buffer really has; a file beside it is not read for that."""
+        uri = self.items("buffers")[index].get("uri")
+        if isinstance(uri, str) and not uri.startswith("data:"):
+            return self.beside(uri, f"/buffers/{index}/uri").stat().st_size
+        return len(self._buffer(index))
+
+    def _bytes_of(self, path: Path) -> bytes:
+        try:
+            size = path.stat().st_size
+            if size > MOST:
+                raise InputError(f"{size} bytes, at most {MOST} expected", str(path))
+            return path.read_bytes()
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from None
+
+    def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
+        """The JSON and the binary chunk of a .glb."""
+        if len(data) < 20 or data[:4] != b"glTF":
+            self.fail("no glTF: its first 20 bytes are no head of a .glb")
+        version, length = struct.unpack_from("<II", data, 4)
+        if version != 2:
+            self.fail(f"version {version} of .glb, 2 expected", hint="save it as glTF 2.0")
+        if length != len(data):
+            self.fail(f"it says that it has {length} bytes, and has {len(data)}", hint="it is cut off or damaged")
+        found: dict[int, bytes] = {}
+        at = 12
+        while at < length:
+            if at + 8 > length:
+                self.fail(f"a chunk's head is cut off at byte {at}")
+            size, kind = struct.unpack_from("<II", data, at)
+            if size > length - at - 8:
+                self.fail(f"a chunk of {size} bytes at byte {at}, where {length - at - 8} are left")
+            found.setdefault(kind, data[at + 8 : at + 8 + size])
+            at += 8 + size
+        if _JSON not in found:
+            self.fail("a .glb without JSON")
+        return found[_JSON], found.get(_BIN)
+
+    # ------------------------------------------------------------------ checks
+
+    def _parsed(self, text: bytes) -> Json:
+        if len(text) > MOST_JSON:
+            self.fail(f"{len(text)} bytes of JSON, at most {MOST_JSON} expected")
+
+        def no_number(name: str) -> NoReturn:
+            raise ValueError(f"{name} is no number")
+
+        try:
+            found = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
+        except RecursionError:
+            self.fail("JSON that is nested too deep")
+        except ValueError as error:  # no UTF-8 too, and an integer of more digits than Python converts
+            self.fail(f"no JSON: {str(error)[:200]}", hint="it is cut off or damaged")
+        if not isinstance(found, dict):
+            self.fail("an object expected", "/")
+        return found
+
+    def _check(self) -> None:
+        version = self.member(self.root, "asset", "").get("version")
+        if not isinstance(version, str) or not version.startswith("2."):
+            what = "no asset.version" if version is None else f"version {str(version)[:20]}"
+            self.fail(f"{what}, 2.0 expected", "/asset", "save it as glTF 2.0")
+        for key, value in self.root.items():
+            if isinstance(value, list) and len(value) > MOST_ITEMS:
+                self.fail(f"{len(value)} entries, at most {MOST_ITEMS} expected", f"/{key}")
+        sizes = self._buffers()
+        for index, view in enumerate(self.items("bufferViews")):
+            at = f"/bufferViews/{index}"
+            end = self.whole(view, "byteOffset", at, 0) + self.whole(view, "byteLength", at)
+            size = sizes[self.index(view, "buffer", "buffers", at)]
+            if end > size:
+                self.fail(f"it ends at byte {end} of a buffer of {size}", at, "it is cut off or damaged")
+        for index, accessor in enumerate(self.items("accessors")):
+            self._accessor(accessor, f"/accessors/{index}")
+        self._nodes()
+
+    def _buffers(self) -> list[int]:
+        sizes = []
+        for index, buffer in enumerate(self.items("buffers")):
+            claimed, size = self.whole(buffer, "byteLength", f"/buffers/{index}"), self._size(index)
+            if claimed > size:
+                what = f"a buffer of {claimed} bytes, and there are {size}"
+                self.fail(what, f"/buffers/{index}/byteLength", "it is cut off or damaged")
+            sizes.append(claimed)
+        return sizes
+
+    def _accessor(self, accessor: Json, at: str) -> None:
+        size, parts = _SIZES.get(self.whole(accessor, "componentType", at)), _PARTS.get(str(accessor.get("type")))
+        if size is None or parts is None:
+            self.fail("unknown componentType or type", at)
+        count = self.whole(accessor, "count", at)
+        if "bufferView" not in accessor:
+            return
+        view = self.items("bufferViews")[self.index(accessor, "bufferView", "bufferViews", at)]
+        element = size * parts
+        stride = self.whole(view, "byteStride", at, 0, 252) or element
+        end = self.whole(accessor, "byteOffset", at, 0) + (stride * (count - 1) + element if count else 0)
+        if end > self.whole(view, "byteLength", at):
+            self.fail(f"{count} entries end at byte {end} of a view of {view['byteLength']}", at)
+
+    def _nodes(self) -> None:
+        """Every node has one parent at most, and none is its own ancestor."""
+        nodes = self.items("nodes")
+        parent: dict[int, int] = {}
+        for index, node in enumerate(nodes):
+            at = f"/nodes/{index}/children"
+            children = node.get("children", [])
+            if not isinstance(children, list):
+                self.fail("a list expected", at)
+            for place, child in enumerate(children):
+                number = self.index({str(place): child}, str(place), "nodes", at)
+                if number in parent:
+                    self.fail(f"node {number} has two parents", at)
+                parent[number] = index
+        rooted: set[int] = set()
+        for start in range(len(nodes)):
+            chain: set[int] = set()
+            here: int | None = start
+            while here is not None and here not in rooted:
+                if here in chain:
+                    self.fail(f"node {here} is its own ancestor", f"/nodes/{here}", "nodes must form a tree")
+                chain.add(here)
+                here = parent.get(here)
+            rooted |= chain

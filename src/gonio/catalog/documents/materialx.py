@@ -1,0 +1,259 @@
+"""MaterialX: open_pbr_surface and standard_surface, by the wheel MaterialX (gonio[materialx])."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, TypeAlias
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...errors import InputError, MachineError, did_you_mean
+from . import Described, Document, Notation, xml_guard
+
+Node: TypeAlias = Any  # of MaterialX's own, in C++, without stubs
+Number: TypeAlias = float | bool | tuple[float, ...]
+Inputs: TypeAlias = dict[str, Number]
+
+OPEN_PBR, STANDARD = "open_pbr_surface", "standard_surface"
+LIBRARIES = ("stdlib/stdlib_defs.mtlx", "pbrlib/pbrlib_defs.mtlx", f"bxdf/{OPEN_PBR}.mtlx", f"bxdf/{STANDARD}.mtlx")
+FRAMES = {
+    "geometry_normal",
+    "geometry_coat_normal",
+    "geometry_tangent",
+    "geometry_coat_tangent",
+    "coat_normal",
+    "normal",
+}
+
+# What `to_open_pbr` has no word for, and where it then makes no difference
+LEFT: Mapping[str, Number] = {
+    "specular_rotation": 0.0, "transmission_extra_roughness": 0.0, "coat_rotation": 0.0, "coat_affect_color": 0.0,
+}  # fmt: skip
+
+
+class MaterialX(Document):
+    """MaterialX documents (.mtlx)."""
+
+    name: ClassVar[str] = "materialx"
+    suffixes: ClassVar[tuple[str, ...]] = (".mtlx",)
+    writes: ClassVar[str] = "openpbr"
+
+    def materials(self, path: Path) -> list[str]:
+        return list(_surfaces(_document(path)))
+
+    def read(self, path: Path, name: str) -> Described:
+        document = _document(path)  # its nodes do not keep it
+        surface = _surfaces(document)[name]
+        where = f"{path}#{surface.getName()}"
+        given = _inputs(surface, where)
+        notices: list[str] = []
+        if surface.getCategory() == STANDARD:
+            definition = surface.getNodeDef()  # of its version
+            whole = {**_defaults(definition.getName() if definition else f"ND_{STANDARD}_surfaceshader"), **given}
+            notices = [f"{key} is left out" for key, without in LEFT.items() if whole[key] != without]
+            given = to_open_pbr(whole)
+        values = {key: list(value) if isinstance(value, tuple) else value for key, value in given.items()}
+        return Described({"type": "openpbr", **values}, tuple(notices))
+
+    def write(self, notation: Notation, name: str) -> bytes:
+        """The file of an `openpbr`: an open_pbr_surface and a material of that name."""
+        mx = _wheel()
+        document = mx.createDocument()
+        surface = document.addNode(OPEN_PBR, "surface_" + mx.createValidName(name), "surfaceshader")
+        known = _types(OPEN_PBR)
+        for key, value in notation.items():
+            if key in ("type", "layering"):  # how the same lobes are put together is Gonio's own matter
+                continue
+            if key not in known:
+                raise InputError(f"{OPEN_PBR} has no input '{key}'", "material", did_you_mean(key, list(known)))
+            surface.addInput(key, known[key]).setValueString(_text(value, known[key], key))
+        material = document.addNode("surfacematerial", mx.createValidName(name), "material")
+        material.addInput("surfaceshader", "surfaceshader").setNodeName(surface.getName())
+        text: str = mx.writeToXmlString(document)
+        return text.encode()
+
+
+def to_open_pbr(s: Mapping[str, Number]) -> Inputs:
+    """The parameters of OpenPBR that stand for those of Autodesk's Standard Surface.
+
+    The formulas are those of MaterialX's node graph NG_standard_surface_to_open_pbr_surface (MaterialX2024), in its
+    libraries/bxdf/translation. There a film's thickness becomes micrometres, a coat over metal only tints, and
+    `coat_affect_roughness` is handed to `coat_darkening`.
+    """
+    coat, metal = _number(s["coat"]), _number(s["metalness"])
+    colour, coat_colour = _colour(s["base_color"]), _colour(s["coat_color"])
+    specular_colour = _colour(s["specular_color"])
+    film = _number(s["thin_film_thickness"]) * 0.001
+    return {
+        "base_weight": s["base"],
+        "base_color": tuple(c * (1.0 + (k - 1.0) * coat) for c, k in zip(colour, coat_colour, strict=True)),
+        "base_diffuse_roughness": s["diffuse_roughness"],
+        "base_metalness": metal,
+        "specular_weight": 1.0 if metal > 0.0 else s["specular"],
+        "specular_color": specular_colour if sum(specular_colour) != 0.0 else (1.0, 1.0, 1.0),
+        "specular_roughness": s["specular_roughness"],
+        "specular_ior": s["specular_IOR"],
+        "specular_roughness_anisotropy": s["specular_anisotropy"],
+        "transmission_weight": s["transmission"],
+        "transmission_color": s["transmission_color"],
+        "transmission_depth": s["transmission_depth"],
+        "transmission_scatter": s["transmission_scatter"],
+        "transmission_scatter_anisotropy": s["transmission_scatter_anisotropy"],
+        "transmission_dispersion_scale": s["transmission_dispersion"],
+        "subsurface_weight": s["subsurface"],
+        "subsurface_color": s["subsurface_color"],
+        "subsurface_radius": s["subsurface_scale"],
+        "subsurface_radius_scale": s["subsurface_radius"],
+        "subsurface_scatter_anisotropy": s["subsurface_anisotropy"],
+        "fuzz_weight": s["sheen"],
+        "fuzz_color": s["sheen_color"],
+        "fuzz_roughness": _number(s["sheen_roughness"]) ** 0.4,
+        "coat_weight": 0.0 if coat * metal > 0.0 else coat,
+        "coat_color": coat_colour,
+        "coat_roughness": s["coat_roughness"],
+        "coat_roughness_anisotropy": s["coat_anisotropy"],
+        "coat_ior": s["coat_IOR"],
+        "coat_darkening": s["coat_affect_roughness"],
+        "thin_film_weight": 1.0 if film > 0.0 else 0.0,
+        "thin_film_thickness": film,
+        "thin_film_ior": s["thin_film_IOR"],
+        "emission_luminance": s["emission"],
+        "emission_color": s["emission_color"],
+        "geometry_opacity": _colour(s["opacity"])[0],
+        "geometry_thin_walled": s["thin_walled"],
+    }
+
+
+def _number(value: Number) -> float:
+    assert isinstance(value, float), "of that type in the definition"
+    return value
+
+
+def _colour(value: Number) -> tuple[float, ...]:
+    assert isinstance(value, tuple), "of that type in the definition"
+    return value
+
+
+# --------------------------------------------------------------------------- MaterialX's own
+
+
+def _wheel() -> ModuleType:
+    try:
+        return importlib.import_module("MaterialX")
+    except ImportError:
+        what = "a MaterialX document needs the wheel MaterialX"
+        raise MachineError(what, "FILE.mtlx", "pip install 'gonio[materialx]'") from None
+
+
+@lru_cache(maxsize=1)
+def _library() -> Node:
+    """The definitions of nodes that a document may use."""
+    mx = _wheel()
+    library = mx.createDocument()
+    for file in LIBRARIES:
+        mx.readFromXmlFile(library, str(Path(str(mx.__file__)).parent / "libraries" / file))
+    return library
+
+
+@lru_cache(maxsize=4)
+def _types(category: str) -> dict[str, str]:
+    """The type of each input of a surface that is a value."""
+    found = _library().getNodeDef(f"ND_{category}_surfaceshader").getActiveInputs()
+    return {one.getName(): one.getType() for one in found if one.getName() not in FRAMES}
+
+
+def _defaults(definition: str) -> Inputs:
+    found = _library().getNodeDef(definition).getActiveInputs()
+    return {one.getName(): _plain(one.getValue()) for one in found if one.getName() not in FRAMES | {"tangent"}}
+
+
+def _plain(value: Node) -> Number:
+    """A value; of what is held as float32 the shortest number that stands for it."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int | float):
+        return float(str(np.float32(value)))
+    return tuple(float(str(np.float32(part))) for part in value)
+
+
+def _document(path: Path) -> Node:
+    """A file as a document of MaterialX's, after it was looked through: no include is left, no entity, no odd size."""
+    mx = _wheel()
+    root = xml_guard.read(path)
+    if root.tag != "materialx":
+        raise InputError(f"<{root.tag[:40]}> is no MaterialX document", str(path), "it starts with <materialx>")
+    document = mx.createDocument()
+    try:
+        mx.readFromXmlString(document, ElementTree.tostring(root, "unicode"))
+        document.setDataLibrary(_library())
+    except Exception as error:  # of MaterialX, which has a family of its own
+        raise InputError(f"MaterialX refuses it: {str(error)[:200]}", str(path), "mend it there") from None
+    return document
+
+
+def _surfaces(document: Node) -> dict[str, Node]:
+    """The surface of each material by the material's name, and surfaces without one by their own."""
+    found: dict[str, Node] = {}
+    loose = {node.getName(): node for node in document.getNodes() if node.getType() == "surfaceshader"}
+    for material in document.getNodes():
+        link = material.getInput("surfaceshader") if material.getType() == "material" else None
+        name = link.getNodeName() if link is not None else ""
+        if name in loose:
+            found[material.getName()] = loose[name]
+    worn = {node.getName() for node in found.values()}
+    return {**found, **{name: node for name, node in loose.items() if name not in worn}}
+
+
+def _inputs(surface: Node, where: str) -> Inputs:
+    """What a surface is given, each a value of the type in its definition."""
+    category = surface.getCategory()
+    if category not in (OPEN_PBR, STANDARD):
+        raise InputError(f"unknown node '{category[:60]}'", where, f"{OPEN_PBR} and {STANDARD} are read")
+    known, found = _types(category), {}
+    for one in surface.getInputs():
+        name = one.getName()
+        linked = [key for key in ("nodename", "nodegraph", "interfacename", "output") if one.hasAttribute(key)]
+        if linked:
+            what = f"its {name[:60]} is joined to '{one.getAttribute(linked[0])[:60]}', and only values can be read"
+            raise InputError(what, where, "bake it into a value")
+        if name not in known:
+            raise InputError(f"{category} has no input '{name[:60]}'", where, did_you_mean(name, list(known)))
+        if one.getType() != known[name]:
+            what = f"{name} is of type {one.getType()[:40]}, {known[name]} expected"
+            raise InputError(what, where)
+        found[name] = _value(one, where)
+    return found
+
+
+def _value(one: Node, where: str) -> Number:
+    name, text = one.getName(), one.getValueString()
+    try:
+        value = _plain(one.getValue())
+    except Exception:  # no value, or a text that is no number
+        raise InputError(f"{name} = '{text[:60]}' is no {one.getType()}", where) from None
+    numbers = value if isinstance(value, tuple) else (value,)
+    if not all(math.isfinite(number) for number in numbers):
+        raise InputError(f"{name} = '{text[:60]}' is not finite", where)
+    return value
+
+
+def _text(value: object, kind: str, name: str) -> str:
+    """A value as MaterialX writes it."""
+    try:
+        if kind == "boolean":
+            if not isinstance(value, bool):
+                raise TypeError
+            return str(value).lower()
+        parts = np.asarray(value, float).ravel().tolist()
+        parts = parts * 3 if kind == "color3" and len(parts) == 1 else parts
+        if len(parts) != (3 if kind == "color3" else 1) or not all(map(math.isfinite, parts)):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise InputError(f"{str(value)[:60]} given, a {kind} expected", f"material: {name}") from None
+    return ", ".join(f"{part:.9g}" for part in parts)

@@ -1,0 +1,225 @@
+"""A hundred named materials: what three papers fitted to the measured BRDFs of the MERL database, as parameters.
+
+    go.material("alum-bronze")                                  Bagher2012's fit, by `shifted-gamma`
+    go.material("alum-bronze", fit="low2012/lowsmooth_E2")      another: FILE/FIT, as go.fits("alum-bronze") lists
+
+As text, for the command line and scenes, the second is alum-bronze:low2012/lowsmooth_E2. The figures stand in
+`published/`, as the papers print them; here is what they mean. Every fit is a preset of its model too.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..errors import InputError, did_you_mean
+from ..material import model, models
+from ..material.bsdf import BSDF, Preset
+from ..material.parameters import Value
+
+Figures: TypeAlias = "dict[str, Value]"  # as printed, by the name in the collection
+
+FILES = ("bagher2012", "low2012", "ngan2005")
+DEFAULT = "bagher2012/sgd"  # the latest, and one of all hundred
+_FOLDER = Path(__file__).parent / "published"
+
+
+class Fit(NamedTuple):
+    """One way in which a paper fitted its materials.
+
+    name       FILE/FIT, "low2012/lowsmooth_E2"
+    model      the material's model, by name
+    source     the paper, as a key of docs/references.bib
+    materials  material -> the model's parameters
+    """
+
+    name: str
+    model: str
+    source: str
+    materials: Mapping[str, Mapping[str, Value]]
+
+
+def materials() -> list[str]:
+    """The names, in alphabetical order."""
+    return sorted(published()[DEFAULT].materials)
+
+
+def fits(name: str) -> list[str]:
+    """FILE/FIT of every fit of a material, the default first; InputError where the name is unknown."""
+    _known(name, "material")
+    return [fit.name for fit in published().values() if name in fit.materials]
+
+
+def knows(text: str) -> bool:
+    """Whether a text names a material of the library, were it with a fit that there is none of."""
+    return text.partition(":")[0] in published()[DEFAULT].materials
+
+
+def resembles(text: str) -> bool:
+    """Whether a text is the name of a material, with or without a fit, or nearer to one than to a model's name."""
+    near = difflib.get_close_matches(text.partition(":")[0].lower(), [*materials(), *models()], n=1, cutoff=0.75)
+    return bool(near) and near[0] in materials()
+
+
+def named(text: str, where: str = "material") -> tuple[type[BSDF], str]:
+    """(class, its preset's name) of NAME or NAME:FILE/FIT."""
+    name, _, fit = text.partition(":")
+    _known(name, where)
+    fit = fit or DEFAULT
+    if fit not in published():
+        raise InputError(f"unknown fit '{fit}'", where, did_you_mean(fit, fits(name)))
+    if name not in published()[fit].materials:
+        raise InputError(f"{fit} leaves '{name}' out", where, "it has " + ", ".join(fits(name)))
+    return model(published()[fit].model), _key(name, fit)
+
+
+def presets(model_name: str) -> dict[str, Preset]:
+    """The fits of a model as its presets: "alum-bronze" of the default, else "alum-bronze:low2012/lowsmooth_E2"."""
+    return {
+        key: Preset(key, values, fit.source)
+        for fit in published().values()
+        if fit.model == model_name
+        for name, values in fit.materials.items()
+        for key in [_key(name, fit.name)]
+    }
+
+
+@lru_cache(maxsize=1)
+def published() -> dict[str, Fit]:
+    """Every fit by FILE/FIT, the default first."""
+    found: dict[str, Fit] = {}
+    for file in FILES:
+        data = json.loads((_FOLDER / f"{file}.json").read_text())
+        for name, one in data["fits"].items():
+            model_name, translate = _MEANING[one["model"]]
+            shapes = {parameter: tuple(shape) for parameter, shape in one["parameters"].items()}
+            of_material = {}
+            for key, numbers in one["materials"].items():
+                figures = _unpacked(numbers, shapes)
+                of_material[key] = {"diffuse": figures["diffuse"], **translate(figures)}
+            found[f"{file}/{name}"] = Fit(f"{file}/{name}", model_name, data["source"], of_material)
+    return found
+
+
+def _unpacked(numbers: list[float], shapes: Mapping[str, tuple[int, ...]]) -> Figures:
+    """The flat list of a material's figures, by parameter: numbers, colours, pairs of colours."""
+    found: Figures = {}
+    at = 0
+    for name, shape in shapes.items():
+        size = math.prod(shape)
+        part = np.reshape(numbers[at : at + size], shape)
+        found[name] = float(part) if not shape else _tuples(part)
+        at += size
+    return found
+
+
+def _tuples(array: np.ndarray) -> Value:
+    return tuple(map(_tuples, array)) if array.ndim > 1 else tuple(array.tolist())
+
+
+def _key(name: str, fit: str) -> str:
+    return name if fit == DEFAULT else f"{name}:{fit}"
+
+
+def _known(name: str, where: str) -> None:
+    if name not in published()[DEFAULT].materials:
+        raise InputError(f"unknown material '{name}'", where, did_you_mean(name, materials()))
+
+
+# --------------------------------------------------------------------------- what the printed figures mean
+
+
+def _index(f0: float) -> float:
+    """The index that reflects f0 at normal incidence: Schlick's formula is given F0 by it."""
+    root = math.sqrt(f0)
+    return (1.0 + root) / (1.0 - root)
+
+
+def _times(colour: tuple[float, ...], factor: float) -> tuple[float, ...]:
+    return tuple(factor * c for c in colour)
+
+
+def _ward(p: Figures) -> Figures:
+    return {"specular": p["albedo"], "alpha": p["roughness"]}
+
+
+def _phong(p: Figures) -> Figures:
+    return {"specular": p["albedo"], "exponent": p["sharpness"]}
+
+
+def _lafortune(p: Figures) -> Figures:
+    """Divided by max(|Cz|, |Cxy|)^n."""
+    largest = max(abs(p["Cz"]), abs(p["Cxy"]))
+    cxy, cz = p["Cxy"] / largest, p["Cz"] / largest
+    return {"specular": p["albedo"], "cx": cxy, "cy": cxy, "cz": cz, "exponent": p["sharpness"]}
+
+
+def _ngan_cook_torrance(p: Figures) -> Figures:
+    """D with its 1 / pi, over pi again; `eta` is F0 of Schlick's formula."""
+    values = {"alpha": p["roughness"], "eta": _index(p["eta"]), "fresnel": "schlick"}
+    return {"specular": _times(p["albedo"], 1.0 / math.pi), **values}
+
+
+def _ngan_ashikhmin_shirley(p: Figures) -> Figures:
+    values = {"exponent": p["sharpness"], "eta": _index(p["fresnelReflectance"]), "fresnel": "schlick"}
+    return {"specular": p["albedo"], **values}
+
+
+def _he(p: Figures) -> Figures:
+    """Lengths in micrometres."""
+    lengths = {"sigma": 1000.0 * p["roughness"], "tau": 1000.0 * p["autocorrelation"]}
+    return {"specular": p["albedo"], **lengths, "eta": p["eta"]}
+
+
+def _low_ashikhmin_shirley(p: Figures) -> Figures:
+    """`fresnelReflectance` is the index, of the exact equations."""
+    values = {"exponent": p["sharpness"], "eta": p["fresnelReflectance"], "fresnel": "exact"}
+    return {"specular": p["albedo"], **values}
+
+
+def _low_cook_torrance(p: Figures) -> Figures:
+    return {"specular": p["albedo"], "alpha": p["roughness"], "eta": p["eta"]}
+
+
+def _abc(p: Figures) -> Figures:
+    return {"specular": p["A"], "b": p["B"], "c": p["C"], "eta": p["eta"]}
+
+
+def _shifted_gamma(p: Figures) -> Figures:
+    """`eta` is the pair F0, F1; c = reach^-k."""
+    f0, f1 = p["eta"]
+    return {
+        "specular": p["albedo"],
+        "alpha": p["alpha"],
+        "p": p["p"],
+        "f0": f0,
+        "f1": f1,
+        "normalization": p["K"],
+        "Lambda": p["Lambda"],
+        "reach": tuple(math.exp(-math.log(c) / k) for c, k in zip(p["c"], p["k"], strict=True)),
+        "k": p["k"],
+        "theta0": p["theta0"],
+    }
+
+
+_MEANING: dict[str, tuple[str, Callable[[Figures], Figures]]] = {
+    "Bagher": ("shifted-gamma", _shifted_gamma),
+    "LowAshikhminShirley": ("ashikhmin-shirley", _low_ashikhmin_shirley),
+    "LowCookTorrance": ("cook-torrance", _low_cook_torrance),
+    "LowMicrofacetFit": ("low-microfacet", _abc),
+    "LowSmooth": ("low-smooth", _abc),
+    "NganAshikhminShirley": ("ashikhmin-shirley", _ngan_ashikhmin_shirley),
+    "NganBlinnPhong": ("lafortune", _phong),
+    "NganCookTorrance": ("cook-torrance", _ngan_cook_torrance),
+    "NganHe": ("he-torrance", _he),
+    "NganLafortune": ("lafortune", _lafortune),
+    "NganWard": ("ward", _ward),
+    "NganWardDuer": ("ward-duer", _ward),
+}

@@ -1,0 +1,126 @@
+"""What moves in a fit: the numbers of a material, each with its bounds and a scale on which steps are even."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, did_you_mean
+from ..material import BSDF, Parameter, tree
+from ..material.parameters import pair_of
+from ..ops import backend
+
+CHANNELS = 3
+NAMES = ("r", "g", "b")
+WIDE = 30.0  # a range whose ends differ by more is stepped through in ratios
+SMALLEST = 1e-3  # of a width, and of what is stepped through in ratios, where the range begins at 0
+M = TypeVar("M", bound=BSDF)
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that moves.
+
+    path       in the tree of materials
+    kind       "float", "spectrum" or "alpha"
+    low, high  its range
+    ratio      whether steps are of its logarithm
+    """
+
+    path: str
+    kind: str
+    low: float
+    high: float
+    ratio: bool
+
+    @property
+    def count(self) -> int:
+        """Numbers that it has."""
+        return CHANNELS if self.kind == "spectrum" else 1
+
+    @property
+    def names(self) -> list[str]:
+        """Of its numbers."""
+        return [f"{self.path}.{c}" for c in NAMES] if self.count > 1 else [self.path]
+
+
+def free_of(material: BSDF, fixed: Mapping[str, object], free: tuple[str, ...] = ()) -> list[Free]:
+    """The parameters of a material that a fit may move.
+
+    fixed  paths that stay as they are
+    free   paths that move although they would stay: what is 1 by default and only scales (a conductor's albedo), and
+           turns
+    Raises InputError for a path that is none, and where nothing is left.
+    """
+    leaves = [leaf for leaf in tree.surface(material) if leaf.parameter.numeric]
+    known = [leaf.path for leaf in leaves]
+    for path in (*fixed, *free):
+        if path not in [leaf.path for leaf in tree.leaves(material)]:
+            raise InputError(f"no parameter '{path}'", type(material).__name__, did_you_mean(path, known))
+    found = []
+    for leaf in leaves:
+        parameter = leaf.parameter
+        stays = parameter.kind == "angle" or (parameter.high == 1.0 and parameter.default == 1.0)
+        if leaf.path in fixed or (stays and leaf.path not in free) or parameter.kind == "angle":
+            continue
+        found.append(_free(leaf.path, parameter))
+    if not found:
+        raise InputError("nothing is left to be fitted", type(material).__name__, "fix fewer parameters")
+    return found
+
+
+def _free(path: str, parameter: Parameter) -> Free:
+    low = parameter.low if np.isfinite(parameter.low) else -1e6
+    high = parameter.high if np.isfinite(parameter.high) else 1e6
+    ratio = low >= 0.0 and parameter.kind != "spectrum" and (parameter.kind == "alpha" or high > WIDE * max(low, 1.0))
+    return Free(path, parameter.kind, max(low, SMALLEST) if ratio else low, high, ratio)
+
+
+def start_of(material: BSDF, free: list[Free]) -> NDArray[np.float64]:
+    """The numbers of the free parameters as the material has them, within their ranges."""
+    values: list[float] = []
+    for one in free:
+        value = tree.value_at(material, one.path)
+        if one.kind == "alpha":
+            value = np.sqrt(np.prod([float(np.mean(w)) for w in pair_of(value)]))
+        numbers = np.broadcast_to(np.asarray(value, float), (one.count,))
+        values += list(np.clip(numbers, one.low, one.high))
+    return np.array(values)
+
+
+def ranges(free: list[Free]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """(lowest, highest, whether by ratio) of each number."""
+    many = [(one.low, one.high, one.ratio) for one in free for _ in range(one.count)]
+    low, high, ratio = zip(*many, strict=True)
+    return np.array(low), np.array(high), np.array(ratio)
+
+
+def with_values(material: M, free: list[Free], numbers: NDArray[np.float64]) -> M:
+    """The material with other numbers."""
+    values: dict[str, object] = {}
+    at = 0
+    for one in free:
+        part = numbers[at : at + one.count]
+        at += one.count
+        values[one.path] = float(part[0]) if one.count == 1 else tuple(map(float, part))
+    return tree.replace(material, values)
+
+
+def with_drjit(material: M, free: list[Free], numbers: list[backend.Array], types: backend.Types) -> M:
+    """The material with Dr.Jit's numbers, one entry each."""
+    values: dict[str, object] = {}
+    at = 0
+    for one in free:
+        part = numbers[at : at + one.count]
+        at += one.count
+        if one.kind == "spectrum":
+            values[one.path] = types.vec3(*part)
+        elif one.kind == "alpha":
+            values[one.path] = types.vec2(part[0], part[0])
+        else:
+            values[one.path] = part[0]
+    return tree.replace(material, values)

@@ -1,0 +1,63 @@
+"""What a material is: the protocol `BSDF`, its parameters, and how its formulas are bound, called and recorded.
+
+The materials themselves are in `gonio.materials`, one file each.
+"""
+
+from __future__ import annotations
+
+from ..errors import InputError, did_you_mean
+from .bsdf import BSDF, Breach, Microsurface, Preset, never
+from .calling import method
+from .parameters import (
+    Angle,
+    Colour,
+    Index,
+    Number,
+    Parameter,
+    Width,
+    angle,
+    bsdf,
+    choice,
+    file,
+    flag,
+    index,
+    number,
+    spectrum,
+    width,
+)
+from .sample import Sample
+
+__all__ = [
+    "BSDF", "Angle", "Breach", "Colour", "Index", "Microsurface", "Number", "Parameter", "Preset", "Sample", "Width",
+    "angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number", "spectrum",
+    "width",
+]  # fmt: skip
+
+
+def models() -> dict[str, type[BSDF]]:
+    """Every material class by name, in alphabetical order."""
+    return BSDF.family.all()
+
+
+def is_model(name: str) -> bool:
+    """Whether `model` finds a class of that name."""
+    return bool(_key(name))
+
+
+def model(name: str) -> type[BSDF]:
+    """The class of that name; underscores, hyphens and case do not matter. InputError where there is none."""
+    key = _key(name)
+    if not key:
+        raise InputError(f"unknown material '{name}'", "model", did_you_mean(_plain(name), list(models())))
+    return models()[key]
+
+
+def _key(name: str) -> str:
+    """The name under which a class is known; "" where there is none."""
+    known = models()
+    by_class = {cls.__name__.lower(): key for key, cls in known.items()}
+    return _plain(name) if _plain(name) in known else by_class.get(name.lower(), "")
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "-")

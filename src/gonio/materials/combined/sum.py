@@ -1,0 +1,56 @@
+"""Two materials on top of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...errors import InputError
+from ...material.bsdf import BSDF, Breach
+from ...material.calling import method
+from ...material.parameters import bsdf
+from ...material.polarization import Polarized
+from ...ops import Direction, Mask, Mode, Spectrum
+
+
+class Sum(BSDF):
+    """a + b: both materials' light together, as fits to measurements write it: "lambert+conductor" (Ngan2005).
+
+    Nothing is kept in balance: what both reflect may be more than arrives. It is sampled by a guide. A delta lobe has
+    no value to add, and is refused.
+    """
+
+    a: BSDF = bsdf("the one material")
+    b: BSDF = bsdf("the other")
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach("what two materials reflect may add up to more than arrives", 1e3, certain=False)
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, part in (("a", self.a), ("b", self.b)):
+            if part.delta == "always":
+                what = f"{type(part).__name__} is a delta lobe, which has no value to add"
+                raise InputError(what, f"Sum.{name}", "give it a width, or take mix")
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """a + b."""
+        return self.a.eval(wo, wi, mode) + self.b.eval(wo, wi, mode)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The parts of both."""
+        return (*self.a.polarized(wo, wi, delta, mode), *self.b.polarized(wo, wi, delta, mode))
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """That of both."""
+        return self.a.tint(wo) + self.b.tint(wo)
+
+    @property
+    def transmits(self) -> bool:
+        return self.a.transmits or self.b.transmits
+
+    @property
+    def two_sided(self) -> bool:
+        return self.a.two_sided and self.b.two_sided

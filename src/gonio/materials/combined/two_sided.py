@@ -1,0 +1,79 @@
+"""A material on both sides of a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...material.bsdf import BSDF, Delta, InnerAlbedo
+from ...material.calling import method
+from ...material.parameters import bsdf
+from ...material.polarization import Polarized
+from ...material.sample import Sample
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, function, vec3, where
+
+
+class TwoSided(BSDF):
+    """The base material on both sides: from behind it looks as from the front. The base must not transmit."""
+
+    base: BSDF = bsdf("the material, which must not transmit")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.base.transmits:
+            raise InputError(
+                f"{type(self.base).__name__} transmits, a material that only reflects expected",
+                "TwoSided.base",
+                "a transmitting material has two sides of its own",
+            )
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The base's value, with both directions turned to wo's side."""
+        return self.base.eval(_turned(wo, wo), _turned(wi, wo), mode)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The base's density, likewise."""
+        return self.base.pdf(_turned(wo, wo), _turned(wi, wo))
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """The base's sample, turned back."""
+        s = self.base.sample(_turned(wo, wo), u, mode)
+        return Sample(_turned(s.wi, wo), s.weight, s.pdf, s.delta, s.eta)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The base's, turned back."""
+        parts = self.base.polarized(_turned(wo, wo), _turned(wi, wo), delta, mode)
+        return tuple(part._replace(normal=_turned(part.normal, wo)) for part in parts)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The base's."""
+        return self.base.tint(_turned(wo, wo))
+
+    @property
+    def delta(self) -> Delta:
+        return self.base.delta
+
+    @property
+    def two_sided(self) -> bool:
+        return True
+
+    @property
+    def ambient(self) -> Spectrum | None:
+        """The base's."""
+        return self.base.ambient
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """The base's."""
+        return inner(self.base, np.abs(mu), phi)
+
+
+@function
+def _turned(w: Direction, wo: Direction) -> Direction:
+    """w with its z mirrored where wo is below the surface."""
+    return vec3(w.x, w.y, where(wo.z < 0.0, -w.z, w.z))

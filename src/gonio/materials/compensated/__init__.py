@@ -1,0 +1,1 @@
+"""Materials with the energy restored that single scattering loses."""

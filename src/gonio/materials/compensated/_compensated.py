@@ -1,0 +1,180 @@
+"""A base and what single scattering in it misses, given back by a broad lobe: what the compensated materials share."""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...energy.compensation import missing, reflecting
+from ...energy.compensation.lobe import MissingEnergy
+from ...material import BSDF, Sample, bsdf, method
+from ...material.bsdf import Delta, InnerAlbedo
+from ...material.polarization import Polarized
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
+from ...ops.backend import Array
+from ...optics.special import gauss
+
+ALMOST_ONE = 0.99999994  # the largest float32 under 1
+
+
+class Parts(NamedTuple):
+    """What a compensated material is the sum of, both times |cos theta_i|.
+
+    single  the base alone: light scattered once
+    multi   what is added: light scattered more than once
+    """
+
+    single: Spectrum
+    multi: Spectrum
+
+
+class AllParts(NamedTuple):
+    """`Parts`, after the microfacet `Terms` of the base."""
+
+    D: Scalar
+    G: Scalar
+    F: Spectrum
+    single: Spectrum
+    multi: Spectrum
+
+
+class _OnBase(BSDF):
+    """A material that compensates another, and is otherwise as that is."""
+
+    base: BSDF = bsdf("the material to be compensated")
+    _takes_glass: ClassVar[bool] = True  # whether the base may transmit
+    _takes_any: ClassVar[bool] = False  # whether it may be another than a microsurface
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        missing.check_base(self.base, f"{type(self).__name__}.base", self._takes_glass, self._takes_any)
+
+    # ------------------------------------------------------------------ facts
+
+    @property
+    def two_widths(self) -> bool:
+        """Whether the base has two widths."""
+        return reflecting.has_two_widths(self.plain.base)
+
+    @property
+    def transmits(self) -> bool:
+        return self.base.transmits
+
+    @property
+    def delta(self) -> Delta:
+        return self.base.delta
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """The base's: light that was scattered once. What is given back has lost its polarization among the facets."""
+        return self.base.polarized(wo, wi, delta, mode)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The base's."""
+        return self.base.tint(wo)
+
+
+class _Compensated(_OnBase):
+    """base + what it misses, sampled by a mixture of the base and of the lobe that is missing.
+
+    A subclass writes `derive`, which gives `missing` and `ratio` among others, `added`, and `eval` with it.
+    """
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """The base's, plus lobes that are alike all around the normal."""
+        of_base = None if nodes is None or self.stochastic or self.two_widths else inner(self.base, mu, phi)
+        if nodes is None or of_base is None:
+            return None
+        types = backend.types("float64")
+        bound = self.bind(types)
+        x, w = gauss(nodes)
+        total = np.array(of_base)
+        for row, (cosine, azimuth) in enumerate(zip(mu, phi, strict=True)):
+            wo = _direction(types, np.array([cosine]), azimuth)
+            for side in (1.0, -1.0) if self.transmits else (float(np.sign(cosine)),):
+                value = backend.to_numpy(bound.added(wo, _direction(types, side * x**2), "importance"), len(x))
+                total[row] += 2.0 * np.pi * (2.0 * x * w) @ value
+        return total
+
+    # ------------------------------------------------------------------ formulas
+
+    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+        """What is added to the base, times |cos theta_i|."""
+        raise NotImplementedError
+
+    @function
+    def M(self, w: Direction) -> Scalar:
+        """1 - E(mu), what single scattering misses at a direction, from its own side; E of the base at F = 1."""
+        return self.derived.missing.at(w)
+
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
+        """`Parts`, with D, G and F of the base where it has them."""
+        return with_terms(self.base, wo, wi, self.base.eval(wo, wi), self.added(wo, wi, "radiance"))
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The base's density and that of a lobe as (1 - E(mu_i)) mu_i, mixed by the energy that each carries."""
+        share = self._share(wo)
+        return self.base.pdf(wo, wi) * (1.0 - share) + self._lobe_pdf(wo, wi) * share
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks the base or the lobe, and is stretched to serve again."""
+        share = self._share(wo)
+        broad = u.x < share
+        again = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
+        u = vec3(ops.minimum(again, ALMOST_ONE), u.y, u.z)
+        s = self.base.sample(wo, u, mode)
+        wi = where(broad, self._lobe_sample(wo, u), s.wi)
+        delta = s.delta & ~broad
+        # what the base knows of its own sample is more exact than what its direction, once rounded, tells
+        base_pdf = where(broad, self.base.pdf(wo, wi), s.pdf)
+        base_value = where(broad, self.base.eval(wo, wi, mode), s.weight * s.pdf)
+        density = base_pdf * (1.0 - share) + self._lobe_pdf(wo, wi) * share
+        pdf = where(broad | (s.pdf > 0.0), where(delta, s.pdf * (1.0 - share), density), 0.0)
+        value = base_value + self.added(wo, wi, mode)
+        value = value * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
+        eta = where(broad, self.derived.missing.eta(wo, wi), s.eta)
+        # a smooth base misses nothing: share = 0
+        return Sample(wi, where(delta, s.weight * safe_div(1.0, 1.0 - share), value), pdf, delta, eta)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """M(mu_i) mu_i / (pi M_avg), the density of the broad lobe."""
+        return self.derived.missing.pdf(wo, wi)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """A direction of that density: mu^2 from the table of its inverse, any azimuth."""
+        return self.derived.missing.sample(wo, u)
+
+    @function
+    def _share(self, wo: Direction) -> Scalar:
+        """Probability of the broad lobe: the power it carries over all the power, at the mean colour."""
+        lost = self.derived.missing.given(wo)
+        given = lost * self.derived.ratio
+        return safe_div(given, given + maximum(1.0 - lost, 0.0))
+
+
+def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi: Spectrum) -> Parts | AllParts:
+    """The parts, with D, G and F where the base has them."""
+    if not base.has_terms:
+        return Parts(single, multi)
+    d, g, f = base.terms(wo, wi)
+    return AllParts(d, g, f, single, multi)
+
+
+@function
+def lobe_ratio(added: Spectrum, lost: MissingEnergy) -> Scalar:
+    """Mean colour of what is given back over that of single scattering."""
+    return safe_div(mean(added), maximum(mean(lost.F_avg * lost.factor), 1e-6))
+
+
+def _direction(types: backend.Types, mu: NDArray[np.float64], phi: float = 0.0) -> Array:
+    sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
+    return backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)

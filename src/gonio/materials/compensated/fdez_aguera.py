@@ -1,0 +1,71 @@
+"""Compensation for image-based lighting (FdezAguera2019)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+from ... import ops
+from ...energy.compensation import lobe
+from ...energy.compensation.missing import missing_energy
+from ...energy.compensation.reflecting import Reflecting
+from ...energy.tables import split_sum
+from ...material import Breach, method
+from ...ops import Direction, Mode, Scalar, Spectrum, abs, maximum, where
+from ...optics.fresnel.schlick import schlick_average
+from ...optics.roughness import widths
+from ._compensated import _Compensated, lobe_ratio
+from .kulla_conty import returned
+
+
+class Derived(NamedTuple):
+    """What does not depend on directions.
+
+    missing  1 - Ess
+    f0       reflectance at normal incidence
+    f_avg    F_avg of Schlick's curve
+    ratio    mean colour of what is given back over that of single scattering, for sampling
+    """
+
+    missing: Reflecting
+    f0: Spectrum
+    f_avg: Spectrum
+    ratio: Scalar
+
+
+class FdezAguera(_Compensated):
+    """f_base + F_ms E_ms / pi: multiple scattering as light from a diffuse surface (FdezAguera2019).
+
+    With the split sum FssEss = F0 A(mu_o) + B(mu_o), Ess = A + B, E_ms = 1 - Ess and F_avg = F0 + (1 - F0) / 21:
+    F_ms = FssEss F_avg / (1 - E_ms F_avg). Made for prefiltered lighting, FssEss * radiance + F_ms E_ms * irradiance;
+    as a BSDF the second term is a diffuse lobe that sees wo alone: not reciprocal. Schlick's Fresnel is assumed in it.
+    """
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "reciprocity": Breach("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
+    }
+    lossless: ClassVar[float | None] = 2e-3
+    _takes_glass: ClassVar[bool] = False
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """f_base + F_ms E_ms / pi, times cos theta_i."""
+        return self.base.eval(wo, wi, mode) + self.added(wo, wi, mode)
+
+    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+        """F_ms E_ms cos theta_i / pi."""
+        _, f0, f_avg, _ = self.derived
+        E_ms = self.M(wo)
+        surface = self.base.microsurface
+        assert surface is not None, "checked when it was made"
+        _, smooth = widths(surface.alpha)  # a mirror loses nothing; the polynomials of E_ms end near 0, not at it
+        FssEss = split_sum.reflected(surface, f0, 1.0 - E_ms, wo)
+        F_ms = FssEss * f_avg / maximum(1.0 - f_avg * E_ms, 1e-6)
+        return F_ms * where(lobe.above(wo, wi) & ~smooth, E_ms * abs(wi.z) * ops.inv_pi, 0.0)
+
+    def derive(self) -> Derived:
+        """E_ms by its polynomial, F0 and F_avg = F0 + (1 - F0) / 21."""
+        lost = missing_energy(self.base)
+        f0 = self.base.normal_reflectance()
+        assert isinstance(lost, Reflecting) and f0 is not None, "checked when it was made"
+        return Derived(lost, f0, schlick_average(f0), lobe_ratio(returned(lost, "bounce"), lost))

@@ -1,0 +1,85 @@
+"""Compensation by a factor (Turquin2019)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...energy.compensation.lobe import MissingEnergy
+from ...energy.compensation.missing import missing_energy
+from ...material import BSDF, Breach, Sample, bsdf, method
+from ...material.bsdf import InnerAlbedo
+from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
+from ._compensated import AllParts, Parts, _OnBase, with_terms
+
+
+class Derived(NamedTuple):
+    """What does not depend on directions: 1 - E of the base at F = 1, and F0."""
+
+    missing: MissingEnergy
+    f0: Spectrum
+
+
+class Turquin(_OnBase):
+    """f_base (1 + F0 (1 - E(mu_o)) / E(mu_o)): the lobe of single scattering, scaled up (Turquin2019, eq. 16).
+
+    E(mu) is the albedo of the base at F = 1 and F0 the reflectance at normal incidence. At F = 1 nothing is lost; the
+    returned light keeps the lobe's shape, so nothing new is to be sampled. The factor sees wo alone: not reciprocal.
+    """
+
+    base: BSDF = bsdf("the material to be compensated; it must not transmit")
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)
+    }
+    lossless: ClassVar[float | None] = 2e-3
+    _takes_glass: ClassVar[bool] = False
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """The base's, times the factor."""
+        of_base = None if nodes is None or self.two_widths else inner(self.base, mu, phi)
+        if of_base is None:
+            return None
+        types = backend.types("float64")
+        sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
+        wo = backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)
+        return of_base * backend.to_numpy(self.bind(types)._factor(wo), len(mu))
+
+    def derive(self) -> Derived:
+        """E by its polynomial, and F0."""
+        f0 = self.base.normal_reflectance()
+        assert f0 is not None, "checked when it was made"
+        return Derived(missing_energy(self.base), f0)
+
+    def _factor(self, wo: Direction) -> Spectrum:
+        """1 + F0 (1 - E(mu_o)) / E(mu_o), E held above .05."""
+        lost, F0 = self.derived
+        one_minus_E = ops.minimum(lost.at(wo), 0.95)
+        return 1.0 + F0 * (one_minus_E / maximum(1.0 - one_minus_E, 0.05))
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The base times the factor."""
+        return self.base.eval(wo, wi, mode) * self._factor(wo)
+
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
+        """The base, and what the factor adds to it; D, G and F of the base."""
+        single = self.base.eval(wo, wi)
+        return with_terms(self.base, wo, wi, single, single * (self._factor(wo) - 1.0))
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The base's."""
+        return self.base.pdf(wo, wi)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """The base's, with the weight times the factor."""
+        s = self.base.sample(wo, u, mode)
+        return Sample(s.wi, s.weight * self._factor(wo), s.pdf, s.delta, s.eta)

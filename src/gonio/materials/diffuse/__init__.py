@@ -1,0 +1,1 @@
+"""Matte surfaces: Lambert, Oren-Nayar and EON."""

@@ -1,0 +1,186 @@
+"""Energy-preserving Oren-Nayar."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...material.bsdf import BSDF, InnerAlbedo, never
+from ...material.calling import method
+from ...material.parameters import Colour, Number, choice, number, spectrum
+from ...material.sample import Sample
+from ...ops import Direction, Mode, Scalar, Spectrum, atan2, dot, fma, function, inv_pi, maximum, sqr, vec3, where
+from ...optics import frame
+from ...optics.frame import rotate, rotate_back, sin2
+
+# FON's albedo is A (1 + r G / pi): G(0) / pi, and the mean of G / pi with the cosine (Portsmouth2025, eq. 17 and 21)
+GRAZING = 0.5 - 2.0 / (3.0 * math.pi)
+AVERAGE = 2.0 / 3.0 - 28.0 / (15.0 * math.pi)
+FIT = (0.0571085289, 0.491881867, -0.332181442, 0.0714429953)  # of G / pi in powers of 1 - mu (eq. 64)
+
+FORMS = {
+    "exact": "by the closed form, with an arc cosine",
+    "fit": "by a polynomial in the cosine, within a thousandth",
+}
+
+
+class Eon(BSDF):
+    """Energy-preserving Oren-Nayar: Fujii's single scattering and what it loses, given back (Portsmouth2025).
+
+    f = rho / pi A (1 + r s / t) + rho_ms / pi (1 - E(mu_o)) (1 - E(mu_i)) / (1 - E_avg)
+    s = wo.wi - mu_o mu_i,  t = max(mu_o, mu_i) where s > 0, else 1,  A = 1 / (1 + (1/2 - 2 / (3 pi)) r)
+    E = A (1 + r G(mu) / pi), the albedo of the first term at rho = 1, in closed form, E_avg its mean with the cosine
+    rho_ms = rho^2 E_avg / (1 - rho (1 - E_avg)), the colour of light that bounces twice or more
+
+    Unlike `oren-nayar` it keeps all light at rho = 1, at any roughness and angle, has no dark ring where light grazes,
+    and colours get richer as it roughens. Reciprocal. Sampled by a clipped linearly transformed cosine and a share of
+    uniform directions (their sec. 4).
+    """
+
+    albedo: Colour = spectrum(default=0.5, doc="rho, the share of light that one bounce keeps", low=0.0, high=1.0)
+    roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
+    energy: str = choice("exact", "how E is found", FORMS)
+
+    lossless: ClassVar[float | None] = 1e-3  # what the fit is off; exact: nothing
+
+    @function
+    def _lost(self, w: Direction) -> Scalar:
+        """(1 - E(mu)) / (A r) = 1/2 - 2 / (3 pi) - G(mu) / pi: no difference of albedos, and 0 at grazing angles.
+
+        G = sin (theta - sin cos) + 2/3 (tan (1 - sin^3) - sin); 1 - sin^3 over cos is taken by 1 - sin = cos^2 / (1 +
+        sin).
+        """
+        mu = w.z
+        if self.energy == "fit":
+            low = 1.0 - mu
+            g = fma(fma(fma(low, FIT[3], FIT[2]), low, FIT[1]), low, FIT[0]) * low
+            return maximum(GRAZING - g, 0.0)
+        sin = ops.safe_sqrt(sin2(w))
+        over = 1.0 + sin
+        cubes = sin * mu * (over + sqr(sin)) / over  # tan (1 - sin^3)
+        g = sin * (atan2(sin, mu) - sin * mu) + (2.0 / 3.0) * (cubes - sin)
+        return maximum(GRAZING - inv_pi * g, 0.0)
+
+    @function
+    def _single(self) -> Scalar:
+        """A."""
+        return 1.0 / (1.0 + GRAZING * self.roughness)
+
+    @function
+    def _again(self) -> Spectrum:
+        """rho_ms."""
+        E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
+        return sqr(self.albedo) * E_avg / (1.0 - self.albedo * (1.0 - E_avg))
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """f cos theta_i above the surface; (1 - E)^2 / (1 - E_avg) is A r times a ratio of numbers."""
+        A, r = self._single(), self.roughness
+        s = wo.x * wi.x + wo.y * wi.y
+        t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both vanish only where this is masked
+        once = self.albedo * (A * (1.0 + r * s / t))
+        again = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
+        return (once + again) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The mixture of the transformed cosine's density and the uniform one."""
+        even = _uniform_share(wo.z, self.roughness)
+        cosine = _Clipped(*_coefficients(wo, self.roughness)).pdf(rotate(wi, frame.azimuth(wo)))
+        density = (1.0 - even) * cosine + even * (0.5 * inv_pi)
+        return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks the uniform hemisphere or the clipped lobe."""
+        r = self.roughness
+        lobe = rotate_back(_Clipped(*_coefficients(wo, r)).draw(u.y, u.z), frame.azimuth(wo))
+        phi = (2.0 * ops.pi) * u.z
+        sin, cos = ops.sincos(phi)
+        across = ops.safe_sqrt((1.0 - u.y) * (1.0 + u.y))
+        wi = where(u.x < _uniform_share(wo.z, r), vec3(across * cos, across * sin, u.y), lobe)
+        pdf = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """rho E_avg + rho_ms (1 - E_avg), the mean albedo."""
+        E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
+        return self.albedo * E_avg + self._again() * (1.0 - E_avg)
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """rho E + rho_ms (1 - E), from above; of the fit, only nearly."""
+        if self.energy != "exact":
+            return None
+        r, rho = float(self.roughness), np.asarray(self.albedo, float)  # type: ignore[arg-type]
+        sin, theta = np.sqrt(np.maximum(1.0 - mu * mu, 0.0)), np.arccos(np.clip(mu, 0.0, 1.0))
+        g = sin * (theta - sin * mu) + 2.0 / 3.0 * (sin * mu * (1.0 + sin + sin**2) / (1.0 + sin) - sin)
+        A = 1.0 / (1.0 + GRAZING * r)
+        E, E_avg = A * (1.0 + r * g / np.pi), A * (1.0 + AVERAGE * r)
+        again = rho**2 * E_avg / (1.0 - rho * (1.0 - E_avg))
+        value = rho * E[:, None] + again * (1.0 - E[:, None])
+        return np.where(mu > 0.0, 1.0, 0.0)[:, None] * np.broadcast_to(value, (len(mu), 3))
+
+
+# --------------------------------------------------------------------------- sampling (Portsmouth2025, sec. 4)
+
+
+@function
+def _uniform_share(mu: Scalar, r: Scalar) -> Scalar:
+    """Probability of a uniform direction: the fit of their eq. 39."""
+    return ops.pow(r, 0.1) * (0.162925 + mu * (-0.372058 + (0.538233 - 0.290822 * mu) * mu))
+
+
+@function
+def _coefficients(wo: Direction, r: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """a, b, c, d of the matrix ((a, 0, b), (0, c, 0), (d, 0, 1)) that takes a cosine to the lobe: their fit.
+
+    Theirs is in mu; near the normal b and d are differences of near numbers, so here they stand in 1 - mu.
+    """
+    mu = wo.z
+    low = sin2(wo) / (1.0 + ops.abs(mu))  # 1 - mu
+    wider = r * (0.303392 + (-0.518982 + 0.111709 * mu) * mu + (-0.276266 + 0.335918 * mu) * r)
+    a = 1.0 + wider
+    b = r * ((0.00071 + 0.150105 * low) * r - (0.00548 + 1.15859 * low)) / (mu * mu * mu - 1.43545)
+    c = 1.0 + (0.20013 + (-0.506373 + 0.261777 * mu) * mu) * r
+    d = r * (0.000006 - (0.065466 + 0.475392 * low) * low) / (0.0017372 + (2.0725628 - low) * low)
+    return a, b, c, d
+
+
+class _Clipped:
+    """The cosine under that matrix, of which only the part is drawn that ends above the surface.
+
+    A direction h ends above where d h_x + h_z > 0: the disk of (h_x, h_y) is cut by half an ellipse, whose area is
+    v / 2 of it with v = 1 / sqrt(1 + d^2). x is squeezed into what is left, so that no sample is lost.
+    """
+
+    def __init__(self, a: Scalar, b: Scalar, c: Scalar, d: Scalar) -> None:
+        self.a, self.b, self.c, self.d = a, b, c, d
+
+    def _kept(self) -> Scalar:
+        """The share of the disk that is kept."""
+        return 0.5 * (1.0 + ops.rsqrt(self.d * self.d + 1.0))
+
+    def draw(self, u1: Scalar, u2: Scalar) -> Direction:
+        """A direction of the lobe about a wo in the x-z plane."""
+        radius = ops.sqrt(u1)
+        sin, cos = ops.sincos((2.0 * ops.pi) * u2)
+        y = radius * sin
+        kept = self._kept()
+        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - kept) + radius * cos * kept)
+        z = ops.safe_sqrt(1.0 - (x * x + y * y))
+        return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
+
+    def pdf(self, w: Direction) -> Scalar:
+        """cos(h) / (pi kept) |det| / |adj(M) w|^4, with h along the adjugate's adj(M) w."""
+        across = self.a - self.b * self.d
+        height = self.c * (self.a * w.z - self.d * w.x)
+        h = vec3(self.c * (w.x - self.b * w.z), across * w.y, height)
+        size = self.c * across
+        return sqr(size / maximum(dot(h, h), frame.TINY)) * maximum(height, 0.0) * inv_pi / self._kept()

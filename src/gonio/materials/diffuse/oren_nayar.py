@@ -1,0 +1,69 @@
+"""Oren-Nayar's rough diffuse reflection."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ...material.bsdf import BSDF, Breach
+from ...material.calling import method
+from ...material.parameters import Colour, Number, number, spectrum
+from ...ops import Direction, Mode, Scalar, Spectrum, function, inv_pi, maximum, sqr, where
+
+
+class OrenNayar(BSDF):
+    """Diffuse reflection of a surface of Lambertian V-grooves, in the qualitative form (OrenNayar1994, sec. 4.4).
+
+    f = albedo / pi (A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)),  a, b = max, min of theta_o, theta_i
+    A = 1 - sigma^2 / (2 (sigma^2 + 0.33)),  B = 0.45 sigma^2 / (sigma^2 + 0.09)        (course sheet, eq. 2 and 3)
+
+    No trigonometry: sin(a) tan(b) = sin theta_o sin theta_i / max(cos theta_o, cos theta_i), and the sines times the
+    cosine of the azimuth are the scalar product of the tangential parts. Not valid beyond small sigma (about 0.5 rad);
+    the formula is used as it stands. It loses energy as sigma grows; interreflections are left out. At grazing its
+    albedo tends to albedo (A + B / 2), which is over 1 for albedo = 1 and sigma < 0.33.
+    """
+
+    albedo: Colour = spectrum(
+        default=0.5, doc="share of light that a groove's side reflects", low=0.0, high=1.0, soft_high=True
+    )
+    sigma: Number = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
+            lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
+            certain=False,  # below sigma = 0.04 it is under a thousandth
+        )
+    }
+
+    @function
+    def _shape(self, wo: Direction, wi: Direction) -> Scalar:
+        """A + B max(0, cos(phi_i - phi_o)) sin(a) tan(b)."""
+        s2 = sqr(self.sigma)
+        a = 1.0 - 0.5 * s2 / (s2 + 0.33)
+        b = 0.45 * s2 / (s2 + 0.09)
+        tangential = maximum(wo.x * wi.x + wo.y * wi.y, 0.0)
+        # both cosines vanish together only where the caller masks the result
+        return a + b * tangential / maximum(maximum(wo.z, wi.z), 1e-7)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """albedo / pi (A + B ...) cos theta_i above the surface."""
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        return self.albedo * where(above, self._shape(wo, wi) * wi.z * inv_pi, 0.0)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """cos theta_i / pi above the surface: B's part is small and as smooth."""
+        return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+
+def _grazing_albedo(sigma: float) -> float:
+    """A + B / 2, the limit of the albedo as theta_o goes to 90 degrees.
+
+    There sin(a) tan(b) = tan theta_i, and (1 / pi) int max(0, cos phi) tan theta cos theta sin theta dtheta dphi = 1/2.
+    """
+    s2 = sigma * sigma
+    return 1.0 - 0.5 * s2 / (s2 + 0.33) + 0.225 * s2 / (s2 + 0.09)

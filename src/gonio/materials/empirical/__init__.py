@@ -1,0 +1,1 @@
+"""Phong, modified Phong and Blinn-Phong."""

@@ -1,0 +1,55 @@
+"""Blinn's half-vector variant of Phong's model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ...material.bsdf import Breach
+from ...ops import Direction, Scalar, dot, function, inv_pi, safe_div
+from ...optics.frame import half_vector, reflect, sin2
+from ...optics.special import power_of_cosine
+from ...optics.warp import square_to_power_lobe
+from .phong import _Empirical
+
+
+class BlinnPhong(_Empirical):
+    """Phong's model with the highlight (n.h)^p, h the half vector (Blinn1977): kd cos theta_i + ks max(0, n.h)^p.
+
+    n.h never turns negative where light and viewer are above the surface, so the highlight has no cut-off edge. For a
+    highlight as wide as Phong's take about four times the exponent. Neither reciprocal nor energy conserving.
+    """
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        **_Empirical.breaks,
+        # the bound below is not met: close under it nothing need be gained
+        "energy": _Empirical.breaks["energy"]._replace(certain=False),
+    }
+
+    def _highlight_power(self) -> np.ndarray:
+        """Below int cos^p 4 (v.h) dh <= 8 pi / (p + 1), and below the hemisphere's 2 pi."""
+        return np.minimum(8.0 * np.pi / (np.asarray(self.p) + 1.0), 2.0 * np.pi)
+
+    @function
+    def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
+        """n.h: cosine between the normal and the half vector."""
+        return half_vector(wo, wi).z
+
+    @function
+    def _peak(self, wo: Direction, wi: Direction) -> Scalar:
+        """(n.h)^p."""
+        h = half_vector(wo, wi)
+        return power_of_cosine(h.z, sin2(h), self._exponent)
+
+    @function
+    def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of wi when h has density (p + 1) / (2 pi) cos^p: over 4 (v.h) (Walter2007, eq. 14)."""
+        lobe = (self._exponent + 1.0) * (0.5 * inv_pi) * self._peak(wo, wi)
+        return safe_div(lobe, 4.0 * dot(wo, half_vector(wo, wi)))
+
+    @function
+    def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
+        """The viewer mirrored at a sampled half vector."""
+        return reflect(wo, square_to_power_lobe(u1, u2, self._exponent))

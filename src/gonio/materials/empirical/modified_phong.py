@@ -1,0 +1,85 @@
+"""Phong's model as Lafortune and Willems normalized it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ... import ops
+from ...material.bsdf import BSDF, Breach, never
+from ...material.calling import method
+from ...material.parameters import Colour, Number, number, spectrum
+from ...material.sample import Sample
+from ...ops import Direction, Mode, Scalar, Spectrum, clamp, function, inv_pi, mean, sqr, where
+from ...optics.frame import mirror
+from ...optics.warp import around, power_about, square_to_cosine_hemisphere, square_to_power_lobe
+from ..historic.glossy import lit
+
+
+class ModifiedPhong(BSDF):
+    """Phong's lobe as a BRDF that is reciprocal and keeps the energy: f = kd / pi + ks (p + 2) / (2 pi) (v.r)^p.
+
+    r is the light mirrored at the normal, the base of the power is cut at 0 (Lafortune1994). The factor makes ks the
+    lobe's albedo seen from the normal; toward grazing views a part of the lobe lies below the surface and is lost. So
+    kd + ks <= 1 keeps the energy. `phong` is the model as Phong wrote it, `lafortune` what became of this one.
+    """
+
+    kd: Colour = spectrum(default=0.5, doc="albedo of the diffuse part", low=0.0, high=1.0, soft_high=True)
+    ks: Colour = spectrum(
+        default=0.3, doc="albedo of the lobe, seen from the normal", low=0.0, high=1.0, soft_high=True
+    )
+    p: Number = number(default=32.0, doc="falloff of the lobe", low=0.0)
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "kd + ks is over 1",
+            lambda model: max(float(np.max(np.asarray(model.kd) + np.asarray(model.ks))) - 1.0, 0.0),
+            certain=False,  # met at the normal alone, which not every check looks along
+        )
+    }
+
+    @function
+    def _share(self, wo: Direction) -> Scalar:
+        """Probability of the lobe: ks against kd, less of a lobe as wide as the cosine, and of one cut by the horizon.
+
+        With r = (p + 1) / 2, the density of light at the peak against the cosine's, ((r - 1/2) / (r + 1/2))^2.
+        """
+        lobe = mean(self.ks) * sqr(self.p / (self.p + 2.0)) * clamp(wo.z, 0.1, 1.0)
+        return clamp(ops.safe_div(lobe, lobe + mean(self.kd)), 0.0, MOST)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """kd / pi cos theta_i + ks (p + 2) / (2 pi) (v.r)^p cos theta_i above the surface."""
+        above, o, i = lit(wo, wi)
+        lobe = (self.p + 2.0) * (0.5 * inv_pi) * power_about(mirror(o), i, self.p)
+        return where(above, (self.kd * inv_pi + self.ks * lobe) * i.z, 0.0)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Mixture of the cosine and of (p + 1) / (2 pi) (v.r)^p."""
+        above, o, i = lit(wo, wi)
+        share = self._share(o)
+        lobe = (self.p + 1.0) * (0.5 * inv_pi) * power_about(mirror(o), i, self.p)
+        return where(above, (1.0 - share) * i.z * inv_pi + share * lobe, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks a lobe; a direction below the surface is a failed sample."""
+        lobe = around(mirror(wo), square_to_power_lobe(u.y, u.z, self.p))
+        wi = where(u.x < self._share(wo), lobe, square_to_cosine_hemisphere(u.y, u.z))
+        pdf = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+
+    def white(self) -> Self:
+        """Itself: no two albedos whose sum is 1 return all light."""
+        return self
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The two albedos."""
+        return self.kd + self.ks
+
+
+MOST = 0.95  # share of samples that follow the lobe: where the cosine alone finds light its weights stay bounded

@@ -1,0 +1,144 @@
+"""Phong's empirical model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ... import ops
+from ...errors import InputError
+from ...material.bsdf import BSDF, Breach, never
+from ...material.calling import method
+from ...material.parameters import Colour, Number, flag, number, spectrum
+from ...material.sample import Sample
+from ...ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, where
+from ...optics.frame import mirror
+from ...optics.warp import around, square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
+
+
+class _Empirical(BSDF):
+    """Ambient, diffuse and specular part: kd (n.l) + ks (highlight)^p, as Phong1975 wrote it down.
+
+    No 1/pi, no normalization, no cosine on the specular term, so f = eval / cos theta_i grows without bound at
+    grazing light. Shared by the two highlights.
+    """
+
+    kd: Colour = spectrum(default=0.5, doc="diffuse coefficient", low=0.0)
+    ks: Colour = spectrum(default=0.3, doc="specular coefficient", low=0.0)
+    p: Number = number(default=32.0, doc="falloff of the highlight", low=0.0)
+    ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
+    check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "reciprocity": Breach(
+            "the specular term has no cosine, so f divides it by cos theta_i alone",
+            lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
+        ),
+        "energy": Breach(
+            "neither term is normalized: kd = 1 reflects pi times what it receives",
+            lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
+        ),
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.check_sum:
+            total = np.asarray(self.ka) + np.asarray(self.kd) + np.asarray(self.ks)
+            if not np.allclose(total, 1.0, atol=1e-6):
+                raise InputError(
+                    f"ka + kd + ks = {np.round(total, 6).tolist()}, 1 expected",
+                    type(self).__name__,
+                    "change a coefficient, or leave check_sum out",
+                )
+
+    @property
+    def _exponent(self) -> Scalar:
+        """p; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        return self.p
+
+    def _highlight_power(self) -> np.ndarray:
+        """The most that int (highlight)^p dwi comes to."""
+        raise NotImplementedError
+
+    def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
+        """Base of the power, the cosine that peaks in the highlight."""
+        raise NotImplementedError
+
+    def _peak(self, wo: Direction, wi: Direction) -> Scalar:
+        """(highlight)^p."""
+        return pow(self._highlight(wo, wi), self.p)
+
+    def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        raise NotImplementedError
+
+    def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
+        raise NotImplementedError
+
+    @function
+    def _specular_share(self, wo: Direction) -> Scalar:
+        """Probability of the specular lobe: its power against that of the diffuse lobe, ks 2 pi / (p + 1) : kd pi."""
+        specular = mean(self.ks) * 2.0 / (self.p + 1.0)
+        both = specular + mean(self.kd)
+        return ops.safe_div(specular, both)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """kd (n.l) + ks (highlight)^p for light and viewer above the surface (course sheet, eq. 1)."""
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        return self.kd * where(above, wi.z, 0.0) + self.ks * where(above, self._peak(wo, wi), 0.0)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Mixture of the cosine and the highlight's lobe."""
+        share = self._specular_share(wo)
+        density = (1.0 - share) * wi.z * inv_pi + share * self._highlight_pdf(wo, wi)
+        return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks a lobe; a direction below the surface is a failed sample."""
+        diffuse = square_to_cosine_hemisphere(u.y, u.z)
+        specular = self._highlight_sample(wo, u.y, u.z)
+        wi = where(u.x < self._specular_share(wo), specular, diffuse)
+        pdf = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The diffuse part's colour."""
+        return self.kd
+
+    @property
+    def ambient(self) -> Spectrum:
+        """ka."""
+        return self.ka
+
+
+class Phong(_Empirical):
+    """Phong's model: L = ka Ia + kd I (n.l) + ks I (v.r)^p, r = l mirrored at n (course sheet, eq. 1; Phong1975).
+
+    eval(wo, wi) = kd cos theta_i + ks max(0, v.r)^p, exactly that: the light's 1 / r^2 is the renderer's. The base of
+    the power is cut at 0, or an even p would light the wrong side, and light below the surface gives nothing.
+    Neither reciprocal nor energy conserving.
+    """
+
+    def _highlight_power(self) -> np.ndarray:
+        """2 pi / (p + 1), met at normal incidence."""
+        return 2.0 * np.pi / (np.asarray(self.p) + 1.0)
+
+    @function
+    def _highlight(self, wo: Direction, wi: Direction) -> Scalar:
+        """v.r: cosine between the viewer and the mirrored light."""
+        return dot(wo, mirror(wi))
+
+    @function
+    def _highlight_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of a cos^p lobe about the mirrored viewer, 1/sr."""
+        return square_to_power_lobe_pdf(dot(mirror(wo), wi), self._exponent)
+
+    @function
+    def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
+        """A direction of a cos^p lobe about the mirrored viewer."""
+        return around(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))

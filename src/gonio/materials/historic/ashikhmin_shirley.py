@@ -1,0 +1,111 @@
+"""Ashikhmin and Shirley's anisotropic Phong model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ... import ops
+from ...material.bsdf import Breach
+from ...material.parameters import Angle, Colour, Width, choice, flag, spectrum, width
+from ...ops import Direction, Pair, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
+from ...optics import frame, fresnel
+from ...optics.special import exprel, power_of_cosine
+from ..microfacet import microfacet
+from .glossy import _Glossy, facet, sum_breach
+
+
+class AshikhminShirley(_Glossy):
+    """Anisotropic Phong: f = diffuse part + specular F p(h) / (4 (o.h) max((n.o), (n.i))) (Ashikhmin2000).
+
+    p = sqrt((n_x + 1)(n_y + 1)) / (2 pi) (n.h)^((n_x h_x^2 + n_y h_y^2) / (1 - h_z^2)), normalized over half vectors h.
+    F is Schlick's in the paper, of an index eta: F0 = ((eta - 1) / (eta + 1))^2. The diffuse part is Lambert's, or
+    coupled to the lobe as in the paper: what F0 reflects is missing from it, and it fades toward grazing light.
+    Reciprocal.
+    """
+
+    specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
+    exponent: Width = width(default=100.0, doc="falloff of the lobe; two for anisotropy", low=0.0, high=math.inf)
+    rotation: Angle = microfacet.rotation_angle()
+    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    fresnel: str = choice("schlick", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
+    coupled: bool = flag(default=False, doc="the paper's diffuse part, which gives way to the lobe")
+
+    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+
+    def _most(self) -> np.ndarray:
+        """specular: F (n.i) / max((n.o), (n.i)) is the weight of a sample."""
+        return np.max(np.asarray(self.specular, float))
+
+    def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
+        """F by name at a facet seen under cos_theta."""
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+
+    @function
+    def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
+        """diffuse / pi, or 28 diffuse / (23 pi) (1 - Rs) (1 - (1 - (n.o) / 2)^5) (1 - (1 - (n.i) / 2)^5)."""
+        if not self.coupled:
+            return self._lambert * (wi.z * inv_pi)
+        kept = 1.0 - self.specular * self.reflectance(1.0 + 0.0 * wo.z)
+        return self._lambert * kept * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
+
+    @function
+    def _focus(self) -> Scalar:
+        """(n / (n + 9))^2: 0 for the flat lobe n = 0; the density at the peak is (n + 1) / 8 of the cosine's."""
+        n = sqrt((self.exponent.x + 1.0) * (self.exponent.y + 1.0))
+        return sqr((n - 1.0) / (n + 8.0))
+
+    @function
+    def _density(self, h: Direction) -> Scalar:
+        """p(h), 1/sr."""
+        n = self.exponent
+        turned = frame.rotate(h, self.rotation)
+        sin2 = frame.sin2(turned)
+        power = (n.x * sqr(turned.x) + n.y * sqr(turned.y)) / maximum(sin2, frame.TINY)
+        norm = sqrt((n.x + 1.0) * (n.y + 1.0)) * (0.5 * inv_pi)
+        return norm * power_of_cosine(h.z, sin2, power)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular F p cos theta_i / (4 (o.h) max((n.o), (n.i)))."""
+        h, cos = facet(wo, wi)
+        spread = self._density(h) * wi.z / (4.0 * cos * maximum(wo.z, wi.z))
+        return self.specular * self.reflectance(cos) * spread
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """p(h) / (4 (o.h))."""
+        h, cos = facet(wo, wi)
+        return self._density(h) / (4.0 * cos)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a half vector of density p."""
+        return frame.reflect(wo, frame.rotate_back(_half_vector(u.y, u.z, self.exponent), self.rotation))
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular F: of a narrow lobe."""
+        return self.specular * self.reflectance(wo.z)
+
+
+@function
+def _faded(cos: Scalar) -> Scalar:
+    """1 - (1 - cos / 2)^5."""
+    c = 1.0 - 0.5 * cos
+    return 1.0 - sqr(sqr(c)) * c
+
+
+@function
+def _half_vector(u1: Scalar, u2: Scalar, exponent: Pair) -> Direction:
+    """A half vector of density p: tan phi = sqrt((n_x + 1) / (n_y + 1)) tan(2 pi u2), then the power lobe of that
+    azimuth (Ashikhmin2000, eq. 9 and 10, all four quadrants at once)."""
+    s, c = sincos((2.0 * ops.pi) * u2)
+    across = s * sqrt((exponent.x + 1.0) / (exponent.y + 1.0))
+    over = ops.rsqrt(sqr(c) + sqr(across))
+    c, s = c * over, across * over
+    log_cos = log(1.0 - u1) / (exponent.x * sqr(c) + exponent.y * sqr(s) + 1.0)
+    sin = safe_sqrt(-2.0 * log_cos * exprel(2.0 * log_cos))
+    return ops.vec3(sin * c, sin * s, exp(log_cos))

@@ -1,0 +1,71 @@
+"""Cook and Torrance's model of 1982."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ...material.bsdf import Breach
+from ...material.parameters import Angle, Colour, Width, spectrum, width
+from ...ops import Direction, Scalar, Spectrum, function
+from ...optics import frame, fresnel
+from ...optics.masking.v_groove import v_groove
+from ...optics.ndf import distribution
+from ..microfacet import microfacet
+from .glossy import _Glossy, facet, sum_breach
+
+
+class CookTorrance(_Glossy):
+    """Rough metal or varnish as of 1982: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Cook1982).
+
+    D = exp(-tan^2 / alpha^2) / (alpha^2 cos^4), Beckmann's without its 1 / pi, and G that of V-grooves: as printed.
+    Today D has the 1 / pi and the denominator a 4 (`conductor`), so this lobe is four times as bright as its facets;
+    hence specular = 1/4 for a real surface. Ngan2005 divides by pi once more. F is that of an index eta without
+    absorption, which stands for a metal of reflectance F0 by eta = (1 + sqrt F0) / (1 - sqrt F0). Reciprocal. Sampled
+    by visible normals of Beckmann's D with Smith's masking.
+    """
+
+    specular: Colour = spectrum(default=0.25, doc="factor of the lobe; 1/4 is that of a real surface", low=0.0)
+    alpha: Width = width(default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0)
+    rotation: Angle = microfacet.rotation_angle()
+    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    fresnel: str = microfacet.fresnel_choice()
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": sum_breach("D G / (pi cos cos) is four times what facets reflect, "),
+    }
+
+    def _most(self) -> np.ndarray:
+        """4 specular: no more is reflected than by facets of F = 1, four times."""
+        return 4.0 * np.max(np.asarray(self.specular, float))
+
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """F by name at a facet seen under cos_theta."""
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular F D G / cos theta_o with D's 1 / pi."""
+        h, cos = facet(wo, wi)
+        d = distribution("beckmann").D(frame.rotate(h, self.rotation), self.alpha)
+        return self.specular * self.reflectance(cos) * (d * v_groove(wo, wi, h) / wo.z)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of Beckmann's visible normals over 4 (o.h) (Walter2007, eq. 14)."""
+        h, _ = facet(wo, wi)
+        turned, normal = frame.rotate(wo, self.rotation), frame.rotate(h, self.rotation)
+        return 0.25 * distribution("beckmann").visible_per_cosine(turned, normal, self.alpha)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a visible normal."""
+        turned = frame.rotate(wo, self.rotation)
+        h = distribution("beckmann").sample_visible(turned, u.y, u.z, self.alpha)
+        return frame.rotate_back(frame.reflect(turned, h), self.rotation)
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """4 specular F: of a narrow lobe."""
+        return self.specular * self.reflectance(wo.z) * 4.0

@@ -1,0 +1,167 @@
+"""He, Torrance, Sillion and Greenberg's model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ... import ops
+from ...material.bsdf import Breach
+from ...material.parameters import Colour, Number, number, spectrum
+from ...ops import (
+    Direction,
+    Pair,
+    Scalar,
+    Spectrum,
+    clamp,
+    erf,
+    exp,
+    function,
+    inv_pi,
+    log,
+    max_component,
+    maximum,
+    mean,
+    minimum,
+    sqr,
+    sqrt,
+    vec2,
+)
+from ...optics import frame, fresnel
+from ...optics.ndf import distribution
+from ...optics.roughness import SMOOTH
+from ...optics.special import exprel
+from ..microfacet import microfacet
+from .glossy import _Glossy, facet, sum_breach
+
+TERMS = 64  # of the series: its largest term stands at m = g, so they do up to g = 40
+ROUGH = 18.0  # g from which on, in all channels, the series' limit takes over, blended in over 1 (Westin's program)
+
+
+class HeTorrance(_Glossy):
+    """Wave optics of a Gaussian rough surface, its directional-diffuse part: f = diffuse / pi + specular F S G D / (pi
+    (n.o)(n.i)) (He1991, eq. 71, 76 and 78).
+
+    D = (pi tau / 2 lambda)^2 sum_m g^m e^-g / (m m!) exp(-(pi tau v / lambda)^2 / m), v = o + i along the surface,
+    g = (2 pi s / lambda (n.o + n.i))^2 with the roughness s = sigma / sqrt(1 + w) of what lies in no shadow, where
+    w e^w = x^2, x = sum of tan erfc(tau cot / (2 sigma)) / sqrt(8 pi). G, of the vectors of polarization, is
+    4 (o.h)^2 / (n.h)^2 for any pair: those of eq. 76 are orthonormal, and the rest cancels. S is Smith's masking of
+    Beckmann's slopes, of width 2 sigma / tau, times (1 + erf(cot / width)) / 2 for either direction, with the
+    exponential that eq. 25 lost in print (Holzschuch2017).
+
+    As Ngan2005 used it: F of a real index, unpolarized; no coherent part (a mirror's), which no measured table holds.
+    From g = 18 on D is the limit of the series, exp(-(tan h / width)^2) / (4 width^2 ((n.o) + (n.i))^2). Reciprocal.
+    Lengths in nm; only their ratios count. Sampled by visible normals of GGX, as wide as the series is at its peak.
+    """
+
+    specular: Colour = spectrum(default=1.0, doc="factor of the lobe", low=0.0)
+    sigma: Number = number(default=180.0, doc="standard deviation of the surface's heights", low=1.0, unit="nm")
+    tau: Number = number(default=3000.0, doc="correlation length of the heights", low=100.0, unit="nm")
+    eta: Number = number(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    wavelength: Colour = spectrum(default=(645.0, 526.0, 444.0), doc="wavelength of each channel", low=100.0, unit="nm")
+    fresnel: str = microfacet.fresnel_choice()
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": sum_breach("toward grazing light G D grows faster than S falls, "),
+    }
+
+    def reflectance(self, cos_theta: Scalar) -> Scalar:
+        """F by name at a facet seen under cos_theta."""
+        return fresnel.kind(self.fresnel).dielectric(cos_theta, fresnel.cos_transmitted(cos_theta, self.eta), self.eta)
+
+    @function
+    def _width(self) -> Scalar:
+        """Width of the slopes, as Beckmann's alpha."""
+        return 2.0 * self.sigma / self.tau
+
+    @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^2 of r = 1 / (4 width^2), the density at a rough surface's peak against the cosine's."""
+        return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
+
+    @function
+    def _seen(self, v: Direction) -> Scalar:
+        """S of one direction (He1991, eq. 24 and 25, with the exponential)."""
+        width = self._width()
+        return distribution("beckmann").G1(v, vec2(width, width)) * (0.5 + 0.5 * erf(_cot(v) / width))
+
+    @function
+    def _shadowed(self, v: Direction) -> Scalar:
+        """tan erfc(cot / width) / sqrt(8 pi): what v adds to the equation for s."""
+        cot = _cot(v)
+        return (1.0 - erf(cot / self._width())) / cot * (8.0 * ops.pi) ** -0.5
+
+    @function
+    def _roughness2(self, x: Scalar) -> Scalar:
+        """s^2 = sigma^2 / (1 + w) with w e^w = x^2 (He1991, eq. 80 to 82): a guess within a few percent, then Newton's
+        steps on w = x^2 e^-w, which end at rounding."""
+        x2 = sqr(x)
+        log_x = log(1.0 + x2)
+        w = log_x * (1.0 - log(1.0 + log_x) / (2.0 + log_x))
+        for _ in range(4):
+            e = x2 * exp(-w)
+            w = w - (w - e) / (1.0 + e)
+        return sqr(self.sigma) / (1.0 + w)
+
+    @function
+    def _series(self, g: Spectrum, spread: Spectrum) -> Spectrum:
+        """sum_m g^m e^-g / (m m!) exp(-spread / m), and its limit exp(-spread / g) / g where all g are large."""
+        limit = exp(-spread / maximum(g, 1.0)) / maximum(g, 1.0)
+        blend = clamp(-max_component(-g) - ROUGH, 0.0, 1.0)
+        g = minimum(g, 60.0)  # beyond, the limit alone counts, and the powers would leave float32
+        term = g * exp(-g)
+        total = term * exp(-spread)
+        for m in range(2, TERMS + 1):
+            term = term * (g * (1.0 / m))
+            total = total + term * (1.0 / m) * exp(spread * (-1.0 / m))
+        return total + (limit - total) * blend
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular F S G D / (pi cos theta_o)."""
+        h, cos = facet(wo, wi)
+        s2 = self._roughness2(self._shadowed(wo) + self._shadowed(wi))
+        waves = 1.0 / self.wavelength  # per nm
+        g = waves * waves * (sqr(2.0 * ops.pi * (wo.z + wi.z)) * s2)
+        correlation = sqr(waves * (ops.pi * self.tau))
+        spread = correlation * (sqr(wo.x + wi.x) + sqr(wo.y + wi.y))
+        d = correlation * 0.25 * self._series(g, spread)
+        geometry = sqr(2.0 * cos / h.z) * self._seen(wo) * self._seen(wi)
+        return self.specular * d * (self.reflectance(cos) * geometry * inv_pi / wo.z)
+
+    @function
+    def _peak(self, wo: Direction) -> tuple[Pair, Scalar]:
+        """(width of the lobe in half vectors about the mirrored wo, g there), of the mean wavelength.
+
+        The terms about m = 1 + g count: exp(-(pi tau v / lambda)^2 / m), and v = 2 (n.o) tan h.
+        """
+        waves = 1.0 / mean(self.wavelength)
+        g = sqr(4.0 * ops.pi * wo.z * waves) * self._roughness2(2.0 * self._shadowed(wo))
+        width = sqrt(1.0 + g) / (2.0 * ops.pi * self.tau * waves * maximum(wo.z, 0.01))
+        width = clamp(width, SMOOTH, 1.0)
+        return vec2(width, width), g
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of visible normals over 4 (o.h) (Walter2007, eq. 14)."""
+        alpha, _ = self._peak(wo)
+        h, _ = facet(wo, wi)
+        return 0.25 * distribution("ggx").visible_per_cosine(wo, h, alpha)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a visible normal."""
+        alpha, _ = self._peak(wo)
+        return frame.reflect(wo, distribution("ggx").sample_visible(wo, u.y, u.z, alpha))
+
+    @function
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular F (1 - e^-g): what is not reflected as by a mirror."""
+        _, g = self._peak(wo)
+        return self.specular * (self.reflectance(wo.z) * g * exprel(-g))
+
+
+@function
+def _cot(v: Direction) -> Scalar:
+    """cos over sin, held where both stay in float32."""
+    return clamp(v.z, 1e-6, 1.0) / sqrt(maximum(frame.sin2(v), 1e-12))

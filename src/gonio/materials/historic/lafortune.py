@@ -1,0 +1,94 @@
+"""Lafortune's generalized cosine lobe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ... import ops
+from ...material.bsdf import Breach
+from ...material.parameters import Colour, Number, number, spectrum
+from ...ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
+from ...optics.frame import upright
+from ...optics.special import logrel
+from ...optics.warp import around, power_about, square_to_power_lobe
+from .glossy import _Glossy, sum_breach
+
+SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which there is no lobe to speak of
+
+
+class Lafortune(_Glossy):
+    """Generalized cosine lobe: f = diffuse / pi + specular (n + 2) / (2 pi) (C o_x i_x + C o_y i_y + C o_z i_z)^n.
+
+    The three C are cx, cy, cz, n is `exponent`, the base is cut at 0 (Lafortune1997, eq. 4). C = (-1, -1, 1) is Phong's
+    lobe about the mirror direction, normalized (Lafortune1994), and what Ngan2005 calls Blinn-Phong; a smaller cz leans
+    it toward the horizon, and where cx and cy are positive, light is thrown back. The largest C should have size 1, as
+    in Ngan2005's normalization: what is less goes into the lobe's strength, to the n-th power. Reciprocal. Sampled by a
+    power lobe about (C o_x, C o_y, C o_z).
+    """
+
+    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe at C = (-1, -1, 1), seen from the normal", low=0.0)
+    cx: Number = number(default=-1.0, doc="factor of o_x i_x: negative mirrors", low=-1.0, high=1.0)
+    cy: Number = number(default=-1.0, doc="factor of o_y i_y: negative mirrors", low=-1.0, high=1.0)
+    cz: Number = number(default=1.0, doc="factor of o_z i_z", low=-1.0, high=1.0)
+    exponent: Number = number(default=50.0, doc="falloff of the lobe", low=0.0)
+
+    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether x and y count alike."""
+        return bool(np.array_equal(np.asarray(self.plain.cx), np.asarray(self.plain.cy)))
+
+    def _most(self) -> np.ndarray:
+        """(n + 2) / (n + 1): the lobe's integral, cosine left out."""
+        n = np.asarray(self.exponent, float)
+        return np.max(np.asarray(self.specular)) * np.max((n + 2.0) / (n + 1.0))
+
+    @function
+    def _axis(self, wo: Direction) -> tuple[Direction, Scalar]:
+        """(unit axis of the lobe, its length to the n-th power): the length from what is missing to 1, as a length so
+        near 1 has no digits left for a large n."""
+        axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
+        missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
+        missing = minimum(missing, 1.0 - SHORTEST)
+        axis = where(dot(axis, axis) > SHORTEST, axis, upright(wo))
+        return normalize(axis), exp(self.exponent * (-0.5 * missing * logrel(-missing)))
+
+    @function
+    def _focus(self) -> Scalar:
+        """((r - 1/2) / (r + 1/2))^2 of r = (n + 1) / 2, the density of light at the peak against the cosine's."""
+        return sqr(self.exponent / (self.exponent + 2.0))
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular (n + 2) / (2 pi) |C o|^n (axis.wi)^n cos theta_i."""
+        axis, strength = self._axis(wo)
+        norm = (self.exponent + 2.0) * (0.5 * inv_pi)
+        return self.specular * (norm * strength * power_about(axis, wi, self.exponent) * wi.z)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """(n + 1) / (2 pi) (axis.wi)^n."""
+        axis, _ = self._axis(wo)
+        return (self.exponent + 1.0) * (0.5 * inv_pi) * power_about(axis, wi, self.exponent)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """A direction of the power lobe about the axis."""
+        axis, _ = self._axis(wo)
+        return around(axis, square_to_power_lobe(u.y, u.z, self.exponent))
+
+    @function
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular |C o|^n times the axis's cosine: of a narrow lobe."""
+        axis, strength = self._axis(wo)
+        return self.specular * (strength * ops.clamp(axis.z, 0.1, 1.0))
+
+
+@function
+def _less(c: Scalar) -> Scalar:
+    """1 - c^2."""
+    return (1.0 - c) * (1.0 + c)

@@ -1,0 +1,92 @@
+"""Low's microfacet model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ... import ops
+from ...material.bsdf import Breach
+from ...material.parameters import Colour, Number, number, spectrum
+from ...ops import Direction, Scalar, Spectrum, exp, function, inv_pi, log, safe_sqrt, sincos, sqr, vec3
+from ...optics import frame, fresnel
+from ...optics.masking.v_groove import v_groove
+from ...optics.special import exprel, logrel, power_integral, power_quantile
+from ..microfacet import microfacet
+from .glossy import _Glossy, facet, sum_breach
+
+
+class LowMicrofacet(_Glossy):
+    """Microfacets whose normals fall off as a power law: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)) (Low2012).
+
+    D = (1 + b (1 - n.h))^-c, not normalized, so that `specular` is the height of the distribution; G is that of
+    V-grooves, and the 1 / pi that of Cook1982. Reciprocal. Sampled by D's own power law.
+    """
+
+    specular: Colour = spectrum(default=3.0, doc="height of D", low=0.0)
+    b: Number = number(default=300.0, doc="how narrow the peak is: it ends at 1 - n.h = 1 / b", low=1e-3)
+    c: Number = number(default=1.5, doc="falloff beyond the peak: as (1 - n.h)^-c", low=0.0)
+    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    fresnel: str = microfacet.fresnel_choice()
+
+    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach("D is not normalized, ")}
+
+    def _most(self) -> np.ndarray:
+        """16 specular int D d(n.h): a sample weighs 8 specular F G (o.h) / (n.o) of it, and G (o.h) <= 2 (n.o)."""
+        b, c = np.asarray(self.b, float), np.asarray(self.c, float)
+        log_t, q = np.log1p(b), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
+        return np.max(np.asarray(self.specular, float)) * 16.0 * np.max(np.expm1(q * log_t) / (q * b))
+
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """F by name at a facet seen under cos_theta."""
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+
+    @function
+    def _fall(self, h: Direction) -> Scalar:
+        """(1 + b (1 - n.h))^-c; 1 - n.h from the sine, as it cancels at the peak."""
+        return exp(-self.c * log(1.0 + self.b * frame.sin2(h) / (1.0 + h.z)))
+
+    @function
+    def _mass(self) -> Scalar:
+        """int_0^1 D d(n.h)."""
+        return logrel(self.b) * exprel((1.0 - self.c) * self._log_end())
+
+    @function
+    def _log_end(self) -> Scalar:
+        """log(1 + b), where the power law ends."""
+        return self.b * logrel(self.b)
+
+    @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^3 of r = 1 / (8 int D), the density of light at the peak against the cosine's."""
+        narrower = 1.0 / (1.0 + 8.0 * self._mass())
+        return narrower * sqr(narrower)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular F D G / (pi cos theta_o)."""
+        h, cos = facet(wo, wi)
+        facets = self._fall(h) * v_groove(wo, wi, h) * inv_pi / wo.z
+        return self.specular * self.reflectance(cos) * facets
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """D over its integral over the hemisphere, over 4 (o.h)."""
+        h, cos = facet(wo, wi)
+        return self._fall(h) * (0.5 * inv_pi) / (self._mass() * 4.0 * cos)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a half vector of density D: 1 + b (1 - n.h) follows a power law from 1 to 1 + b."""
+        q = 1.0 - self.c
+        log_t = power_quantile(u.y * power_integral(self._log_end(), q), q)
+        versine = log_t * exprel(log_t) / self.b
+        sin = safe_sqrt(versine * (2.0 - versine))
+        s, c = sincos((2.0 * ops.pi) * u.z)
+        return frame.reflect(wo, vec3(sin * c, sin * s, 1.0 - versine))
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """8 specular F int D: of a narrow lobe."""
+        return self.specular * self.reflectance(wo.z) * (8.0 * self._mass())

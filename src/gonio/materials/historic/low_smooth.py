@@ -1,0 +1,143 @@
+"""Low's model of a smooth surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from ... import ops
+from ...material.bsdf import Breach
+from ...material.parameters import Colour, Number, number, spectrum
+from ...ops import (
+    Direction,
+    Scalar,
+    Spectrum,
+    exp,
+    function,
+    inv_pi,
+    maximum,
+    safe_sqrt,
+    sincos,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
+from ...optics import fresnel
+from ...optics.special import exprel, logrel, power_integral, power_quantile
+from ..microfacet import microfacet
+from .glossy import _Glossy, sum_breach
+
+# How far a step may always go: seen flat, half of the azimuths have their rim so close that all steps in them would end
+# in a sliver along the horizon, whose density no float32 direction resolves.
+RIM = 0.25
+
+
+class LowSmooth(_Glossy):
+    """Rayleigh-Rice scattering of a nearly smooth surface: f = diffuse / pi + specular (1 + b |Dp|^2)^-c F (Low2012).
+
+    Dp = o + i along the surface, how far the pair is from a mirror's, after the power spectrum of polished surfaces
+    (Church1990; the ABC model). F is at cos = sqrt(1 - |o - i|^2 / 4), both along the surface: the facet's own angle
+    for a mirrored pair. Reciprocal; `specular` is the peak's height over F, 1/sr, no albedo. Sampled by its own power
+    law, cut near the rim of the disk of directions.
+    """
+
+    specular: Colour = spectrum(default=10.0, doc="height of the peak over F, 1/sr", low=0.0)
+    b: Number = number(default=300.0, doc="how narrow the peak is: it ends at |Dp| = 1 / sqrt(b)", low=1e-3)
+    c: Number = number(default=1.0, doc="falloff beyond the peak: as |Dp|^(-2 c)", low=0.0)
+    eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
+    fresnel: str = microfacet.fresnel_choice()
+
+    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
+
+    def _most(self) -> np.ndarray:
+        """specular times the lobe's integral over a disk of radius 2, the farthest that |Dp| gets."""
+        return np.max(np.asarray(self.specular, float)) * np.max(_area(np.asarray(self.b), np.asarray(self.c), 2.0))
+
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """F by name."""
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular (1 + b |Dp|^2)^-c F cos theta_i."""
+        across2 = sqr(wo.x - wi.x) + sqr(wo.y - wi.y)
+        spread = exp(-self.c * self._log_fall(_deviation2(wo, wi)))
+        return self.specular * self.reflectance(safe_sqrt(1.0 - 0.25 * across2)) * (spread * wi.z)
+
+    @function
+    def _mass(self, radius: Scalar) -> Scalar:
+        """int_0^radius (1 + b r^2)^-c r dr."""
+        return power_integral(self._log_fall(sqr(radius)), 1.0 - self.c) * (0.5 / self.b)
+
+    @function
+    def _log_fall(self, r2: Scalar) -> Scalar:
+        """log(1 + b r^2), which keeps its digits for a small b r^2."""
+        x = self.b * r2
+        return x * logrel(x)
+
+    @function
+    def _focus(self) -> Scalar:
+        """(1 - 1 / r)^2, r = 1 / (2 mass) the density at the peak against the cosine's, which is flat on the disk."""
+        mass = self._mass(1.0 + 0.0 * self.b)
+        return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """(1 + b r^2)^-c / (2 pi mass up to the end) over the disk of directions, times d(disk)/dw = cos theta_i."""
+        r2 = _deviation2(wo, wi)
+        r = sqrt(maximum(r2, 1e-30))
+        rim = _rim(wo, (wo.x + wi.x) / r, (wo.y + wi.y) / r)
+        spread = exp(-self.c * self._log_fall(r2))
+        return spread * wi.z * (0.5 * inv_pi) / self._mass(maximum(rim.ahead, RIM))
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """A step of the power law from the mirrored wo on the disk of directions, in any azimuth, ending at its rim or
+        at `RIM`; beyond the rim it has failed."""
+        s, c = sincos((2.0 * ops.pi) * u.z)
+        rim = _rim(wo, c, s)
+        q = 1.0 - self.c
+        end = maximum(rim.ahead, RIM)
+        log_t = power_quantile(u.y * power_integral(self._log_fall(sqr(end)), q), q)
+        r = sqrt(log_t * exprel(log_t) / self.b)
+        # 1 - x^2 - y^2 as a product: near the rim the difference has no digits left
+        z2 = (rim.ahead - r) * (rim.behind + r)
+        beyond = ops.rsqrt(1.0 + maximum(-z2, 0.0))
+        return vec3((r * c - wo.x) * beyond, (r * s - wo.y) * beyond, safe_sqrt(z2))
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular F times the lobe's integral over a disk of radius 1, about the whole of it seen from the normal."""
+        return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(1.0 + 0.0 * wo.z))
+
+
+class Rim(NamedTuple):
+    ahead: Scalar
+    behind: Scalar
+
+
+@function
+def _rim(wo: Direction, c: Scalar, s: Scalar) -> Rim:
+    """How far the rim of the unit disk is from the mirrored wo, ahead in the azimuth (c, s) and behind.
+
+    The roots of |p + r d|^2 = 1, of which one would cancel; their product is -(n.o)^2.
+    """
+    along = wo.x * c + wo.y * s
+    root = sqrt(sqr(along) + sqr(wo.z))
+    longer = maximum(root + ops.abs(along), 1e-6)
+    shorter = sqr(wo.z) / longer
+    return Rim(where(along > 0.0, longer, shorter), where(along > 0.0, shorter, longer))
+
+
+@function
+def _deviation2(wo: Direction, wi: Direction) -> Scalar:
+    """|Dp|^2, squared length of o + i along the surface."""
+    return sqr(wo.x + wi.x) + sqr(wo.y + wi.y)
+
+
+def _area(b: np.ndarray, c: np.ndarray, radius: float) -> np.ndarray:
+    """2 pi int_0^radius (1 + b r^2)^-c r dr, of plain numbers."""
+    log_t, q = np.log1p(b * radius**2), np.where(np.abs(1.0 - c) < 1e-9, 1e-9, 1.0 - c)
+    return np.pi / b * np.expm1(q * log_t) / q

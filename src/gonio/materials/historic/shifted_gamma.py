@@ -1,0 +1,159 @@
+"""Bagher's shifted gamma distribution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ... import ops
+from ...material.bsdf import Breach
+from ...material.parameters import Colour, spectrum
+from ...ops import (
+    Direction,
+    Scalar,
+    Spectrum,
+    atan2,
+    exp,
+    function,
+    inv_pi,
+    log,
+    max_component,
+    maximum,
+    mean,
+    sincos,
+    sqr,
+    sqrt,
+    vec3,
+    where,
+)
+from ...optics import frame
+from ...optics.fresnel.schlick import schlick
+from ...optics.special import exprel, power_integral, power_quantile
+from .glossy import _Glossy, facet, sum_breach
+
+# G1 ends here. Those of the paper reach -0.002 at 90 degrees, which is kept; further down, where only parameters of
+# one's own lead, two negative G1 would multiply to a positive light without bound.
+LEAST = -0.01
+
+
+class ShiftedGamma(_Glossy):
+    """Microfacets of a fitted distribution: f = diffuse / pi + specular F D G / (pi (n.o)(n.i)), a channel each
+    (Bagher2012).
+
+    D = normalization e^-x / (x^p pi cos^4 h), x = alpha + tan^2 h / alpha; G = G1(o) G1(i), where
+    G1 = 1 + Lambda (1 - exp(t^k)) of t = (theta - theta0) / reach, 1 below theta0;
+    F = f0 + (1 - f0) (1 - cos)^5 - f1 cos. In the paper c = reach^-k, which is past 1e100 in its own fits; the angle is
+    not. normalization = 1 / (alpha Gamma(1 - p, alpha)) makes D integrate to 1. All of these are fitted numbers: F can
+    pass 1 and, where f1 > f0, be negative, G1 can end below 0 at the horizon, and the lobe is then negative, as
+    printed. Reciprocal. Sampled by a power law and an exponential that together stay within a factor e of D, of the
+    narrowest channel's width and the widest's.
+    """
+
+    specular: Colour = spectrum(default=0.3, doc="factor of the lobe", low=0.0)
+    alpha: Colour = spectrum(default=0.05, doc="width of the distribution: tan^2 h falls off over alpha", low=1e-5)
+    p: Colour = spectrum(default=0.5, doc="power of the distribution's peak", low=0.0, high=3.0)
+    f0: Colour = spectrum(default=0.05, doc="F at normal incidence, but for f1")
+    f1: Colour = spectrum(default=0.0, doc="what F loses with the cosine")
+    normalization: Colour = spectrum(default=17.5, doc="factor of D (K in the paper)", low=0.0)
+    Lambda: Colour = spectrum(default=3.0, doc="depth of the masking", low=0.0)
+    reach: Colour = spectrum(default=1.64, doc="angle past theta0 at which masking is deep", low=0.05, unit="rad")
+    k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)
+    theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": sum_breach("F and G are fitted factors, which no law bounds, "),
+        "positivity": Breach(
+            "F is negative where f1 cos is more than Schlick's curve, and G1 may be at the horizon",
+            1.0,
+            certain=False,
+        ),
+    }
+
+    @function
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """f0 + (1 - f0) (1 - cos)^5 - f1 cos (Bagher2012, eq. 13)."""
+        return schlick(cos_theta, self.f0) - self.f1 * cos_theta
+
+    @function
+    def _seen(self, v: Direction) -> Spectrum:
+        """G1 = 1 + Lambda (1 - exp(t^k)) (Bagher2012, eq. 11)."""
+        theta = atan2(sqrt(maximum(frame.sin2(v), 1e-20)), v.z)
+        t = maximum(theta - self.theta0, 1e-6) / self.reach
+        power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 stays in float32, and is far below the least G1
+        depth = self.Lambda * power * exprel(power)
+        return maximum(1.0 - depth, LEAST)
+
+    @function
+    def _density(self, h: Direction) -> Spectrum:
+        """D."""
+        cos2 = sqr(maximum(h.z, 1e-4))
+        x = self.alpha + frame.sin2(h) / (cos2 * self.alpha)
+        return self.normalization * exp(-x - self.p * log(x)) * (inv_pi / sqr(cos2))
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular F D G / (pi cos theta_o)."""
+        h, cos = facet(wo, wi)
+        facets = self._density(h) * self._seen(wo) * self._seen(wi) * (inv_pi / wo.z)
+        return self.specular * self.reflectance(cos) * facets
+
+    @function
+    def _widths(self) -> tuple[Scalar, Scalar, Scalar]:
+        """(least alpha, largest alpha, mean p) of the channels."""
+        return -max_component(-self.alpha), max_component(self.alpha), mean(self.p)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Mixture of the two widths, over 4 (o.h)."""
+        h, cos = facet(wo, wi)
+        narrow, wide, p = self._widths()
+        return (_gamma_pdf(h, narrow, p) + _gamma_pdf(h, wide, p)) * 0.125 / cos
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a half vector of one of the two."""
+        narrow, wide, p = self._widths()
+        return frame.reflect(wo, _gamma_sample(u.y, u.z, where(u.x < 0.5, narrow, wide), p))
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """4 / pi specular F G, G at the mirrored direction: of a narrow lobe."""
+        return self.specular * self.reflectance(wo.z) * sqr(self._seen(wo)) * (4.0 * inv_pi)
+
+
+@function
+def _parts(alpha: Scalar, p: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """Of int x^-p dx from alpha to s = max(1, alpha) and int s^-p e^-x dx beyond: s, log(s / alpha), and the first over
+    alpha^(1 - p); the second is s^-p e^-s. Together they are D in x, to a factor between 1 / e and 1."""
+    s = maximum(alpha, 1.0)
+    log_t = log(s / alpha)
+    return s, log_t, power_integral(log_t, 1.0 - p)
+
+
+@function
+def _gamma_pdf(h: Direction, alpha: Scalar, p: Scalar) -> Scalar:
+    """Density of `_gamma_sample`, 1/sr."""
+    s, _, area = _parts(alpha, p)
+    below, beyond = exp((1.0 - p) * log(alpha)) * area, exp(-p * log(s) - s)
+    cos2 = sqr(maximum(h.z, 1e-4))
+    x = alpha + frame.sin2(h) / (cos2 * alpha)
+    value = where(x < s, exp(-p * log(x)), exp(-p * log(s) - x))
+    # tan^2 = alpha (x - alpha), and dw = cos^3 / 2 d(tan^2) dphi
+    return value / ((below + beyond) * alpha * ops.pi * cos2 * sqrt(cos2))
+
+
+@function
+def _gamma_sample(u1: Scalar, u2: Scalar, alpha: Scalar, p: Scalar) -> Direction:
+    """A half vector: x by its power law up to s, by its exponential beyond."""
+    s, _, area = _parts(alpha, p)
+    q = 1.0 - p
+    below, beyond = exp(q * log(alpha)) * area, exp(-p * log(s) - s)
+    share = below / (below + beyond)
+    inner = u1 < share
+    log_t = power_quantile(area * ops.minimum(u1 / maximum(share, 1e-6), 1.0), q)
+    outer = ops.clamp((1.0 - u1) / maximum(1.0 - share, 1e-6), 1e-7, 1.0)
+    past = where(inner, alpha * log_t * exprel(log_t), s - alpha - log(outer))  # x - alpha
+    tan2 = alpha * past
+    cos = ops.rsqrt(1.0 + tan2)
+    sin = sqrt(tan2) * cos
+    sn, cs = sincos((2.0 * ops.pi) * u2)
+    return vec3(sin * cs, sin * sn, cos)

@@ -1,0 +1,74 @@
+"""Ward's model of 1992."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...material.bsdf import Breach
+from ...material.parameters import Angle, Colour, Width, spectrum, width
+from ...ops import Direction, Scalar, Spectrum, function, sqr, sqrt
+from ...optics import frame
+from ...optics.ndf import distribution
+from ..microfacet import microfacet
+from .glossy import _Glossy, facet, sum_breach
+
+
+class Ward(_Glossy):
+    """Ward's Gaussian lobe: f = diffuse / pi + specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) (Ward1992).
+
+    e = exp(-(h_x^2 / alpha_x^2 + h_y^2 / alpha_y^2) / h_z^2), h the half vector (Walter2005). Reciprocal. A narrow lobe
+    reflects specular cos theta_o, so it loses energy as the view gets flat, and beyond, where a wide one has spread to
+    the normal's side, it gains without bound. Sampled by all half vectors, with density D (n.h) of Beckmann's D.
+    """
+
+    specular: Colour = spectrum(default=0.2, doc="albedo of the lobe, seen from the normal", low=0.0)
+    alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=1e-3, high=4.0)
+    rotation: Angle = microfacet.rotation_angle()
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing, and "),
+    }
+
+    @property
+    def _height(self) -> Spectrum:
+        """`specular`; in subclasses mypy forgets that an inherited field is a declared parameter."""
+        return self.specular
+
+    @function
+    def _shape(self, wo: Direction, wi: Direction) -> Scalar:
+        """f of the lobe over D specular: (n.h)^4 / (4 sqrt((n.o)(n.i)))."""
+        h, _ = facet(wo, wi)
+        return 0.25 * sqr(sqr(h.z)) / sqrt(wo.z * wi.z)
+
+    @function
+    def _density(self, h: Direction) -> Scalar:
+        """Beckmann's D."""
+        return distribution("beckmann").D(frame.rotate(h, self.rotation), self.alpha)
+
+    @function
+    def _focus(self) -> Scalar:
+        """(r / (1 + r))^2 of r = 1 / (4 alpha_x alpha_y), the density of light at the peak against the cosine's."""
+        return 1.0 / sqr(1.0 + 4.0 * self.alpha.x * self.alpha.y)
+
+    @function
+    def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
+        """specular e / (4 pi alpha_x alpha_y sqrt((n.o)(n.i))) cos theta_i."""
+        h, _ = facet(wo, wi)
+        return self.specular * (self._density(h) * self._shape(wo, wi) * wi.z)
+
+    @function
+    def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """D (n.h) / (4 (o.h)) (Walter2005)."""
+        h, cos = facet(wo, wi)
+        return self._density(h) * h.z / (4.0 * cos)
+
+    @function
+    def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
+        """wo mirrored at a Gaussian half vector."""
+        h = distribution("beckmann").sample(u.y, u.z, self.alpha)
+        return frame.reflect(wo, frame.rotate_back(h, self.rotation))
+
+    def _lobe_albedo(self, wo: Direction) -> Spectrum:
+        """specular cos theta_o: of a narrow lobe."""
+        return self.specular * wo.z

@@ -1,0 +1,1 @@
+"""Layers over a base: coat, OpenPBR and the two Disney models."""

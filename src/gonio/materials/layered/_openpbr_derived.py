@@ -1,0 +1,235 @@
+"""What follows from the parameters of OpenPBR alone: widths, indices, means over the hemisphere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from ...energy.compensation.glass import Glass
+from ...energy.compensation.lobe import NOTHING, MissingEnergy
+from ...energy.compensation.missing import missing_energy
+from ...material import binding
+from ...ops import Pair, Scalar, Spectrum, maximum, mean, sqr, sqrt
+from ...optics import fresnel
+from ...optics.fresnel import exact
+from ...optics.special import gauss
+from ..microfacet.conductor import Conductor
+from ..microfacet.dielectric import Dielectric
+from . import _openpbr_tables as tables
+from ._openpbr_formulas import averaged, colour_again, covered, over_pi, seen_by, total_of
+from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, NODES, PLACES
+
+if TYPE_CHECKING:
+    from .openpbr import OpenPBR
+
+STEPS = 4  # of the iteration in `_balanced`
+WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of means with the cosine
+
+
+class Other(NamedTuple):
+    """What facets of glass miss that reflects otherwise than bare glass: under a film, or under a coat, by whose index
+    it reflects, while light is bent as by both. Missing are M + sum of less D (`spared`), M that of bare glass.
+
+    less         by how much F differs at `FEW_PLACES`
+    thin, dense  the mean of what is missing, from outside and from inside
+    into, out    the share of it that passes to the other side (`compensation.glass`)
+    """
+
+    less: tuple[Spectrum, ...]
+    thin: Spectrum
+    dense: Spectrum
+    into: Spectrum
+    out: Spectrum
+
+
+class Between(NamedTuple):
+    """What follows from the parameters alone.
+
+    alpha        of the base, roughened by the coat, along x and y
+    rough        its roughness; the root of alpha with one width
+    coat_alpha   of the coat
+    ratio        index by which the base reflects, over what lies above it, 1 and more
+    eta          index by which it refracts, over the outside's
+    medium       index of what lies above the base, over the outside's
+    sheer        share of diffuse light that the base's surface lets through: its albedo's complement, averaged
+    joint        the same seen through the coat's
+    bent         by nodes of the cosine, how far that is off its mean; both of them
+    filmed       by how much the film changes F at `PLACES`; empty without one
+    extra        the mean of that
+    facets       factor of facets under the coat, by nodes of the cosine; empty without one
+    returned     what those of a dielectric return less than white ones would, averaged: the body below gets it
+    metal        what single scattering misses at F = 1
+    metal_again  colour of what a metal gives back
+    sheet_again  colours of what a thin sheet gives back, reflected and transmitted
+    glass        what it misses of bare glass; None where nothing is transmitted
+    other        what it misses more or less, as glass reflects otherwise there; None where it is bare
+    """
+
+    alpha: Pair
+    rough: Scalar
+    coat_alpha: Pair
+    ratio: Scalar
+    eta: Scalar
+    medium: Scalar
+    sheer: Spectrum
+    joint: Spectrum
+    bent: tuple[tuple[Scalar, ...], tuple[Scalar, ...]]
+    filmed: tuple[Spectrum, ...]
+    extra: Scalar
+    facets: tuple[Scalar, ...]
+    returned: Scalar
+    metal: MissingEnergy
+    metal_again: Spectrum
+    sheet_again: tuple[Spectrum, Spectrum] | None
+    glass: Glass | None
+    other: Other | None
+
+
+def derive(model: OpenPBR) -> Between:
+    """Widths and indices, means over the hemisphere, and what facets scatter twice."""
+    rough = model._roughened()
+    alpha = model._widths(rough, model.specular_roughness_anisotropy)
+    coat_alpha = model._widths(model.coat_roughness, model.coat_roughness_anisotropy)
+    ratio, eta, medium = model._indices()
+    zero, white = 0.0 * model.base_color, 1.0 + 0.0 * model.base_color
+    two = model._two_widths
+    kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=model._masking)
+    values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
+    metal = missing_energy(binding.bound_copy(kind, values))
+    bare, filmed, extra = at_places(model, ratio, eta, medium)
+    weights = [4.0 * w * x**3 for x, w in zip(NODES, gauss(len(NODES))[1].tolist(), strict=True)]
+    under = kept_at_nodes(model, rough, ratio, filmed)
+    over = [1.0 - E for E in tables.reflected_at_nodes(model.coat_roughness, model.coat_ior, model._masking)]
+    over_hats, over = over[:HATS], over[HATS:]
+    facets: tuple[Scalar, ...] = ()
+    returned = 0.0 * rough
+    if model._has("coat_weight"):
+        facets = balanced(model, rough, over_hats)
+        returned = returned_less(model, rough, ratio, over_hats, facets)
+    total = total_of(weights)
+    sheer = total_of([one * (w / total) for one, w in zip(under, weights, strict=True)])
+    both = [one * other for one, other in zip(under, over, strict=True)]
+    joint = total_of([one * (w / total) for one, w in zip(both, weights, strict=True)])
+    bent = tuple(
+        tuple(mean(one / level - 1.0) * w for one, w in zip(parts, weights, strict=True))
+        for parts, level in ((under, sheer), (both, joint))
+    )
+    f_metal = white
+    if model._has("base_metalness"):
+        places = FEW_PLACES if filmed else PLACES
+        f_metal = averaged([model._metal(x + 0.0 * rough, eta, medium) for x in places])
+    sheet = None
+    if model.geometry_thin_walled:
+        f = [white * one for one in bare]
+        if filmed:
+            f = [one + more for one, more in zip(f, filmed, strict=True)]
+        both_ways = [model._sheet(x + 0.0 * rough, one, eta) for x, one in zip(PLACES, f, strict=True)]
+        sheet = averaged([back for back, _ in both_ways]), averaged([on for _, on in both_ways])
+    glass, other = None, None
+    if model._refracts:
+        kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=model._masking)
+        clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
+        found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
+        assert isinstance(found, Glass), "a dielectric's"
+        glass = found
+        if filmed or model._has("coat_weight"):
+            other = misses_otherwise(model, glass, bare, filmed, rough, eta)
+    return Between(
+        alpha=alpha,
+        rough=rough,
+        coat_alpha=coat_alpha,
+        ratio=ratio,
+        eta=eta,
+        medium=medium,
+        sheer=sheer,
+        joint=(joint + returned) / sheer,
+        bent=bent,  # type: ignore[arg-type]
+        filmed=filmed,
+        extra=extra,
+        facets=facets,
+        returned=returned,
+        metal=metal,
+        metal_again=colour_again(f_metal, metal.average),
+        sheet_again=sheet,
+        glass=glass,
+        other=other,
+    )
+
+
+def at_places(
+    model: OpenPBR, ratio: Scalar, eta: Scalar, medium: Scalar
+) -> tuple[list[Scalar], tuple[Spectrum, ...], Scalar]:
+    """F of the bare dielectric at `PLACES`, what a film adds there, and the mean of that."""
+    cosines = [x + 0.0 * ratio for x in PLACES]
+    bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
+    if not model._has("thin_film_weight"):
+        return bare, (), 0.0 * ratio
+    filmed = tuple(
+        (model._clear_film(cos, eta, medium) - one) * model.thin_film_weight
+        for cos, one in zip(cosines, bare, strict=True)
+    )
+    return bare, filmed, mean(averaged(list(filmed)))
+
+
+def misses_otherwise(
+    model: OpenPBR, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
+) -> Other:
+    """What that glass misses more or less than bare glass of index eta."""
+    white = 1.0 + 0.0 * model.base_color
+    less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
+    for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
+        cos = x + 0.0 * eta
+        known = exact.dielectric(cos, fresnel.cos_transmitted(cos, eta), eta)
+        less.append(white * (one - known) + filmed[n] if filmed else white * (one - known))
+        reflected = reflected + less[-1] * weight
+    few = tuple(total_of([one * share for one, share in zip(less, row, strict=True)]) for row in FROM_PLACES)
+    shares = tables.spared_on_average(rough, eta, model._masking)
+    count = len(few)
+    thin, dense = (
+        maximum(over_pi(side.whole) + total_of([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
+        for side, part in ((glass.thin, shares[:count]), (glass.dense, shares[count:]))
+    )
+    enters = (1.0 - reflected) / (thin + dense)
+    return Other(few, thin, dense, enters * dense, enters * thin / sqr(eta))
+
+
+def kept_at_nodes(model: OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
+    """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
+    found = []
+    E_of = tables.reflected_at_nodes(rough, ratio, model._masking)[HATS:]
+    faced = tables.faced_at_nodes(rough, model._masking) if filmed else [()] * len(E_of)
+    for E, shares in zip(E_of, faced, strict=True):
+        found.append(1.0 - covered(E + 0.0 * model.base_color, filmed, shares))
+    return found
+
+
+def balanced(model: OpenPBR, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar, ...]:
+    """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
+
+    A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
+    light all over and the rest on, w [(1 - b) w + b q] = 1 - E, with a b that grows toward grazing views.
+
+    kept  1 - E_coat at the nodes
+    """
+    rows, w = tables.scattered_at_nodes(rough, model._masking), []
+    q = sqrt(kept[round(0.67 * (HATS - 1))])  # where most light is
+    for n, one in enumerate(kept):
+        cos = (n / (HATS - 1.0)) ** 2
+        b = sqr(rough) / (sqr(rough) + cos + 1e-3)
+        w.append(2.0 * one / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * one + 1e-12)))
+    for _ in range(STEPS):
+        met = [total_of([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
+        w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
+    return tuple(w)
+
+
+def returned_less(
+    model: OpenPBR, rough: Scalar, ratio: Scalar, kept: list[Scalar], facets: tuple[Scalar, ...]
+) -> Scalar:
+    """The mean of E (1 - E_coat - w <w>), see `layers.under`."""
+    E_of = tables.reflected_at_nodes(rough, ratio, model._masking)[:HATS]
+    rows = tables.scattered_at_nodes(rough, model._masking)
+    less = []
+    for n, (E, one, w, row) in enumerate(zip(E_of, kept, facets, rows, strict=True)):
+        cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
+        less.append(E * (one - w * seen_by(cos, ratio, row, facets)) * tables.MEANS[n])
+    return total_of(less)

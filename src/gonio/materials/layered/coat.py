@@ -1,0 +1,286 @@
+"""A clear or coloured coat over any material that reflects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
+from ... import ops
+from ...errors import InputError
+from ...material import (
+    BSDF,
+    Breach,
+    Colour,
+    Number,
+    Sample,
+    Width,
+    binding,
+    bsdf,
+    choice,
+    method,
+    number,
+    spectrum,
+    tree,
+)
+from ...material import width as width_parameter
+from ...material.bsdf import Delta
+from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
+from ...optics import frame, fresnel
+from ...optics.roughness import widths
+from ...optics.warp import square_to_cosine_hemisphere
+from ..microfacet import microfacet  # fmt: skip
+from ..microfacet.dielectric import Dielectric
+from .interior import Account, account_of, colour_of, colour_place, left_place
+
+BOUNCES = {
+    "coloured": "the base's, once more with each bounce: deeper and darker than the base alone",
+    "white": "the base's once, as most renderers have it: its colour is then what is seen of it",
+}
+ALMOST_ONE = 0.99999994  # the largest float32 under 1
+
+
+class Coat(BSDF):
+    """A dielectric layer over a base: light is reflected at the top, or refracted, dimmed on its slant way through the
+    layer, scattered by the base, and bounced between the two until it leaves.
+
+    f = f_top + T(o) T(i) t(o') t(i') / eta^2 g f_base(o', i') + rest(o) rest(i) / norm
+
+    T = 1 - R is what the top lets through, o' and i' the refracted directions, t = exp(-absorption depth / cos) Beer's
+    law along them, eta^2 the solid angle that widens. What bounces more than once is the base's own lobe again, g of
+    it, and a separable rest (`interior.py` says how): over Lambert exact, over a metal exact in albedo, channel
+    by channel. Reciprocal; white on white keeps all light.
+
+    With `bounces="white"` g and rest are a white base's: what is seen is R, and 1 - R of the base's colour, neither
+    darker nor deeper.
+
+    The base stands in the coat: an index of its own is over the coat's. A rough top reflects as rough glass does, by an
+    albedo R; refracted light is not blurred. g and the rest are tables found when the material is first asked. Colours
+    of the base may vary over the surface, and so may the coat's own colour and depth, over which the tables run; no
+    other value may, and derivatives leave the change of the tables out.
+    """
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "what a rough top reflects and lets through is met to so much, by draws of rough glass",
+            lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
+            certain=False,
+        ),
+    }
+    base: BSDF = bsdf("the material under the coat; it must not transmit")
+    index: Number = number(default=1.5, doc="index of the coat over the outside's", low=1.0, high=3.0)
+    alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
+    absorption: Colour = spectrum(default=0.0, doc="a crossing straight down leaves exp(-absorption depth)", low=0.0)
+    depth: Number = number(default=1.0, doc="how thick the coat is", low=0.0)
+    ndf: str = microfacet.ndf_choice()
+    masking: str = microfacet.masking_choice()
+    bounces: str = choice("coloured", "colour of light that bounces between coat and base", BOUNCES)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        name = type(self.base).__name__
+        if self.base.transmits:
+            raise InputError(f"{name} transmits, a material that only reflects expected", "Coat.base")
+        if self.base.delta == "maybe" or self.base.stochastic:
+            why = "is a mirror in places" if self.base.delta == "maybe" else "is random"
+            hint = "give it a width everywhere, or make all of it a mirror"
+            raise InputError(f"{name} {why}, one finite lobe or one mirror expected", "Coat.base", hint)
+        if self._mirror and microfacet.delta_of(self.alpha) != "always":
+            hint = "a narrow base, alpha = 0.01, under a rough coat; or a smooth coat"
+            raise InputError("a rough coat over a perfect mirror, which it would blur", "Coat.alpha", hint)
+        fixed = self.fixed
+        for leaf in tree.leaves(self):
+            if leaf.path in fixed and leaf.value is not None and leaf.parameter.rows(leaf.value) > 1:
+                what = f"{leaf.path} varies from ray to ray, yet tables are found from it once"
+                hint = "colours of the base may vary, and the coat's own absorption and depth"
+                raise InputError(what, f"Coat.{leaf.path}", hint)
+
+    # ------------------------------------------------------------------ what is known of the inside
+
+    def prepare(self) -> None:
+        """Find the tables, before a loop is recorded."""
+        account_of(self.plain)
+
+    @property
+    def _account(self) -> Account:
+        return account_of(self.plain)
+
+    @property
+    def _mirror(self) -> bool:
+        """Whether the base is a mirror, of which the series is known in closed form."""
+        return self.plain.base.delta == "always"
+
+    @property
+    def _top(self) -> Dielectric:
+        """The outside, as glass that only reflects."""
+        kind = Dielectric(transmission=False, ndf=self.ndf, masking=self.masking)
+        one = 1.0 + 0.0 * self.absorption
+        return binding.bound_copy(kind, {"eta": self.index, "alpha": self.alpha, "rotation": None, "albedo": one})
+
+    # ------------------------------------------------------------------ formulas
+
+    @function
+    def _through(self, w: Direction) -> Scalar:
+        """What the base's lobe is multiplied by at each end: T by Fresnel's equations; of a rough top the table's."""
+        _, smooth = widths(self.alpha)
+        return where(smooth, self._sharp(w), self._at(w)[2])
+
+    @function
+    def _sharp(self, w: Direction) -> Scalar:
+        """T of a smooth top, by Fresnel's equations: not 1 - R, which at grazing angles has no digits left."""
+        cos = ops.abs(w.z)
+        cos_t = fresnel.cos_transmitted(cos, self.index)
+        across, along = cos + self.index * cos_t, self.index * cos + cos_t
+        return 2.0 * self.index * cos * cos_t * (1.0 / sqr(across) + 1.0 / sqr(along))
+
+    def _at(self, w: Direction) -> tuple[Scalar, ...]:
+        """The coat's table at a direction outside."""
+        table = self._account.coat
+        at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
+        return ops.lookup(table, at)
+
+    @function
+    def _inside(self, w: Direction) -> Direction:
+        """The refracted direction, away from the base."""
+        over = 1.0 / self.index
+        return ops.vec3(w.x * over, w.y * over, ops.safe_sqrt(1.0 - frame.sin2(w) * sqr(over)))
+
+    @function
+    def _crossed(self) -> Spectrum:
+        """u: what one crossing leaves, straight down."""
+        return exp(self.absorption * (-self.depth))
+
+    @function
+    def _left(self, inner: Direction) -> Spectrum:
+        """t: what a crossing along a direction inside leaves."""
+        return exp(self.absorption * (-self.depth / maximum(inner.z, 1e-4)))
+
+    def _colour(self, w: Direction) -> Spectrum:
+        """a: what colours the base's light, with each bounce."""
+        white = 1.0 + 0.0 * self.absorption
+        up = ops.vec3(0.0 * w.z, 0.0 * w.z, 1.0 + 0.0 * w.z)
+        return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
+
+    def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
+        """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
+        met = 1.0 + 0.0 * a if self.bounces == "white" else a
+        u = self._crossed() + 0.0 * a
+        account, ends = self._account, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
+        factors, rests = [], []
+        for colour, left in zip(ops.channels(colour_place(met)), ops.channels(left_place(u)), strict=True):
+            place = [ops.inset(x, n) for x, n in zip((colour, left), account.again.shape, strict=True)]
+            over_factor, norm = ops.lookup(account.again, *place)
+            factors.append(1.0 / over_factor)
+            if account.rest is not None:
+                at_o, at_i = (
+                    ops.lookup(account.rest, ops.inset(end, account.rest.shape[0]), *place)[0] for end in ends
+                )
+                rests.append(at_o * at_i * ops.safe_div(1.0, norm))
+        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else 0.0 * a
+        return ops.of_channels(a, factors), rest
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The top's lobe and the base's light, times cos theta_i."""
+        if self._mirror:
+            return self._top.eval(wo, wi, mode)
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        top = self._top.eval(wo, wi, mode) + self._at(wo)[3] * self._at(wi)[3] * wi.z
+        o, i = self._inside(wo), self._inside(wi)
+        factor, rest = self._bounced_again(self._colour(wo), wo, wi)
+        crossed = self._left(o) * self._left(i) * (self._through(wo) * self._through(wi) / sqr(self.index))
+        lobe = self.base.eval(o, i, mode) * (wi.z / maximum(i.z, frame.TINY))
+        return where(above, top + lobe * crossed * factor + rest * wi.z, 0.0)
+
+    @function
+    def _shares(self, wo: Direction) -> Pair:
+        """(probability of what is under the top, of a cosine among it): that finds the separable lobe, and what the
+        base sends back totally, whose samples fail."""
+        reflected, even, _, beyond = self._at(wo)
+        _, smooth = widths(self.alpha)
+        cos = ops.abs(wo.z)
+        sharp = fresnel.kind("exact").dielectric(cos, fresnel.cos_transmitted(cos, self.index), self.index)
+        through = where(smooth, self._sharp(wo), 1.0 - reflected)
+        reflected = where(smooth, sharp, reflected)
+        inner = self._inside(wo)
+        tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
+        below = through * mean(self._left(inner) * tint) + 2.0 * beyond
+        under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
+        cosine = 0.0 * even if self._mirror else even
+        return ops.vec2(under, cosine)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The mixture of the top's lobe, the cosine, and the base's density as it is refracted."""
+        shares = self._shares(wo)
+        above = (wo.z > 0.0) & (wi.z > 0.0)
+        top = self._top.pdf(wo, wi)
+        if self._mirror:
+            return 0.0 * top
+        o, i = self._inside(wo), self._inside(wi)
+        base = self.base.pdf(o, i) * wi.z / (sqr(self.index) * maximum(i.z, frame.TINY))
+        below = shares.y * wi.z * inv_pi + (1.0 - shares.y) * base
+        return where(above, (1.0 - shares.x) * top + shares.x * below, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks the top, the cosine or the base; what the base would send into total reflection is a failure."""
+        shares = self._shares(wo)
+        over, by_base = 1.0 - shares.x, 1.0 - shares.y
+        on_top = u.x >= shares.x
+        first = ops.minimum(ops.safe_div(u.x, shares.x), ALMOST_ONE)
+        by_cosine = first < shares.y
+        second = ops.minimum(ops.safe_div(first - shares.y, by_base), ALMOST_ONE)
+        o = self._inside(wo)
+        s_top = self._top.sample(wo, u, mode)
+        s_base = self.base.sample(where(wo.z > 0.0, o, -o), ops.vec3(maximum(second, 0.0), u.y, u.z), mode)
+        # out of the coat: tangential parts grow by eta
+        x, y = s_base.wi.x * self.index, s_base.wi.y * self.index
+        height2 = 1.0 - (sqr(x) + sqr(y))
+        leaves = (height2 > 0.0) & (s_base.wi.z > 0.0) & (s_base.pdf > 0.0)
+        refracted = ops.vec3(where(leaves, x, 0.0), where(leaves, y, 0.0), where(leaves, ops.safe_sqrt(height2), -1.0))
+        if self._mirror:
+            refracted, leaves = frame.mirror(wo), s_base.pdf > 0.0
+        cosine = square_to_cosine_hemisphere(u.y, u.z)
+        wi = where(on_top, s_top.wi, where(by_cosine, cosine, refracted))
+        from_top = on_top & s_top.delta
+        from_base = ~on_top & ~by_cosine & s_base.delta & leaves
+        delta = from_top | from_base
+        density = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, density)
+        weight = where(from_top, s_top.weight / over, weight)
+        ideal = where(from_top, over * s_top.pdf, shares.x * by_base * s_base.pdf)
+        if self._mirror:
+            weight = where(from_base, s_base.weight * self._bounced(wo, o), weight)
+            weight = where(from_base, weight * ops.safe_div(1.0, shares.x), weight)
+        pdf = where((wo.z > 0.0) & (wi.z > 0.0), where(delta, ideal, density), 0.0)
+        return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), 1.0 + 0.0 * pdf)
+
+    @function
+    def _bounced(self, wo: Direction, inner: Direction) -> Spectrum:
+        """T^2 t^2 / (1 - a k) of a mirror, k = (1 - T) t^2."""
+        through, left2 = self._through(wo), sqr(self._left(inner))
+        k = (1.0 - through) * left2
+        tint = self.base.tint(inner)
+        return sqr(through) * left2 / (1.0 - (k if self.bounces == "white" else k * tint))
+
+    def white(self) -> Self:
+        """Over the white base, and without absorption."""
+        white = self.base.white()
+        values = {"base": white, "absorption": self.absorption * 0.0 if self.is_bound else 0.0}
+        return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """What the tables are found from: all but colours of the base, and the coat's own colour and depth."""
+        numeric = [leaf for leaf in tree.leaves(self.plain.base) if leaf.parameter.numeric]
+        return frozenset({"index", "alpha"} | {f"base.{leaf.path}" for leaf in numeric if leaf.parameter.white is None})
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """R, and what is left of the base's."""
+        through = self._through(wo)
+        return (1.0 - through) + through * sqr(self._left(self._inside(wo))) * self.base.tint(self._inside(wo))
+
+    @property
+    def delta(self) -> Delta:
+        top = microfacet.delta_of(self.plain.alpha)
+        return "always" if self._mirror else "never" if top == "never" else "maybe"

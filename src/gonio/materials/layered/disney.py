@@ -1,0 +1,230 @@
+"""Disney's principled BRDF of 2012."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple, Self
+
+from ... import ops
+from ...material.bsdf import BSDF, Breach, never
+from ...material.calling import method
+from ...material.parameters import Angle, Colour, Number, number, spectrum
+from ...material.sample import Sample
+from ...ops import (
+    Direction,
+    Mode,
+    Pair,
+    Scalar,
+    Spectrum,
+    clamp,
+    function,
+    inv_pi,
+    log,
+    maximum,
+    mean,
+    sqr,
+    sqrt,
+    vec2,
+    vec3,
+    where,
+)
+from ...optics import frame, masking
+from ...optics.ndf import distribution
+from ...optics.warp import square_to_cosine_hemisphere
+from ..historic.glossy import facet, lit
+from ..microfacet import microfacet
+
+SMALLEST = 0.001  # width: Burley2012's own code holds it there
+COAT_WIDTH = 0.25  # of the coat's masking, whatever its gloss (Burley2012, 5.6)
+
+
+class Pieces(NamedTuple):
+    """What the model is the sum of, times cos theta_i.
+
+    diffuse   retro-reflection at grazing angles, toward subsurface scattering
+    specular  GTR2 lobe
+    sheen     Schlick's (1 - cos)^5 at the half vector
+    coat      GTR1 lobe
+    """
+
+    diffuse: Spectrum
+    specular: Spectrum
+    sheen: Spectrum
+    coat: Spectrum
+
+
+class Disney(BSDF):
+    """Disney's principled BRDF: eleven dials, each from 0 to 1 (Burley2012, with the formulas of its published code).
+
+    f = (1 - metallic) (base / pi mix(f_d, f_ss, subsurface) + f_sheen) + F D G / (4 (n.o)(n.i)) + clearcoat / 4 f_r
+    f_d = (1 + (F_D90 - 1) (1 - n.i)^5) (1 + (F_D90 - 1) (1 - n.o)^5),  F_D90 = 1/2 + 2 roughness (i.h)^2
+    D is GTR2 (GGX) of alpha = roughness^2, drawn out by 1 / aspect, aspect^2 = 1 - .9 anisotropic; G is Smith's; F is
+    Schlick's of .08 specular, tinted, or of the base colour where metallic. f_r is a second lobe, GTR1 of width .1 to
+    .001, F0 = .04. Tints are the base colour over the mean of its channels (his are over its luminance).
+
+    The lobes are simply added, as artists wanted them: at grazing views, and where several dials are up, it gives back
+    more than it receives, and rough metal loses what it scatters twice. Reciprocal.
+    """
+
+    base_color: Colour = spectrum(default=0.5, doc="colour of the surface", low=0.0, high=1.0)
+    subsurface: Number = number(default=0.0, doc="from diffuse to flattened, as light under a skin", low=0.0, high=1.0)
+    metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0)
+    specular: Number = number(default=0.5, doc="F0 over .08, of a dielectric", low=0.0, high=1.0)
+    specular_tint: Number = number(default=0.0, doc="how much of the base colour is in F0", low=0.0, high=1.0)
+    roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
+    anisotropic: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0)
+    rotation: Angle = microfacet.rotation_angle()
+    sheen: Number = number(default=0.0, doc="an extra rim, for cloth", low=0.0, high=1.0)
+    sheen_tint: Number = number(default=0.5, doc="how much of the base colour is in the sheen", low=0.0, high=1.0)
+    clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
+    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "the lobes are added, and rough diffuse reflection gains at grazing angles: nothing bounds their sum",
+            2.5,
+            certain=False,
+        ),
+        "linearity": Breach("tints are ratios of the base colour to its mean", 10.0, certain=False),
+    }
+
+    @property
+    def isotropic(self) -> bool:
+        return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
+
+    def white(self) -> Self:
+        """Itself: no values of the added lobes return all light."""
+        return self
+
+    @function
+    def _widths(self) -> Pair:
+        """alpha along x and y."""
+        aspect = sqrt(1.0 - 0.9 * self.anisotropic)
+        alpha = sqr(self.roughness)
+        return vec2(maximum(alpha / aspect, SMALLEST), maximum(alpha * aspect, SMALLEST))
+
+    @function
+    def _coat_width(self) -> Scalar:
+        """.1 to .001."""
+        return 0.1 + self.clearcoat_gloss * (0.001 - 0.1)
+
+    @function
+    def _tint(self) -> Spectrum:
+        """The base colour over its mean, 1 of black."""
+        level = mean(self.base_color)
+        some = level > 0.0
+        return where(some, self.base_color / where(some, level, 1.0), 1.0 + 0.0 * self.base_color)
+
+    @function
+    def _normal_reflectance(self) -> Spectrum:
+        """F0."""
+        tinted = 1.0 + (self._tint() - 1.0) * self.specular_tint
+        dielectric = tinted * (0.08 * self.specular)
+        return dielectric + (self.base_color - dielectric) * self.metallic
+
+    @function
+    def _coat_density(self, h: Direction) -> Scalar:
+        """GTR1: (a^2 - 1) / (pi log(a^2) (sin^2 + a^2 cos^2)), 1/sr."""
+        a2 = sqr(self._coat_width())
+        return (a2 - 1.0) * inv_pi / (log(a2) * (frame.sin2(h) + a2 * sqr(h.z)))
+
+    def _pieces(self, wo: Direction, wi: Direction) -> Pieces:
+        """The four parts for two directions above the surface."""
+        h, cos = facet(wo, wi)
+        at_o, at_i, at_h = _schlick(wo.z), _schlick(wi.z), _schlick(cos)
+        rough = self.roughness * sqr(cos)
+        edge = 0.5 + 2.0 * rough
+        diffuse = _mix(1.0, edge, at_i) * _mix(1.0, edge, at_o)
+        even = _mix(1.0, rough, at_i) * _mix(1.0, rough, at_o)
+        below = 1.25 * (even * (1.0 / (wo.z + wi.z) - 0.5) + 0.5)
+        body = (1.0 - self.metallic) * wi.z
+        alpha, ndf = self._widths(), distribution("ggx")
+        m, o, i = (frame.rotate(w, self.rotation) for w in (h, wo, wi))
+        g = masking.masking_shadowing("smith-separable", ndf, o, i, m, alpha)
+        f0 = self._normal_reflectance()
+        four = 4.0 * wo.z
+        specular = (f0 + (1.0 - f0) * at_h) * (ndf.D(m, alpha) * g / four)
+        satin = vec2(COAT_WIDTH + 0.0 * cos, COAT_WIDTH + 0.0 * cos)
+        coat_g = masking.masking_shadowing("smith-separable", ndf, wo, wi, h, satin)
+        strength = (0.01 + 0.24 * at_h) * self.clearcoat  # a quarter of Fresnel's
+        coat = self._coat_density(h) * coat_g * strength / four
+        tint = 1.0 + (self._tint() - 1.0) * self.sheen_tint
+        return Pieces(
+            self.base_color * (_mix(diffuse, below, self.subsurface) * body * inv_pi),
+            specular,
+            tint * (at_h * self.sheen * body),
+            coat + 0.0 * self.base_color,
+        )
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The sum of its parts, above the surface."""
+        above, o, i = lit(wo, wi)
+        parts = self._pieces(o, i)
+        return where(above, parts.diffuse + parts.specular + parts.sheen + parts.coat, 0.0)
+
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Pieces:
+        """Diffuse, specular, sheen and coat."""
+        above, o, i = lit(wo, wi)
+        parts = self._pieces(o, i)
+        return Pieces(*(where(above, part, 0.0) for part in parts))
+
+    @function
+    def _shares(self, wo: Direction) -> Direction:
+        """Probabilities of the specular lobe, of the coat, and of the cosine, by what each reflects, about."""
+        at_o = _schlick(wo.z)
+        f0 = mean(self._normal_reflectance())
+        specular = _mix(f0, 1.0, at_o)
+        coat = 0.25 * self.clearcoat * (0.04 + 0.96 * at_o)
+        diffuse = (1.0 - self.metallic) * (mean(self.base_color) + 0.2 * self.sheen)
+        total = specular + coat + diffuse + 0.05
+        return vec3(specular / total, coat / total, (diffuse + 0.05) / total)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The mixture of visible normals, the coat's normals and the cosine."""
+        above, o, i = lit(wo, wi)
+        shares = self._shares(o)
+        h, cos = facet(o, i)
+        ndf = distribution("ggx")
+        visible = ndf.visible_per_cosine(frame.rotate(o, self.rotation), frame.rotate(h, self.rotation), self._widths())
+        coat = self._coat_density(h) * h.z / cos
+        return where(above, 0.25 * (shares.x * visible + shares.y * coat) + shares.z * i.z * inv_pi, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 picks the lobe."""
+        o = where(wo.z > 0.0, wo, frame.upright(wo))
+        shares = self._shares(o)
+        turned = frame.rotate(o, self.rotation)
+        m = distribution("ggx").sample_visible(turned, u.y, u.z, self._widths())
+        specular = frame.rotate_back(frame.reflect(turned, m), self.rotation)
+        # GTR1: cos^2 = (1 - a^(2 - 2 u)) / (1 - a^2)
+        a2 = sqr(self._coat_width())
+        sin2 = clamp((ops.exp(log(a2) * (1.0 - u.y)) - a2) / (1.0 - a2), 0.0, 1.0)
+        sin, (s, c) = sqrt(sin2), ops.sincos((2.0 * ops.pi) * u.z)
+        coat = frame.reflect(o, vec3(sin * c, sin * s, sqrt(1.0 - sin2)))
+        on_coat = u.x < shares.x + shares.y
+        wi = where(u.x < shares.x, specular, where(on_coat, coat, square_to_cosine_hemisphere(u.y, u.z)))
+        pdf = self.pdf(wo, wi)
+        weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The base colour and F0."""
+        return self.base_color * (1.0 - self.metallic) + self._normal_reflectance()
+
+
+@function
+def _schlick(cos: Scalar) -> Scalar:
+    """(1 - cos)^5."""
+    x = clamp(1.0 - cos, 0.0, 1.0)
+    x2 = sqr(x)
+    return sqr(x2) * x
+
+
+@function
+def _mix(a: Scalar | float, b: Scalar | float, share: Scalar) -> Scalar:
+    """a at share 0, b at share 1."""
+    return a + (b - a) * share

@@ -1,0 +1,233 @@
+"""Disney's principled BSDF of 2015, on the slabs of OpenPBR."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ... import ops
+from ...material import BSDF, Breach, Colour, Number, Sample, binding, flag, method, number, spectrum
+from ...material.bsdf import Delta, Interior
+from ...material.parameters import Angle
+from ...ops import Direction, Mode, Node, Scalar, Spectrum, backend, clamp, max_component, sqrt, where
+from ...optics import frame
+from ...optics.roughness import SMOOTH
+from ..microfacet.microfacet import rotation_angle
+from .openpbr import Between, OpenPBR
+
+COAT_INDEX = 1.5  # of the clearcoat
+SATIN, GLOSS = 0.1, 0.001  # its widths at gloss 0 and 1
+STRENGTH = 0.25  # of a coat of 1
+STRETCH = 0.9  # by how much an anisotropic of 1 stretches
+
+
+class _Slabs(OpenPBR):
+    """OpenPBR whose coat lies on its base without changing its index or its width: the base is seen as it is."""
+
+    name: ClassVar[str] = ""
+
+    if TYPE_CHECKING:  # OpenPBR's, which mypy forgets to be declared parameters
+        specular_roughness: Number = number(0.3)
+        specular_ior: Number = number(1.5)
+
+    # What there is of the slabs is known from the dials (`DisneyBSDF._kind`), whether those are recorded or not.
+    def _has(self, name: str) -> bool:
+        return bool(getattr(self.plain, name) != 0.0)
+
+    def _has_holes(self) -> bool:
+        return False
+
+    def _may_be_smooth(self, name: str) -> bool:
+        return bool(getattr(self.plain, name) ** 2 < SMOOTH)
+
+    def _roughened(self) -> Scalar:
+        return self.specular_roughness
+
+    def _indices(self) -> tuple[Scalar, Scalar, Scalar]:
+        eta = ops.maximum(self.specular_ior, 1.001)
+        return eta, eta, 1.0 + 0.0 * eta
+
+
+class DisneyBSDF(BSDF):
+    """Disney's principled BSDF of 2015, on slabs that keep energy: glass, metal and thin walls by one set of dials.
+
+    The dials are those of Burley2015: `disney` of 2012 with the index in place of `specular`, `spec_trans` for glass
+    and, of a `thin` sheet, `diff_trans` and `flatness`. Metal, dielectric and glass are his lobes: GGX of alpha =
+    roughness^2, drawn out by sqrt(1 - .9 anisotropic), F by the index, of metal Schlick's of the base colour, glass
+    tinted by the root of the base colour at each crossing. What he adds up is layered here, so that nothing is gained,
+    and light that facets scatter twice comes back: the slabs are `openpbr`'s, and so are their laws.
+
+    Not as he has it: the diffuse lobe is `eon` of that roughness under the dielectric (his has a rim of its own, which
+    `flatness` takes off; here it makes `eon` a Lambert), sheen is the `sheen` of fibres, the coat GGX of his GTR1's
+    width, masking has correlated heights, tints are the base colour over its largest channel, and a thin sheet's
+    transmission is as rough as its reflection. docs/openpbr.md has the sizes.
+    """
+
+    name: ClassVar[str] = "disney2015"
+    reads_wavelengths: ClassVar[bool] = True
+
+    base_color: Colour = spectrum(default=0.5, doc="colour of the surface", low=0.0, high=1.0)
+    metallic: Number = number(default=0.0, doc="0 is a dielectric, 1 a metal", low=0.0, high=1.0, off=0.0)
+    roughness: Number = number(default=0.5, doc="root of alpha", low=0.0, high=1.0)
+    anisotropic: Number = number(default=0.0, doc="0 is round, 1 drawn out along x", low=0.0, high=1.0, off=0.0)
+    rotation: Angle = rotation_angle()
+    eta: Number = number(default=1.5, doc="index inside over index outside", low=1.0, high=3.0)
+    specular_tint: Number = number(
+        default=0.0, doc="how much of the base colour is in what a dielectric reflects", low=0.0, high=1.0
+    )
+    spec_trans: Number = number(default=0.0, doc="share of the dielectric that is glass", low=0.0, high=1.0, off=0.0)
+    sheen: Number = number(default=0.0, doc="fibres on a dielectric", low=0.0, high=1.0, off=0.0)
+    sheen_tint: Number = number(default=0.5, doc="how much of the base colour is in the sheen", low=0.0, high=1.0)
+    clearcoat: Number = number(default=0.0, doc="strength of the coat", low=0.0, high=1.0, off=0.0)
+    clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
+    diff_trans: Number = number(
+        default=0.0, doc="of a thin sheet: 0 is opaque, 1 even on both sides, 2 sends all light on", low=0.0, high=2.0
+    )
+    flatness: Number = number(default=0.0, doc="1 takes the roughness from the diffuse lobe", low=0.0, high=1.0)
+    thin: bool = flag(default=False, doc="whether it is a sheet without an inside")
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "reciprocity": Breach(
+            "the sheen's table of lobes is one of the viewer's direction alone",
+            lambda model: 4.0 if _some(model.sheen) else 0.0,
+            certain=False,
+        ),
+        "energy": Breach(
+            OpenPBR.breaks["energy"].reason,
+            lambda model: 0.15 if _some(model.anisotropic) else 0.01,
+            certain=False,
+        ),
+        "linearity": Breach("tints are ratios of the base colour, and glass takes its root", 10.0, certain=False),
+    }
+
+    # ------------------------------------------------------------------ as slabs
+
+    def _kind(self) -> _Slabs:
+        """Which parts of the slabs' code there are."""
+        plain = self.plain
+
+        def at(name: str, on: float = 0.5) -> float:
+            return on if isinstance(getattr(self, name), Node) or _some(getattr(plain, name)) else 0.0
+
+        def rough(name: str) -> float:
+            value = getattr(plain, name)
+            open_ = isinstance(getattr(self, name), Node) or backend.is_drjit(value)
+            return 0.0 if open_ else float(np.min(np.asarray(value, float)))
+
+        return _Slabs(
+            base_diffuse_roughness=0.5,  # roughness is no weight: what is recorded of 0 holds for others too
+            base_metalness=at("metallic"),
+            specular_roughness=rough("roughness"),
+            specular_roughness_anisotropy=0.5 if _some(plain.anisotropic) else 0.0,
+            transmission_weight=at("spec_trans"),
+            subsurface_weight=1.0 if self.thin else 0.0,
+            subsurface_radius=0.0,
+            coat_weight=at("clearcoat"),
+            coat_roughness=0.1,
+            fuzz_weight=at("sheen"),
+            geometry_thin_walled=self.thin,
+        )
+
+    def _slabs(self) -> _Slabs:
+        """The slabs that these dials stand for."""
+        kind, colour = self._kind(), self.base_color
+        one, white = 1.0 + 0.0 * self.roughness, 1.0 + 0.0 * colour
+        most = max_component(colour)
+        tint = where(most > 0.0, colour / where(most > 0.0, most, 1.0), white)
+        # alpha r^2 / a and r^2 a, a^2 = 1 - .9 anisotropic: the same ratio, and the roughness whose squares add up so
+        low = 1.0 - STRETCH * self.anisotropic
+        wide = sqrt(sqrt(0.5 * (low + 1.0 / low)))
+        rest = {
+            name: (white if parameter.kind == "spectrum" else one) * getattr(kind, name)
+            for name, parameter in kind.parameters().items()
+            if parameter.numeric and not parameter.inside
+        }
+        values = {
+            **rest,
+            "base_color": colour,
+            "base_metalness": self.metallic,
+            "base_diffuse_roughness": self.roughness * (1.0 - self.flatness),
+            "specular_color": 1.0 + (tint - 1.0) * (self.specular_tint * (1.0 - self.metallic)),
+            "specular_roughness": clamp(self.roughness * wide, 0.0, 1.0),
+            "specular_roughness_anisotropy": STRETCH * self.anisotropic,
+            "specular_ior": self.eta,
+            "transmission_weight": self.spec_trans,
+            "transmission_color": colour if self.thin else ops.safe_sqrt(colour),
+            "subsurface_weight": one if self.thin else 0.0 * one,
+            "subsurface_color": colour,
+            "subsurface_scatter_anisotropy": self.diff_trans - 1.0,
+            "coat_weight": STRENGTH * self.clearcoat,
+            "coat_roughness": sqrt(SATIN + (GLOSS - SATIN) * self.clearcoat_gloss),
+            "coat_ior": COAT_INDEX * one,
+            "coat_darkening": 0.0 * one,
+            "fuzz_weight": self.sheen * (1.0 - self.metallic),
+            "fuzz_color": 1.0 + (tint - 1.0) * self.sheen_tint,
+        }
+        copy = binding.bound_copy(kind, values, self._derived)
+        if self.wavelengths is not None:
+            vars(copy)["wavelengths"] = self.wavelengths
+        return copy
+
+    def derive(self) -> Between:
+        """What the slabs derive."""
+        return self._slabs().derive()
+
+    def prepare(self) -> None:
+        """Find the tables, before a loop is recorded."""
+        self._kind().prepare()
+
+    def _turned(self, w: Direction) -> Direction:
+        return frame.rotate(w, self.rotation)
+
+    # ------------------------------------------------------------------ values
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """That of the slabs, along the axes of the anisotropy."""
+        return self._slabs().eval(self._turned(wo), self._turned(wi), mode)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """That of the slabs."""
+        return self._slabs().pdf(self._turned(wo), self._turned(wi))
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """That of the slabs."""
+        drawn = self._slabs().sample(self._turned(wo), u, mode)
+        return drawn._replace(wi=frame.rotate_back(drawn.wi, self.rotation))
+
+    # ------------------------------------------------------------------ facts
+
+    @property
+    def transmits(self) -> bool:
+        return self.thin or bool(self._kind()._refracts)
+
+    @property
+    def delta(self) -> Delta:
+        return self._kind().delta
+
+    @property
+    def isotropic(self) -> bool:
+        if isinstance(self.anisotropic, Node):
+            return False
+        return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
+
+    @property
+    def interior(self) -> Interior | None:
+        if self.thin or not self._kind()._refracts:
+            return None
+        if not self.is_bound:
+            return self.bind(backend.types("float64")).interior
+        return Interior(self._slabs()._indices()[1], 0.0 * self.base_color, 0.0 * self.eta)
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """The slabs' colours."""
+        return self._slabs().tint(wo)
+
+
+def _some(value: object) -> bool:
+    """Whether a dial may be other than 0."""
+    return backend.is_drjit(value) or bool(np.any(np.asarray(value, float) != 0.0))

@@ -1,0 +1,396 @@
+"""Light between a coat and the material under it: what the base sends back through the coat, bounce after bounce.
+
+Light that the base scatters along w leaves the coat by the share T(w) t(w), and comes down again by k(w) = (1 - T(w))
+t(w)^2, mirrored: T is the interface's transmittance from inside, t what is left of the light after one crossing. With B
+the base, all that leaves is the series B + B k B + B k B k B + ...
+
+Its sum is found on 33 directions, averaged over azimuth: rows of a matrix P are drawn by the `sample` of the base's
+white twin (`BSDF.white`), k stands inside the sum, and X = (1 - P)^-1 E1 solves the series, E1 being what leaves after
+the first bounce. A smooth interface sends light in along one direction; of a rough one, glass whose lost light Kulla
+and Conty give back, samples say where light goes in and how much comes out.
+
+A base's own Fresnel reflectance is known for its channels, by what each makes of the white twin's draws when every
+share of light is 1; of any other colour it is taken between theirs, and black's and white's. So the series holds for
+every channel of a metal, with the rise of its reflectance where light grazes, and for any colour over which the rest
+of the base varies.
+
+What leaves, B(o), is then shared between two terms whose sum is exactly that:
+
+    lobe         the base's own, refracted, times a factor: as much of it as fits under B at every o. Over Lambert that
+                 is all there is (Saunderson1942), and nearly all of a narrow lobe under a smooth coat
+    rest(o)      what is left, as a separable lobe rest(o) rest(i) / norm, reciprocal like Kulla-Conty's
+
+Both are tables over the colour a and over u, what one crossing straight down leaves.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import OrderedDict
+from typing import NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import ops
+from ...energy.albedo.directional import albedo
+from ...errors import InputError
+from ...material import BSDF, guide_search, tree
+from ...material.parameters import pair_of
+from ...ops import Direction, Spectrum, Table, backend
+from ...ops.backend import Array
+from ...optics.roughness import SMOOTH
+from ..compensated.kulla_conty import KullaConty
+from ..microfacet.dielectric import Dielectric
+
+Floats: TypeAlias = "NDArray[np.floating]"
+
+HALF = 16  # steps of the directions that leave, and of those that cannot
+POINTS = 1 << 13  # directions drawn at each node
+NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R bends like it at grazing angles
+ROUGH = 33  # of those at which a rough interface is drawn from
+COLOURS, LEFT = 13, 13  # steps of the colour and of what one crossing leaves, see `colour_place` and `left_place`
+LEAST_LEFT = 0.03  # of the light after a crossing, the first step of that
+KEPT = 32  # accounts in memory
+LEAST = 1e-9
+
+
+class Account(NamedTuple):
+    """What a coat must know of its inside, as tables.
+
+    coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's samples that a
+           cosine should replace, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
+    rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None where there is none
+    again  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
+    """
+
+    coat: Table
+    rest: Table | None
+    again: Table
+
+
+def colour_place(a: Array) -> Array:
+    """Where a colour stands on the tables' axis: in a / (2 - a) a series 1 / (1 - a k) is nearly straight, of k = 1 / 2
+    exactly."""
+    return a / (2.0 - a)
+
+
+def left_place(u: Array) -> Array:
+    """Where what one crossing leaves stands: closer near 1, where light that bounces often fades at once. 1 is the last
+    node but one, so that a clear coat has a derivative by its absorption."""
+    return u / (3.0 - 2.0 * u) * ((LEFT - 2.0) / (LEFT - 1.0))
+
+
+class Coated(Protocol):
+    """What is asked of a coat here: plain values."""
+
+    base: BSDF
+    index: object
+    alpha: object
+    ndf: str
+    masking: str
+
+
+_kept: OrderedDict[object, Account] = OrderedDict()
+
+
+def account_of(coat: BSDF) -> Account:
+    """The account of a coat as it was made, found once and kept; InputError while Dr.Jit records a loop."""
+    own = vars(coat).get("_account")
+    if own is None:
+        key = _bright(guide_search.plain_values(coat))
+        if key not in _kept:
+            if backend.drjit().flag(backend.drjit().JitFlag.SymbolicScope):
+                what = f"what lies under {type(coat).__name__} cannot be found inside a loop"
+                raise InputError(what, "eval", "call its `eval` once before the loop")
+            _kept[key] = find(key)  # type: ignore[arg-type]
+            while len(_kept) > KEPT:
+                _kept.popitem(last=False)
+        vars(coat)["_account"] = own = _kept[key]
+    found: Account = own
+    return found
+
+
+def _bright(coat: BSDF) -> BSDF:
+    """The coat without what changes no table: its own colour, and every share of light in the base, which is 1."""
+    values: dict[str, object] = {"absorption": 0.0, "depth": 1.0, "bounces": "coloured"}
+    for leaf in tree.leaves(coat):
+        if leaf.parameter.numeric and leaf.parameter.white is not None and leaf.value is not None:
+            values[leaf.path] = leaf.parameter.white
+    return tree.replace(coat, values)
+
+
+def colour_of(base: BSDF, up: Direction) -> Spectrum:
+    """a: the tint of a bound base seen straight down, over that of its white twin; of a base that is its own white twin
+    over its brightest channel."""
+    tint = base.tint(up)
+    white = base.white()
+    if white is base:
+        return ops.safe_div(tint, functools.reduce(ops.maximum, ops.channels(tint)))
+    return ops.safe_div(tint, white.tint(up))
+
+
+def _colours(base: BSDF) -> Floats:
+    """The same as three numbers."""
+    kind = backend.types("float64")
+    up = ops.vec3(kind.float(0.0), kind.float(0.0), kind.float(1.0))
+    return backend.to_numpy(kind.vec3(1.0) * colour_of(base.bind(kind), up), 1)[0]
+
+
+def find(coat: Coated) -> Account:
+    """The account of a coat whose shares of light are 1, one value each."""
+    index = float(coat.index)  # type: ignore[arg-type]
+    outside = np.linspace(0.0, 1.0, NODES) ** 2
+    face = _interface(coat, index)
+    if coat.base.delta == "always":
+        columns = [face.reflected(outside), 0.0 * outside, 1.0 - face.reflected(outside), face.beyond(outside)]
+        once = Table("coat_again", np.array([1.0, 0.0]).reshape(1, 1, 2))
+        return Account(Table("coat", np.stack(columns, -1)), None, once)
+    seen = _drawn(coat.base, index)
+    totally = (seen.weight * (seen.position <= 0.0)).sum(1) / np.maximum(seen.weight.sum(1), LEAST)
+    t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
+    colours = np.maximum(2.0 * t / (1.0 + t), 1e-4)
+    sums = [_series(seen, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), LEAST_LEFT)]
+    rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
+    # what is sampled by a cosine: what the base's own samples lose totally, and the rest
+    share = np.maximum(1.7 * np.interp(np.sqrt(outside), seen.place, totally), 0.7 * sums[-1].share)
+    columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
+    return Account(
+        Table("coat", np.stack(columns, -1)),
+        Table("coat_rest", rest[..., None]) if rest.any() else None,
+        Table("coat_again", np.stack([over_factor, norm], -1)),
+    )
+
+
+class _Curve(Protocol):
+    def __call__(self, cosine: Floats, /) -> Floats: ...
+
+
+class _Interface(NamedTuple):
+    """The coat's surface.
+
+    reflected  R seen from outside, by the cosine outside
+    out        T from inside, by the place (`_places`)
+    beyond     square root, normalized, of what R is beyond the facets' first reflection
+    entering   None of a smooth one; else, for `ROUGH` places outside, weights, cosines and places of draws inside
+    returning  likewise for the places inside: where it sends back what does not leave
+    """
+
+    reflected: _Curve
+    out: _Curve
+    beyond: _Curve
+    entering: tuple[Floats, Floats, Floats] | None
+    returning: tuple[Floats, Floats, Floats] | None
+
+    def lobe(self, x: Floats) -> Floats:
+        """The crossing that the base's lobe makes at each end: a narrow one makes T(o) going in and T(i) coming out."""
+        found: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, LEAST))))
+        return found
+
+
+def _interface(coat: Coated, index: float) -> _Interface:
+    glass = Dielectric(index, coat.alpha, ndf=coat.ndf, masking=coat.masking)  # type: ignore[arg-type]
+    x_width, y_width = (float(width) for width in pair_of(coat.alpha))
+    if max(x_width, y_width) < SMOOTH or index < 1.0 + 1e-5:
+
+        def fresnel(cos: Floats) -> Floats:
+            cos = np.maximum(cos, LEAST)
+            cos_t = np.sqrt(1.0 - (1.0 - cos**2) / index**2)
+            r_s = (cos - index * cos_t) / (cos + index * cos_t)
+            r_p = (index * cos - cos_t) / (index * cos + cos_t)
+            found: Floats = 0.5 * (r_s**2 + r_p**2)
+            return found
+
+        return _Interface(
+            fresnel, lambda p: np.where(p > 0.0, 1.0 - fresnel(p * p), 0.0), lambda x: 0.0 * x, None, None
+        )
+    surface = KullaConty(glass)
+    root = np.linspace(0.0, 1.0, ROUGH)
+    lattice = _lattice(POINTS)
+    wo, u = _directions(np.maximum(root**2, 1e-4), lattice), np.tile(lattice[:, :3], (ROUGH, 1))
+    up = surface.sample(wo, u, "importance", "float64")
+    weight = np.where(up.pdf > 0.0, up.weight.mean(1), 0.0).reshape(ROUGH, POINTS)
+    weight /= weight.sum(1, keepdims=True)
+    cosine = up.wi[:, 2].reshape(ROUGH, POINTS)
+    R = (weight * (cosine > 0.0)).sum(1)
+    goes_in = np.where(cosine < 0.0, weight, 0.0)
+    inside = np.clip(-cosine, 1e-4, 1.0)
+    place, mu = _places(index)
+    down = surface.sample(-_directions(mu, lattice), np.tile(lattice[:, :3], (len(mu), 1)), "importance", "float64")
+    weight = np.where(down.pdf > 0.0, down.weight.mean(1), 0.0).reshape(len(mu), POINTS)
+    weight /= weight.sum(1, keepdims=True)
+    cosine = down.wi[:, 2].reshape(len(mu), POINTS)
+    leaves = (weight * (cosine > 0.0)).sum(1)
+    stays, again = np.where(cosine < 0.0, weight, 0.0), np.clip(-cosine, 1e-4, 1.0)
+    # R is that of one reflection, by quadrature, and what is beyond it
+    single = tree.replace(glass, {"transmission": False})
+    angles = (0.0,) if x_width == y_width else (0.0, 0.25 * np.pi, 0.5 * np.pi)
+    fine = np.linspace(0.0, 1.0, NODES)
+    once = np.mean([albedo(single, mu=np.maximum(fine**2, 1e-4), phi=phi).value[:, 0] for phi in angles], axis=0)
+    more = np.maximum(np.interp(fine, root, R) - once, 0.0)
+    total = 2.0 * np.pi * np.trapezoid(more * 2.0 * fine**3, fine)
+    scale = 1.0 / np.sqrt(total) if total > 1e-7 else 0.0
+    return _Interface(
+        lambda cos: np.interp(np.sqrt(cos), fine, once + more * (scale > 0.0)),
+        lambda p: np.interp(p, place, leaves),
+        lambda cos: np.interp(np.sqrt(cos), fine, more * scale),
+        (goes_in, inside, _place_of(inside, index)),
+        (stays, again, _place_of(again, index)),
+    )
+
+
+def _lattice(count: int) -> Floats:
+    """R4, powers of x^5 = x + 1."""
+    return np.arange(1, count + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5.0) % 1.0
+
+
+def _directions(mu: Floats, lattice: Floats) -> Floats:
+    """Directions of each cosine at the lattice's azimuths, (len(mu) * len(lattice), 3)."""
+    phi, sin = np.tile(2.0 * np.pi * lattice[:, 3], len(mu)), np.repeat(np.sqrt(1.0 - mu**2), len(lattice))
+    return np.stack([sin * np.cos(phi), sin * np.sin(phi), np.repeat(mu, len(lattice))], -1)
+
+
+def _places(index: float) -> tuple[Floats, Floats]:
+    """(places, cosines inside) of the nodes: 0 to 1 the root of the cosine outside where light leaves, as what leaves
+    changes fast where it grazes; -1 to 0 where it cannot."""
+    place = np.linspace(-1.0, 1.0, 2 * HALF + 1)
+    critical = np.sqrt(max(1.0 - index**-2, 0.0))
+    mu = np.where(place >= 0.0, np.sqrt(1.0 - (1.0 - place**4) / index**2), critical * (1.0 - place**2))
+    return place, np.clip(mu, 1e-4, 1.0)
+
+
+def _place_of(cosine: Floats, index: float) -> Floats:
+    """The place of directions inside, by their cosines."""
+    outside2 = 1.0 - index**2 * (1.0 - cosine**2)
+    critical = np.sqrt(max(1.0 - index**-2, 0.0))
+    beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, LEAST), 0.0))
+    found: Floats = np.clip(np.where(outside2 > 0.0, np.maximum(outside2, 0.0) ** 0.25, beyond), -1.0, 1.0)
+    return found
+
+
+class _Seen(NamedTuple):
+    """What the white base does with light inside.
+
+    place, mu           of the nodes
+    weight              of each draw at each node (nodes, POINTS)
+    cosine, position    of the directions drawn, and their places
+    colours, share      of black, the base's channels and white, rising; by what each multiplies a draw of the others
+    """
+
+    place: Floats
+    mu: Floats
+    weight: Floats
+    cosine: Floats
+    position: Floats
+    colours: Floats
+    share: Floats
+
+
+def _drawn(base: BSDF, index: float) -> _Seen:
+    """Draws of the white base's own sampling from the nodes, over all azimuths. Of a base that is its own white twin
+    the brightest channel is met."""
+    white = base.white()
+    place, mu = _places(index)
+    lattice = _lattice(POINTS)
+    wo = _directions(mu, lattice)
+    drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
+    channels = drawn.weight
+    colours, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
+    tints = _colours(base)
+    if white is base:
+        channels = channels[:, np.argmax(tints)][:, None]
+    else:
+        own, full = (np.asarray(one.eval(wo, drawn.wi, precision="float64"), float) for one in (base, white))
+        known, first = np.unique(np.round(tints, 3), return_index=True)
+        known, first = known[known < 1.0], first[known < 1.0]
+        ratio = np.where(full > 0.0, own / np.where(full > 0.0, full, 1.0), tints)[:, first].T
+        colours = np.concatenate([[0.0], known, [1.0]])
+        share = np.concatenate([share[:1], np.clip(ratio, 0.0, 1.0), share[1:]])
+    weight = np.where(drawn.pdf > 0.0, channels.mean(1), 0.0).reshape(len(mu), POINTS) / POINTS
+    weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # a base that gains light would do so without end
+    cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
+    share = share.reshape(-1, len(mu), POINTS)
+    return _Seen(place, mu, weight, cosine, _place_of(cosine, index), colours, share)
+
+
+class _Sum(NamedTuple):
+    """The series at one u, for each colour: see `Account`; and the share of the rest in what leaves a white base."""
+
+    rest: Floats
+    over_factor: Floats
+    norm: Floats
+    share: Floats
+
+
+def _series(seen: _Seen, colours: Floats, u: float, face: _Interface, index: float) -> _Sum:
+    """The series, summed and shared out."""
+    n = len(seen.place)
+    out, t = face.out(seen.position), u ** (1.0 / seen.cosine)
+    out = np.where((seen.position <= 0.0) & (face.entering is None), 0.0, out)
+    x = np.linspace(0.0, 1.0, NODES) ** 2
+    root = np.sqrt(x)
+    through = u ** (1.0 / np.interp(root, seen.place, seen.mu))
+    crossing = np.where(seen.position > 0.0, face.lobe(np.maximum(seen.position, 0.0) ** 2), 0.0)
+    back = None
+    if face.returning is not None:
+        weight, cosine, place = face.returning
+        back = _onto(weight * u ** (1.0 / cosine), place, n)
+    kinds = []
+    for share in seen.share[1:]:  # of black nothing comes
+        weight = seen.weight * share
+        # a smooth interface sends light back as a mirror does
+        P = (
+            _onto(weight * (1.0 - out) * t**2, seen.position, n)
+            if back is None
+            else _onto(weight * t, seen.position, n) @ back
+        )
+        lobe = face.lobe(x) * through * np.interp(root, seen.place, (weight * crossing * t).sum(1))
+        kinds.append((P, (weight * out * t).sum(1), lobe))
+    if face.entering is None:
+        enters = _at_nodes(root, seen.place) * ((1.0 - face.reflected(x)) * through)[:, None]
+    else:
+        weight, cosine, place = face.entering
+        rows = _onto(weight * u ** (1.0 / cosine), place, n)
+        enters = _at_nodes(root, np.linspace(0.0, 1.0, ROUGH)) @ rows
+    area = np.gradient(root) * 2.0 * root**3  # x dx
+    judged = x > 1e-3  # at the horizon both vanish
+    rests, factors, norms, share = [], [], [], 0.0 * x
+    for a in colours:
+        mixed = [float(np.interp(a, seen.colours, one)) for one in np.eye(len(seen.colours))[1:]]
+        P, first, lobe = (
+            sum(m * one for m, one in zip(mixed, parts, strict=True)) for parts in zip(*kinds, strict=True)
+        )
+        # a perfect mirror keeps forever what it reflects totally, though nothing gets there
+        leaves = enters @ np.linalg.solve(np.eye(n) - P * (1.0 - LEAST), first)
+        some = judged & (lobe > 1e-6 * a)
+        factor = float(np.min((leaves / np.maximum(lobe, LEAST * a))[some], initial=1e3))
+        rest = np.maximum(leaves - factor * lobe, 0.0)
+        share = rest / np.maximum(leaves, LEAST)
+        rest = rest / (a * u * u)
+        norm = 2.0 * np.pi * float(area @ rest)
+        some_rest = norm > 1e-7  # less is roundings
+        rests.append(rest * some_rest)
+        factors.append(1.0 / factor)
+        norms.append(norm * some_rest)
+    return _Sum(np.stack(rests, -1), np.array(factors), np.array(norms), share)
+
+
+def _continued(values: list[Floats]) -> Floats:
+    """Values at each u, last, and one more, in a straight line."""
+    return np.stack([*values, 2.0 * values[-1] - values[-2]], -1)
+
+
+def _onto(weight: Floats, position: Floats, n: int) -> Floats:
+    """Draws of each row shared out among the nodes on both sides of their places -1 to 1, (rows, n)."""
+    scaled = (position + 1.0) * (0.5 * (n - 1))
+    cell = np.minimum(scaled, n - 1 - LEAST).astype(int)
+    part, row = scaled - cell, np.arange(len(weight))[:, None] * n
+    size = n * len(weight)
+    found = np.bincount((row + cell).ravel(), (weight * (1.0 - part)).ravel(), size)
+    found += np.bincount((row + cell + 1).ravel(), (weight * part).ravel(), size)
+    return np.asarray(found, float).reshape(len(weight), n)
+
+
+def _at_nodes(x: Floats, nodes: Floats) -> Floats:
+    """The matrix that interpolates linearly between values at nodes."""
+    return np.stack([np.interp(x, nodes, one) for one in np.eye(len(nodes))], -1)

@@ -1,0 +1,1 @@
+"""The material that a table of measured values is."""

@@ -1,0 +1,92 @@
+"""A measured material: a table as a BSDF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ... import ops
+from ...material import BSDF, Breach, Sample, file, method, never
+from ...measure import SAMPLE, names_table, read
+from ...measure.tables.base import Measurement, above
+from ...ops import Direction, Mode, Scalar, Spectrum, where
+
+
+class Measured(BSDF):
+    """A table of measured values, interpolated in its own coordinates (course notes, part B).
+
+    Files: MERL's .binary, the RGL's .bsdf, Cornell's .brdf, ASTM E1392 (.astm), Zemax (.zbsdf), networks (.npz, as
+    FILE.npz:NAME) and Gonio's .gonio; docs/measured.md has what is known of each. What the data are is shown: negative
+    values stay negative, an albedo over 1 stays over 1, and a table that is not reciprocal is not made so. Reflection
+    only, black from below. A table is sampled by its own densities (RGL), or by a density found from its values.
+    """
+
+    file: str = file(
+        default=SAMPLE,
+        doc="file of measured values; behind a colon which one, of files that hold several; `sample` comes with Gonio",
+    )
+    only_rgb: ClassVar[bool] = True
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "energy": Breach(
+            "the measured albedo is over 1, and shown as it is",
+            lambda model: max(1.05 * float(model.table.albedos().max()) - 1.0, 0.0),
+            certain=False,
+        ),
+        "reciprocity": Breach(
+            "measured values are shown as they are", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
+        ),
+        "positivity": Breach(
+            "values below 0 were measured, and are shown; as a share of the largest",
+            lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
+            certain=False,
+        ),
+        "isotropy": Breach(
+            "the table is not its own mirror image, or its place is found by sums that lose digits where a lobe ends",
+            lambda model: 0.0 if model.table.mirrored else 2.0,
+            certain=False,
+        ),
+        "precision": Breach(
+            "the place in a table is found by sums that lose digits where a lobe ends",
+            lambda model: 0.1 if model.table.sums else 0.0,
+            certain=False,
+        ),
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        table = read(self.file)
+        table.prepare()
+        vars(self)["_table"] = table
+
+    @classmethod
+    def reads(cls, text: str) -> bool:
+        return names_table(text)
+
+    @property
+    def table(self) -> Measurement:
+        """The table behind it."""
+        table: Measurement = vars(self)["_table"]
+        return table
+
+    @property
+    def isotropic(self) -> bool:
+        return self.table.isotropic
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """f cos theta_i, read from the table."""
+        return where(above(wo, wi), self.table.value(wo, wi), 0.0)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """The table's density, or that of the guide that was found for it."""
+        return where(above(wo, wi), self.table.pdf(wo, wi), 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """A direction from that density."""
+        wi, pdf = self.table.draw(wo, u)
+        pdf = where(above(wo, wi), pdf, 0.0)
+        value = self.table.value(wo, wi)
+        weight = where(pdf > 0.0, value * ops.safe_div(1.0, pdf), 0.0)
+        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)

@@ -1,0 +1,293 @@
+"""Torrance-Sparrow dielectric with transmission."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.bsdf import Delta, InnerAlbedo, Interior, Preset
+from ...material.calling import method
+from ...material.parameters import Angle, Colour, Index, Number, Width, flag, index, number, spectrum
+from ...material.polarization import Polarized
+from ...material.sample import Sample
+from ...ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
+from ...ops.types import Direction, Mask, Mode, Pair, Scalar, Spectrum
+from ...optics import frame, fresnel, indices, masking
+from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass, refracted
+from ...optics.ndf import distribution
+from ...optics.roughness import widths
+from . import microfacet
+from .microfacet import Terms
+
+
+class _Facet(NamedTuple):
+    """What joins a pair of directions.
+
+    wo, wi        the pair, in the frame of the widths
+    m             normal of the facet, m.z >= 0
+    dot_o, dot_i  o.m and i.m
+    reflects      whether wi lies on wo's side
+    lit           whether a rough lobe joins them
+    alpha         widths
+    spread        |o.m| dm/dwi (Walter2007, eq. 14), in refraction (eq. 17) over eta^2
+    """
+
+    wo: Direction
+    wi: Direction
+    m: Direction
+    dot_o: Scalar
+    dot_i: Scalar
+    reflects: Mask
+    lit: Mask
+    alpha: Pair
+    spread: Scalar
+
+
+class Dielectric(microfacet._Microfacet):
+    """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
+
+    With eta = eta_i / eta_o (indices on the wi and wo sides) and the facet's normal m along +-(wo + eta wi):
+    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form that carries radiance: it holds the
+    factor 1 / eta^2 by which radiance shrinks; mode "importance" leaves it out. alpha below 1e-4 is smooth glass, and
+    eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
+
+    What light loses on its way through (`absorption`, by Beer and Lambert exp(-absorption length)) and which of several
+    media that overlap is there (`priority`, Schmidt2002) are matters of paths: Gonio's integrators apply them, no value
+    of the surface depends on them.
+    """
+
+    eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
+    alpha: Width = microfacet.alpha_width()
+    rotation: Angle = microfacet.rotation_angle()
+    ndf: str = microfacet.ndf_choice()
+    masking: str = microfacet.masking_choice()
+    fresnel: str = microfacet.fresnel_choice()
+    albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
+    transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
+    sampling: str = microfacet.sampling_choice()
+    absorption: Colour = spectrum(
+        default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length", inside=True
+    )
+    priority: Number = number(
+        default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6, inside=True
+    )
+
+    preset_kind: ClassVar[str] = "medium"
+
+    @classmethod
+    def presets(cls) -> Mapping[str, Preset]:
+        """Transparent media by name: eta."""
+        media = indices.MEDIA.items()
+        return {name: Preset(m.title, {"eta": indices.DispersiveIndex(m)}, m.source) for name, m in media}
+
+    @function
+    def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
+        """F by name at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
+
+    @function
+    def _relative_eta(self, wo: Direction) -> Scalar:
+        """Index on the far side over index on wo's side."""
+        return where(wo.z >= 0.0, self.eta, 1.0 / self.eta)
+
+    @function
+    def _normal(self, wo: Direction, wi: Direction, eta: Scalar) -> Direction:
+        """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
+        ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
+        h = fma(wi, ratio, wo)
+        h = h * rsqrt(maximum(dot(h, h), frame.TINY))
+        return where(h.z < 0.0, -h, h)
+
+    def _facet(self, wo: Direction, wi: Direction, eta: Scalar) -> _Facet:
+        """The facet that joins a pair of directions, along the axes of the anisotropy; turned last, see `Conductor`."""
+        m = self._normal(wo, wi, eta)
+        wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
+        alpha, smooth = self._widths()
+        dot_o, dot_i = dot(wo, m), dot(wi, m)
+        reflects = wo.z * wi.z > 0.0
+        spread = 0.25 + 0.0 * dot_o
+        if self.transmission:
+            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which keeps its digits where eta is near 1
+            thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
+            spread = where(reflects, spread, abs(dot_i * dot_o) * thinned)
+        # a facet seen from its back, or one that would refract into the wrong side, is never sampled
+        lit = (dot_o * wo.z > 0.0) & (dot_i * wi.z > 0.0) & ~smooth
+        if not self.transmission:
+            lit = lit & reflects
+        return _Facet(wo, wi, m, dot_o, dot_i, reflects, lit, alpha, spread)
+
+    def _reflectance_at(self, facet: _Facet, eta: Scalar) -> Scalar:
+        """F of the facet."""
+        cos_o = abs(facet.dot_o)
+        # the far direction of a refraction is known: Snell's root would lose its cosine near the critical angle
+        cos_t = where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), abs(facet.dot_i))
+        return self.reflectance(cos_o, cos_t, eta)
+
+    def _masking(self, facet: _Facet) -> Scalar:
+        """G of the facet."""
+        pair = self.masking, distribution(self.ndf), facet.wo, facet.wi, facet.m, facet.alpha
+        g = masking.masking_shadowing(*pair)
+        if self.transmission:
+            g = where(facet.reflects, g, masking.masking_shadowing(*pair, transmits=True))
+        return g
+
+    def _value(self, facet: _Facet) -> Scalar:
+        """Radiance's eval without albedo and F."""
+        facets = safe_div(distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet), abs(facet.wo.z))
+        return where(facet.lit, facets * facet.spread, 0.0)
+
+    def _density(self, facet: _Facet, eta: Scalar) -> Scalar:
+        """The pdf without the probability of the lobe: density of the normal times dm/dwi."""
+        density = microfacet.pdf_per_cosine(self, facet.wo, facet.m, facet.alpha)
+        return where(facet.lit, density * facet.spread * self._squeeze(facet.reflects, eta), 0.0)
+
+    def _squeeze(self, reflects: Mask, eta: Scalar) -> Scalar:
+        """eta^2 for refraction: by how much solid angle shrinks on its way in, and radiance grows."""
+        return where(reflects, 1.0, sqr(eta))
+
+    def _share(self, f: Scalar) -> Scalar:
+        """Probability of choosing reflection."""
+        return f if self.transmission else 1.0 + 0.0 * f
+
+    def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
+        """albedo F or 1 - F of the lobe over the probability with which it is chosen, which is that where both are."""
+        return self.albedo if self.transmission else self.albedo * self._reflectance_at(facet, eta)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """The sum of both lobes times |cos theta_i|; 0 where alpha makes them deltas."""
+        eta = self._relative_eta(wo)
+        facet = self._facet(wo, wi, eta)
+        f = self._reflectance_at(facet, eta)
+        value = self._value(facet) * where(facet.reflects, f, 1.0 - f)
+        # the eta^2 of the Jacobian cancels for radiance
+        return self.albedo * (value * self._squeeze(facet.reflects, eta) if mode == "importance" else value)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Probability of the lobe, times the density of the normal, times dm/dwi."""
+        eta = self._relative_eta(wo)
+        facet = self._facet(wo, wi, eta)
+        share = self._share(self._reflectance_at(facet, eta))
+        return self._density(facet, eta) * where(facet.reflects, share, 1.0 - share)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
+        turned = frame.rotate(wo, self.rotation)
+        alpha, smooth = self._widths()
+        eta = self._relative_eta(wo)
+        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
+        facing = where(wo.z < 0.0, -m, m)  # a facet faces the side of wo
+        cos_o = abs(dot(turned, facing))
+        cos_t = fresnel.cos_transmitted(cos_o, eta)
+        f = self.reflectance(cos_o, cos_t, eta)
+        share = self._share(f)
+        reflects = u.x < share
+        wi = where(reflects, frame.reflect(turned, facing), frame.refract(turned, facing, cos_t, eta))
+        wi = frame.rotate_back(wi, self.rotation)
+        sides = wo.z * wi.z
+        right_side = where(reflects, sides > 0.0, sides < 0.0)
+        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        facet = self._facet(wo, wi, eta)
+        squeeze = self._squeeze(reflects, eta)
+        value = where(smooth, 1.0 / squeeze, self._value(facet))
+        density = where(smooth, 1.0, self._density(facet, eta))
+        if mode == "importance":
+            value = value * squeeze
+        chance = where(reflects, share, 1.0 - share)
+        pdf = where(right_side, chance * density, 0.0)
+        tinted = self._over_chance(facet, eta) * where(pdf > 0.0, safe_div(value, density), 0.0)
+        return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
+        eta = self._relative_eta(wo)
+        m = self._normal(wo, wi, eta)
+        m = where(delta, frame.upright(wo), m)  # equal indices send light straight on, at no normal of their own
+        cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
+        reflects = wo.z * wi.z > 0.0
+        f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
+        through = 1.0 - f if self.transmission else 0.0 * f
+        ideal = where(reflects, f, through if mode == "importance" else through / sqr(eta))
+        value = where(delta, self.albedo * ideal, self.eval(wo, wi, mode))
+        back, on = self._polarization(cos_o, cos_i, eta)
+        both = [where(reflects, one, other) for one, other in zip(back, on, strict=True)]
+        return (Polarized(value, m, Diattenuation(*both)),)
+
+    def _polarization(
+        self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
+    ) -> tuple[Diattenuation[Scalar], Diattenuation[Scalar]]:
+        """What a facet does to the polarization of what it reflects, and of what it lets through."""
+        return reflected_by_glass(cos_o, eta), refracted(cos_o, cos_i, eta)
+
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Terms:
+        """D, G and F of the pair, at the normal that reflects or refracts wo into wi."""
+        eta = self._relative_eta(wo)
+        facet = self._facet(wo, wi, eta)
+        f = self.albedo * self._reflectance_at(facet, eta)
+        return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
+
+    def _widths(self) -> tuple[Pair, Mask]:
+        """Widths, and whether the surface is smooth; where both indices are equal light goes straight on."""
+        alpha, smooth = widths(self.alpha)
+        if self.transmission:
+            smooth = smooth | (abs(self.eta - 1.0) < MATCHED)
+        return alpha, smooth
+
+    @property
+    def transmits(self) -> bool:
+        return self.transmission
+
+    @property
+    def delta(self) -> Delta:
+        eta = self.plain.eta
+        if backend.is_drjit(eta):
+            return "maybe"
+        if self.transmission:
+            matched = np.abs(np.asarray(eta, dtype=float) - 1.0) < MATCHED
+            if np.all(matched):
+                return "always"
+            if np.any(matched):
+                return "maybe"
+        return microfacet.delta_of(self.plain.alpha)
+
+    def _index(self) -> Scalar:
+        return self.eta
+
+    @property
+    def interior(self) -> Interior | None:
+        return Interior(self.eta, self.absorption, self.priority) if self.transmission else None
+
+    def normal_reflectance(self) -> Spectrum:
+        """F at normal incidence, times the albedo."""
+        one = 1.0 + 0.0 * self.eta
+        return self.reflectance(one, one, self.eta) * self.albedo
+
+    def mean_reflectance(self, average: str = "exact") -> Scalar:
+        """From the side of the less dense medium."""
+        return fresnel.kind(self.fresnel).dielectric_average(self.eta)
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """Of smooth glass, which keeps nothing; without transmission, F."""
+        if self.delta != "always":
+            return None
+        albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))
+        if self.transmission:
+            return np.array(albedo)
+        types = backend.types("float64")
+        bound, cos = self.bind(types), types.float(np.abs(mu))
+        eta = where(types.float(mu) >= 0.0, bound.eta, 1.0 / bound.eta)
+        f = bound.reflectance(cos, fresnel.cos_transmitted(cos, eta), eta)
+        return albedo * backend.to_numpy(f, len(mu))[:, None]
+
+
+# Refraction turns light by about (eta - 1) tan: below this difference of indices that is lost in the rounding of a
+# float32 direction (6e-8), and the normal that joins two directions can no longer be told.
+MATCHED = 1e-6

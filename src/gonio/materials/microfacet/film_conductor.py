@@ -1,0 +1,69 @@
+"""A metal under a thin film."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from ...material.parameters import Colour, Number, choice, number, spectrum
+from ...ops import Scalar, Spectrum, function
+from ...optics.fresnel import average as mean_over_angles
+from ...optics.fresnel import film
+from ...optics.fresnel.polarization import Diattenuation
+from .conductor import Conductor
+
+FRESNELS = {"exact": "the waves of the film", "one": "no loss at all: F = 1"}
+
+
+def thickness_number() -> Number:
+    """Declare the film's thickness."""
+    return number(default=300.0, doc="thickness of the film", low=0.0, high=3000.0, unit="nm")
+
+
+def film_index() -> Number:
+    """Declare the film's index."""
+    return number(default=1.38, doc="index of the film, over the outside's", low=1.0, high=3.0)
+
+
+def film_form() -> str:
+    """Declare how colours follow from the waves."""
+    return choice("local", "how three colours follow from the waves", film.FORMS)
+
+
+class FilmConductor(Conductor):
+    """Rough metal under a thin clear film: a `conductor` whose F has the colours of interference (Belcour2017).
+
+    Every facet carries the film. In spectral variants F is that of each wavelength; else three colours follow from it
+    by `form`, with the metal's indices at 650, 550 and 450 nm and straight lines between them. A film of more than 2
+    or 3 um has fringes that are closer than the 20 nm of `local`.
+    """
+
+    if TYPE_CHECKING:  # the conductor's, which mypy forgets to be declared parameters
+        eta: Colour = spectrum(0.0)
+        k: Colour = spectrum(1.0)
+        albedo: Colour = spectrum(1.0)
+    fresnel: str = choice("exact", "Fresnel reflectance", FRESNELS, white="one")
+    thickness: Number = thickness_number()
+    film_eta: Number = film_index()
+    form: str = film_form()
+
+    reads_wavelengths: ClassVar[bool] = True
+
+    @function
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """F of the film, times albedo, at a facet seen under cos_theta."""
+        if self.fresnel == "one":
+            return self.albedo * (1.0 + 0.0 * cos_theta)
+        return self.albedo * film.reflectance(cos_theta, self._film())
+
+    def _film(self) -> film.Film:
+        return film.Film(self.eta, self.k, self.film_eta, self.thickness, self.form, self.wavelengths)
+
+    def _polarization(self, cos_theta: Scalar) -> Diattenuation[Spectrum]:
+        return film.polarization(cos_theta, self._film())[0]
+
+    def mean_reflectance(self, average: str = "exact") -> Spectrum:
+        """The integral of F, whatever fit is asked for; its rule of ten angles follows films up to about 1 um."""
+        if self.fresnel == "one":
+            return 1.0 + 0.0 * self.eta
+        one = 1.0 + 0.0 * self.film_eta
+        return mean_over_angles(lambda mu: film.reflectance(mu * one, self._film()))

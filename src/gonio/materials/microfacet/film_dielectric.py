@@ -1,0 +1,110 @@
+"""Glass under a thin film."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.bsdf import Breach, InnerAlbedo, Microsurface
+from ...material.parameters import Colour, Number, choice, number, spectrum
+from ...ops import Mask, Scalar, Spectrum, abs, function, mean, safe_div, sqr, where
+from ...optics import fresnel
+from ...optics.fresnel import average as mean_over_angles
+from ...optics.fresnel import film
+from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
+from .dielectric import Dielectric, _Facet
+from .film_conductor import FRESNELS, film_form, film_index, thickness_number
+
+
+class FilmDielectric(Dielectric):
+    """Rough glass under a thin clear film: a `dielectric` whose F has the colours of interference (Belcour2017).
+
+    What the film does not reflect goes through, in the opposite colours. It lies outside: from inside, F is that of the
+    direction that light refracts to. Forms and limits are those of `film-conductor`. eta = film_eta = 1 is nothing at
+    all; a soap bubble is eta = 1 and film_eta = 1.33.
+    """
+
+    if TYPE_CHECKING:  # the dielectric's, which mypy forgets to be declared parameters
+        eta: Number = number(1.5)
+        albedo: Colour = spectrum(1.0)
+    fresnel: str = choice("exact", "Fresnel reflectance", FRESNELS, white="one")
+    thickness: Number = thickness_number()
+    film_eta: Number = film_index()
+    form: str = film_form()
+
+    reads_wavelengths: ClassVar[bool] = True
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "delta": Breach("it reflects as its film does, not as the bare index would", 1.0, certain=False)
+    }
+
+    @function
+    def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
+        """F of the film at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        white = 1.0 + 0.0 * self.albedo
+        if self.fresnel == "one":
+            return white * (1.0 + 0.0 * cos_o)
+        found = film.reflectance(where(self._inside(eta), cos_t, cos_o), self._film())
+        return where(cos_t > 0.0, found, white)
+
+    def _inside(self, eta: Scalar) -> Mask:
+        """Whether light comes from the glass, by the index on the far side over that on its own."""
+        return (eta - 1.0) * (self.eta - 1.0) < 0.0
+
+    def _film(self) -> film.Film:
+        zero = 0.0 * self.albedo
+        return film.Film(zero + self.eta, zero, self.film_eta, self.thickness, self.form, self.wavelengths)
+
+    def _share(self, f: Spectrum) -> Scalar:  # type: ignore[override]
+        return mean(f) if self.transmission else 1.0 + 0.0 * mean(f)
+
+    def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
+        """The lobes are chosen by their mean colours."""
+        _, smooth = self._widths()  # where no index bends the light, no facet can be told from its directions
+        cos_o, cos_i = (
+            where(smooth, abs(w.z), abs(dot)) for w, dot in ((facet.wo, facet.dot_o), (facet.wi, facet.dot_i))
+        )
+        f = self.reflectance(cos_o, where(facet.reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
+        share = self._share(f)
+        if not self.transmission:
+            return self.albedo * f
+        return self.albedo * where(facet.reflects, safe_div(f, share), safe_div(1.0 - f, 1.0 - share))
+
+    def _polarization(  # type: ignore[override]
+        self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
+    ) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
+        """From inside by the laws of Stokes: the same shares, and the phases that time reversed has."""
+        inside = self._inside(eta)
+        cos_t = fresnel.cos_transmitted(cos_o, eta)
+        back, _ = film.polarization(where(inside, cos_t, cos_o), self._film())
+        _, on = film.polarization(where(inside, cos_i, cos_o), self._film())
+        through = film.polarization(where(inside, cos_t, cos_o), self._film())[1]
+        size = 1.0 / (sqr(through.c) + sqr(through.s) + 1e-12)
+        cos2, sin2 = (sqr(through.c) - sqr(through.s)) * size, 2.0 * through.c * through.s * size
+        turned = Diattenuation(back.d, back.c * cos2 + back.s * sin2, back.c * sin2 - back.s * cos2)
+        total, white = reflected_by_glass(cos_o, eta), 1.0 + 0.0 * self.albedo
+
+        def chosen(place: int) -> Spectrum:
+            return where(cos_t > 0.0, where(inside, turned[place], back[place]), white * total[place])
+
+        return Diattenuation(chosen(0), chosen(1), chosen(2)), on
+
+    @property
+    def microsurface(self) -> Microsurface | None:  # type: ignore[override]
+        """None: the tables of energy are of bare glass."""
+        return None
+
+    def mean_reflectance(self, average: str = "exact") -> Spectrum:  # type: ignore[override]
+        """From outside; the integral of F, whose rule of ten angles follows films up to about 1 um."""
+        if self.fresnel == "one":
+            return 1.0 + 0.0 * self.albedo
+        one = 1.0 + 0.0 * self.film_eta
+        return mean_over_angles(lambda mu: film.reflectance(mu * one, self._film()))
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """Of smooth glass, which keeps nothing."""
+        return super().known_albedo(mu, phi, inner, nodes) if self.transmission else None

@@ -1,0 +1,57 @@
+"""A metal by its colours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...material.bsdf import Breach
+from ...material.parameters import Angle, Colour, Width, choice, spectrum
+from ...ops import Scalar, Spectrum, function
+from ...optics.fresnel import average as mean_over_angles
+from ...optics.fresnel.f82 import GRAZING, f82
+from ...optics.fresnel.schlick import schlick
+from . import microfacet
+from .reflector import _Reflector
+
+FRESNELS = {"f82": "Schlick's curve, bent at 82 degrees", "one": "no loss at all: F = 1"}
+
+
+class Metal(_Reflector):
+    """Rough metal as artists mean it: a colour from above, and a tint at the edge (F82-tint, Kutz2021).
+
+    f = albedo F D G / (4 (n.o)(n.i)) with F(0) = r0 and F(82 degrees) = edge times Schlick's value there, so that an
+    edge of 1 is Schlick's curve; at 90 degrees all is reflected. It is the metal of OpenPBR, and has no index: thin
+    films and polarization want a `conductor`.
+    """
+
+    breaks: ClassVar[Mapping[str, Breach]] = {
+        "linearity": Breach("where the edge is below a half and r0 dark, F is held at 0", 1.0, certain=False),
+        "precision": Breach("beside the places where F is held at 0 it is a difference", 0.01, certain=False),
+    }
+
+    r0: Colour = spectrum(default=0.9, doc="reflectance from above", low=0.0, high=1.0, soft_high=True)
+    edge: Colour = spectrum(default=1.0, doc="factor on Schlick's curve at 82 degrees", low=0.0, high=1.0)
+    alpha: Width = microfacet.alpha_width()
+    rotation: Angle = microfacet.rotation_angle()
+    ndf: str = microfacet.ndf_choice()
+    masking: str = microfacet.masking_choice()
+    fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")
+    albedo: Colour = microfacet.albedo_factor("factor on everything reflected")
+    sampling: str = microfacet.sampling_choice()
+
+    @function
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """F times albedo, at a facet seen under cos_theta."""
+        if self.fresnel == "one":
+            return self.albedo * (1.0 + 0.0 * cos_theta)
+        return self.albedo * self._curve(cos_theta)
+
+    def _curve(self, cos_theta: Scalar | float) -> Spectrum:
+        return f82(cos_theta, self.r0, self.edge * schlick(GRAZING, self.r0))
+
+    def mean_reflectance(self, average: str = "exact") -> Spectrum:
+        """The curve's integral, whatever fit is asked for."""
+        if self.fresnel == "one":
+            return 1.0 + 0.0 * self.r0
+        return mean_over_angles(self._curve)

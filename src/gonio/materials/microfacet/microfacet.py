@@ -1,0 +1,157 @@
+"""What the two microfacet materials share: the facet's facts, which normals are sampled, D G over the cosines."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.bsdf import BSDF, Delta, InnerAlbedo, Microsurface
+from ...material.parameters import Angle, Colour, Width, angle, choice, pair_of, spectrum, width
+from ...ops import Direction, Pair, Scalar, Spectrum, abs, backend, dot, function, safe_div, where
+from ...optics import fresnel, masking
+from ...optics.ndf import NDF, distribution
+from ...optics.roughness import SMOOTH
+
+SAMPLINGS = {
+    "visible": "normals as wo sees them",
+    "bounded": "visible normals whose reflection can lie above the surface (GGX; glass that transmits: as visible)",
+    "normals": "all normals, by D cos",
+}
+
+
+class Terms(NamedTuple):
+    """What a microfacet lobe is made of, at the half vector of a pair of directions.
+
+    D  density of microfacet normals, 1/sr
+    G  masking and shadowing
+    F  Fresnel reflectance, with the albedo
+    """
+
+    D: Scalar
+    G: Scalar
+    F: Spectrum
+
+
+def alpha_width() -> Width:
+    """Declare the width."""
+    return width(default=0.1, doc="width of the microfacet distribution; two for anisotropy")
+
+
+def rotation_angle() -> Angle:
+    """Declare the turn of the two widths."""
+    return angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
+
+
+def ndf_choice() -> str:
+    """Declare the distribution of normals."""
+    return choice("ggx", "distribution of microfacet normals", lambda: NDF.family.titles())
+
+
+def masking_choice() -> str:
+    """Declare the masking term."""
+    return choice("smith-correlated", "masking and shadowing", lambda: masking.Masking.family.titles())
+
+
+def fresnel_choice() -> str:
+    """Declare the Fresnel reflectance."""
+    return choice("exact", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
+
+
+def sampling_choice() -> str:
+    """Declare which normals are sampled."""
+    return choice("visible", "which normals are sampled", SAMPLINGS)
+
+
+def albedo_factor(doc: str) -> Colour:
+    """Declare the factor on everything that leaves."""
+    return spectrum(default=1.0, doc=doc, low=0.0, high=1.0, soft_high=True)
+
+
+class _Microfacet(BSDF):
+    """A rough surface of mirrors or of glass: what a conductor and a dielectric say of themselves alike."""
+
+    if TYPE_CHECKING:  # declared by each, in the order in which its constructor takes them
+        alpha: Width
+        rotation: Angle
+        ndf: str
+        masking: str
+        fresnel: str
+        albedo: Colour
+        sampling: str
+
+    @property
+    def delta(self) -> Delta:
+        return delta_of(self.plain.alpha)
+
+    @property
+    def microsurface(self) -> Microsurface:
+        kinds = self.ndf, self.masking, self.fresnel
+        return Microsurface(*kinds, self.alpha, self.rotation, self._index(), self.albedo, self.transmits)
+
+    def _index(self) -> Scalar | None:
+        """Index inside over index outside, of a dielectric; None of a conductor."""
+        return None
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64] | None:
+        """Of a smooth surface, whose one direction leaves with the weight of a sample."""
+        if self.delta != "always":
+            return None
+        sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
+        wo = np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
+        drawn = self.sample(wo, np.full((len(mu), 3), 0.5), precision="float64")
+        return np.asarray(drawn.weight, np.float64) * (mu > 0.0)[:, None]
+
+
+def delta_of(alpha: object) -> Delta:
+    """Whether widths, as the user gave them, make a delta lobe: alpha = 0 is a mirror."""
+    pair = (alpha,) if backend.is_drjit(alpha) else pair_of(alpha)
+    if any(backend.is_drjit(width) for width in pair):
+        return "maybe"
+    smooth = functools.reduce(np.maximum, (np.asarray(width, dtype=float) for width in pair)) < SMOOTH
+    return "always" if np.all(smooth) else "maybe" if np.any(smooth) else "never"
+
+
+@function
+def upper(w: Direction) -> Direction:
+    """w above the surface, -w below: a facet seen from behind at -w looks as from the front at w."""
+    return where(w.z < 0.0, -w, w)
+
+
+def _bounded(model: _Microfacet) -> bool:
+    """Whether the bound on reflections may be used: a facet that it leaves out could still transmit."""
+    return model.sampling == "bounded" and not model.transmits
+
+
+@function
+def sample_normal(model: _Microfacet, wo: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
+    """A normal (m.z > 0) by the model's `sampling`; its back faces a wo below the surface."""
+    ndf = distribution(model.ndf)
+    if model.sampling == "normals":
+        return ndf.sample(u1, u2, alpha)
+    if _bounded(model):
+        return ndf.sample_bounded(upper(wo), u1, u2, alpha)
+    return ndf.sample_visible(upper(wo), u1, u2, alpha)
+
+
+@function
+def pdf_per_cosine(model: _Microfacet, wo: Direction, m: Direction, alpha: Pair) -> Scalar:
+    """Density of `sample_normal` over |o.m|, 1/sr: the cosine cancels in dm/dwi (Walter2007, eq. 14 and 17)."""
+    ndf = distribution(model.ndf)
+    if model.sampling == "normals":
+        return safe_div(ndf.pdf(m, alpha), abs(dot(wo, m)))
+    if _bounded(model):
+        return ndf.bounded_per_cosine(upper(wo), m, alpha)
+    return ndf.visible_per_cosine(wo, m, alpha)
+
+
+@function
+def reflection(model: _Microfacet, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
+    """D G / (4 |cos theta_o|): the microfacet BRDF without F, times |cos theta_i|."""
+    ndf = distribution(model.ndf)
+    g = masking.masking_shadowing(model.masking, ndf, wo, wi, m, alpha)
+    return safe_div(g * ndf.D(m, alpha), 4.0 * abs(wo.z))

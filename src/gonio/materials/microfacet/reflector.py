@@ -1,0 +1,88 @@
+"""A rough surface of mirrors, whatever its Fresnel reflectance: what the conductor and the artist's metal share."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...material.calling import method
+from ...material.parameters import Angle, Colour, Width
+from ...material.sample import Sample
+from ...ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, safe_div, where
+from ...optics import frame, masking
+from ...optics.ndf import distribution
+from ...optics.roughness import widths
+from . import microfacet
+from .microfacet import Terms
+
+
+class _Reflector(microfacet._Microfacet):
+    """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass gives `reflectance` and `mean_reflectance`."""
+
+    if TYPE_CHECKING:  # declared by each; mypy forgets what an inherited field is
+        alpha: Width
+        rotation: Angle
+        ndf: str
+        masking: str
+        fresnel: str
+        albedo: Colour
+        sampling: str
+
+    def reflectance(self, cos_theta: Scalar) -> Spectrum:
+        """F, times albedo, at a facet seen under cos_theta."""
+        raise NotImplementedError(f"{type(self).__name__} has no reflectance")
+
+    def _facet(self, wo: Direction, wi: Direction) -> tuple[Direction, Direction, Direction, Pair, Mask]:
+        """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all
+        along the axes of the anisotropy; turned last, as wo + wi would cancel with the rounding of the turn."""
+        m = frame.half_vector(wo, wi)
+        alpha, smooth = widths(self.alpha)
+        wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
+        return wo, wi, m, alpha, _above(wo, wi) & ~smooth
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """albedo F D G / (4 cos theta_o); 0 where alpha makes it a mirror."""
+        wo, wi, m, alpha, lit = self._facet(wo, wi)
+        return self.reflectance(abs(dot(wo, m))) * where(lit, microfacet.reflection(self, wo, wi, m, alpha), 0.0)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """Density of the sampled normal over 4 (o.m) (Walter2007, eq. 14)."""
+        wo, wi, m, alpha, lit = self._facet(wo, wi)
+        return where(lit, 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha), 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
+        alpha, smooth = widths(self.alpha)
+        turned = frame.rotate(wo, self.rotation)
+        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
+        wi = frame.rotate_back(frame.reflect(turned, m), self.rotation)
+        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        wo, turned, m, alpha, lit = self._facet(wo, wi)
+        density = 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha)
+        facets = where(lit, safe_div(microfacet.reflection(self, wo, turned, m, alpha), density), 0.0)
+        mirrors = smooth & _above(wo, turned)
+        weight = self.reflectance(abs(dot(wo, m))) * where(mirrors, 1.0, facets)
+        pdf = where(mirrors, 1.0, where(lit, density, 0.0))
+        return Sample(wi, weight, pdf, mirrors, 1.0 + 0.0 * pdf)
+
+    @method
+    def terms(self, wo: Direction, wi: Direction) -> Terms:
+        """D, G and F of the pair; eval is F D G / (4 cos theta_o)."""
+        wo, wi, m, alpha, _ = self._facet(wo, wi)
+        ndf = distribution(self.ndf)
+        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
+        return Terms(ndf.D(m, alpha), g, self.reflectance(abs(dot(wo, m))))
+
+    def tint(self, wo: Direction) -> Spectrum:
+        """F at the surface's own normal."""
+        return self.reflectance(abs(wo.z))
+
+    def normal_reflectance(self) -> Spectrum:
+        """F at normal incidence."""
+        return self.reflectance(1.0 + 0.0 * self.alpha.x)
+
+
+def _above(wo: Direction, wi: Direction) -> Mask:
+    return (wo.z > 0.0) & (wi.z > 0.0)

@@ -1,0 +1,133 @@
+"""A thin sheet of glass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...material.bsdf import BSDF, Delta, InnerAlbedo, Preset
+from ...material.calling import method
+from ...material.parameters import Colour, Number, choice, number
+from ...material.polarization import Polarized
+from ...material.sample import Sample
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, function, sqr, where
+from ...optics import frame, fresnel, indices
+from ...optics.fresnel import exact
+from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
+from . import microfacet
+
+BOUNCES = {
+    "polarized": "of s and p apart, which a smooth sheet does not mix",
+    "mean": "of their mean, as most renderers have it; all light leaves unpolarized",
+}
+
+
+class _Sheet(NamedTuple):
+    """What a sheet reflects, all bounces together: of s, of p, and the product of both fields; that of what passes."""
+
+    s: Scalar
+    p: Scalar
+    cross: Scalar
+    passed: Scalar
+
+
+class ThinDielectric(BSDF):
+    """A thin sheet of clear glass: a window, a pane. What is not reflected goes straight on (PBRT4, sec. 9.5).
+
+    Light bounces between both faces, R' = R + T^2 R + T^2 R^3 + ... = 2 R / (1 + R), and T' = 1 - R'; the sheet is
+    thicker than the light's coherence, thinner than its own picture. R is that of each polarization, and R' the mean of
+    both: at 60 degrees, index 1.5, .152. `bounces="mean"` takes R' of the mean R, .164, as renderers do that know no
+    polarization.
+    """
+
+    eta: Number = number(default=1.5, doc="index of the sheet over that around it", low=0.2, high=5.0)
+    fresnel: str = microfacet.fresnel_choice()
+    bounces: str = choice("polarized", "what is summed over the bounces", BOUNCES)
+    albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
+
+    preset_kind: ClassVar[str] = "medium"
+
+    @classmethod
+    def presets(cls) -> Mapping[str, Preset]:
+        """Transparent media by name: eta, for sodium light; a sheet sends all wavelengths the same way."""
+        return {name: Preset(m.title, {"eta": m.sodium}, m.source) for name, m in indices.MEDIA.items()}
+
+    @function
+    def reflectance(self, cos: Scalar) -> Scalar:
+        """R' under a cosine, from either side."""
+        cos_t = fresnel.cos_transmitted(cos, self.eta)
+        if self.fresnel == "exact" and self.bounces == "polarized":
+            sheet = self._sheet(cos, cos_t)
+            return where(cos_t > 0.0, 0.5 * (sheet.s + sheet.p), 1.0)
+        return _all_bounces(fresnel.kind(self.fresnel).dielectric(cos, cos_t, self.eta))
+
+    def _sheet(self, cos: Scalar, cos_t: Scalar) -> _Sheet:
+        """All bounces together; powers add up, since waves of different bounces know nothing of each other."""
+        minus_r_s, r_p = exact.amplitudes(cos, cos_t, self.eta)
+        s, p, once = sqr(minus_r_s), sqr(r_p), -minus_r_s * r_p
+        through = (1.0 - s) * (1.0 - p)  # both faces
+        rest = through / (1.0 - sqr(once) + 1e-12)
+        return _Sheet(_all_bounces(s), _all_bounces(p), once * (1.0 + rest), rest)
+
+    @method
+    def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
+        """0: delta lobes have no finite value."""
+        return self.albedo * (0.0 * wo.z)
+
+    @method
+    def pdf(self, wo: Direction, wi: Direction) -> Scalar:
+        """0: delta lobes have no density."""
+        return 0.0 * wo.z
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """u1 chooses reflection with probability R'; else the direction is -wo."""
+        share = self.reflectance(abs(wo.z))
+        reflects = u.x < share
+        one = 1.0 + 0.0 * wo.z
+        pdf = where(reflects, share, 1.0 - share)
+        mirrored = frame.mirror(wo)
+        return Sample(where(reflects, mirrored, -wo), self.albedo * one, pdf, pdf > 0.0, one)
+
+    def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
+        """All of it, unless polarization is lost between the bounces."""
+        if self.bounces == "mean":
+            return ()
+        cos = abs(wo.z)
+        cos_t = fresnel.cos_transmitted(cos, self.eta)
+        sheet, total = self._sheet(cos, cos_t), reflected_by_glass(cos, self.eta)
+        reflects, crosses = wo.z * wi.z > 0.0, cos_t > 0.0
+        s, p = where(reflects, sheet.s, 1.0 - sheet.s), where(reflects, sheet.p, 1.0 - sheet.p)
+        over = 1.0 / (s + p + 1e-12)
+        d, c = (s - p) * over, 2.0 * where(reflects, sheet.cross, sheet.passed) * over
+        zero = 0.0 * cos
+        matrix = Diattenuation(where(crosses, d, zero), where(crosses, c, total.c), where(crosses, zero, total.s))
+        share = self.reflectance(cos)
+        value = self.albedo * where(delta, where(reflects, share, 1.0 - share), 0.0)
+        return (Polarized(value, frame.upright(wo), matrix),)
+
+    @property
+    def transmits(self) -> bool:
+        return True
+
+    @property
+    def delta(self) -> Delta:
+        return "always"
+
+    def normal_reflectance(self) -> Spectrum:
+        """R' at normal incidence, times the albedo."""
+        return self.albedo * self.reflectance(1.0 + 0.0 * self.eta)
+
+    def known_albedo(
+        self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
+    ) -> NDArray[np.float64]:
+        """albedo: nothing is kept."""
+        return np.array(np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3)))
+
+
+def _all_bounces(face: Scalar) -> Scalar:
+    """2 R / (1 + R): what both faces reflect together."""
+    return 2.0 * face / (1.0 + face)

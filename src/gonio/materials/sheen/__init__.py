@@ -1,0 +1,1 @@
+"""Cloth and dust: lobes that rise toward grazing angles."""

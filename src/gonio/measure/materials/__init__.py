@@ -1,1 +1,0 @@
-"""Materials that are tables."""

@@ -1,0 +1,158 @@
+"""Import paths of Gonio 0.1 that have moved: they go on working for one release, with a warning that says where to.
+
+`_MOVED` maps a package or module to its new name; what lies below it follows. Delete after one release.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.abc
+import importlib.machinery
+import sys
+import warnings
+from collections.abc import Sequence
+from types import ModuleType
+
+_MOVED = {
+    "documents": "catalog.documents",
+    "emit": "shaders",
+    "energy.compensation.comparison": "materials.compensated.comparison",
+    "energy.interior": "materials.layered.interior",
+    "energy.materials": "materials.compensated",
+    "energy.materials._openpbr_derived": "materials.layered._openpbr_derived",
+    "energy.materials._openpbr_formulas": "materials.layered._openpbr_formulas",
+    "energy.materials._openpbr_layers": "materials.layered._openpbr_layers",
+    "energy.materials._openpbr_sampling": "materials.layered._openpbr_sampling",
+    "energy.materials._openpbr_tables": "materials.layered._openpbr_tables",
+    "energy.materials.coat": "materials.layered.coat",
+    "energy.materials.disney2015": "materials.layered.disney2015",
+    "energy.materials.openpbr": "materials.layered.openpbr",
+    "measure.fitting": "fitting",
+    "measure.materials": "materials.measured",
+    "models": "material",
+    "models.ashikhmin_shirley": "materials.historic.ashikhmin_shirley",
+    "models.blinn_phong": "materials.empirical.blinn_phong",
+    "models.conductor": "materials.microfacet.conductor",
+    "models.cook_torrance": "materials.historic.cook_torrance",
+    "models.dielectric": "materials.microfacet.dielectric",
+    "models.disney": "materials.layered.disney",
+    "models.documents": "catalog.documents",
+    "models.eon": "materials.diffuse.eon",
+    "models.film_conductor": "materials.microfacet.film_conductor",
+    "models.film_dielectric": "materials.microfacet.film_dielectric",
+    "models.glossy": "materials.historic.glossy",
+    "models.he_torrance": "materials.historic.he_torrance",
+    "models.lafortune": "materials.historic.lafortune",
+    "models.lambert": "materials.diffuse.lambert",
+    "models.library": "catalog.library",
+    "models.low_microfacet": "materials.historic.low_microfacet",
+    "models.low_smooth": "materials.historic.low_smooth",
+    "models.material": "material.bsdf",
+    "models.metal": "materials.microfacet.metal",
+    "models.microfacet": "materials.microfacet.microfacet",
+    "models.mirror": "materials.microfacet.mirror",
+    "models.mix": "materials.combined.mix",
+    "models.modified_phong": "materials.empirical.modified_phong",
+    "models.normal_map": "materials.combined.normal_map",
+    "models.notation": "catalog.notation",
+    "models.opacity": "materials.combined.opacity",
+    "models.oren_nayar": "materials.diffuse.oren_nayar",
+    "models.outside": "catalog.outside",
+    "models.phong": "materials.empirical.phong",
+    "models.published": "catalog.published",
+    "models.reflector": "materials.microfacet.reflector",
+    "models.sheen": "materials.sheen.sheen",
+    "models.sheen_charlie": "materials.sheen.sheen_charlie",
+    "models.shifted_gamma": "materials.historic.shifted_gamma",
+    "models.sum": "materials.combined.sum",
+    "models.thin_dielectric": "materials.microfacet.thin_dielectric",
+    "models.two_sided": "materials.combined.two_sided",
+    "models.ward": "materials.historic.ward",
+    "models.ward_duer": "materials.historic.ward_duer",
+    "render.adapter": "bridge.adapter",
+    "render.answers": "bridge.answers",
+    "render.calls": "bridge.calls",
+    "render.denoise": "pictures.denoise",
+    "render.engine": "bridge.engine",
+    "render.exposures": "pictures.exposures",
+    "render.foreground": "transport.foreground",
+    "render.foreign": "bridge.foreign",
+    "render.formats": "pictures.formats",
+    "render.gradients": "transport.gradients",
+    "render.images": "pictures.images",
+    "render.inline": "transport.fast.inline",
+    "render.integrators": "transport.integrators",
+    "render.lamps": "transport.fast.lamps",
+    "render.lights": "transport.lights.lights",
+    "render.media": "transport.media",
+    "render.metrics": "pictures.metrics",
+    "render.mitsuba_scene": "scene.mitsuba_scene",
+    "render.native": "bridge.native",
+    "render.nearby": "transport.fast.nearby",
+    "render.passes": "transport.passes",
+    "render.photons": "transport.photons",
+    "render.polarizer": "transport.polarizer",
+    "render.sampler": "transport.sampler",
+    "render.scene": "scene",
+    "render.sky": "transport.lights.sky",
+    "render.solid_angles": "transport.lights.solid_angles",
+    "render.sources": "transport.lights.sources",
+    "render.surfaces": "transport.surfaces",
+    "render.types": "bridge.types",
+    "render.until": "transport.until",
+    "verify.causes": "verify.forensics.causes",
+    "verify.child": "verify.isolation.child",
+    "verify.crowding": "verify.forensics.crowding",
+    "verify.diagnosis": "verify.forensics.diagnosis",
+    "verify.factors": "verify.forensics.factors",
+    "verify.ratio": "verify.forensics.ratio",
+    "verify.reproduction": "verify.forensics.reproduction",
+    "verify.watch": "verify.isolation.watch",
+    "verify.worker": "verify.isolation.worker",
+}
+
+
+def new_name(name: str) -> str:
+    """The present name of a module of 0.1; "" where it has not moved."""
+    head, _, tail = name.removeprefix("gonio.").rpartition(".")
+    if name.removeprefix("gonio.") in _MOVED:
+        return "gonio." + _MOVED[name.removeprefix("gonio.")]
+    parent = new_name("gonio." + head) if head else ""
+    return f"{parent}.{tail}" if parent else ""
+
+
+class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Finds a moved module at its new place; asked last, for what is nowhere else."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        if not name.startswith("gonio.") or not new_name(name):
+            return None
+        return importlib.machinery.ModuleSpec(name, self, is_package=True)
+
+    def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
+        """The module at its new place, which then stands under both names."""
+        new = new_name(spec.name)
+        warnings.warn(f"{spec.name} is now {new}", DeprecationWarning, stacklevel=2)
+        module = _Alias(spec.name)
+        module.__dict__["_new"] = importlib.import_module(new)
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        pass
+
+
+class _Alias(ModuleType):
+    """A module of 0.1: every name is looked up in the module that has taken its place."""
+
+    def __getattr__(self, name: str) -> object:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.__dict__["_new"], name)
+
+
+def install() -> None:
+    """Have Python ask for moved modules, after everything else."""
+    if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
+        sys.meta_path.append(_Finder())

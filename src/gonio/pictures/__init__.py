@@ -1,0 +1,1 @@
+"""Pictures: files, formats, metrics, exposures and denoising."""

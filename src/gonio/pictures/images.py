@@ -1,0 +1,304 @@
+"""Pictures on disk: .exr, .hdr, .png and .npz, with the settings that made them, written whole or not at all.
+
+A picture in memory is linear RGB, float32, shape (H, W, 3), row 0 on top. PNG is what a screen shows: times
+2^exposure, clamped, sRGB-encoded, 8 bit. The settings go into EXR attributes, PNG text chunks, comment lines
+of the Radiance header, or an array named `metadata` in an .npz.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import archives, files
+from ..bridge import engine
+from ..errors import InputError, did_you_mean
+from ..owner import alone
+from . import exposures, formats
+
+Value = str | int | float
+RGB = NDArray[np.float32]
+Number = TypeVar("Number", bound=np.generic)
+Metadata = Mapping[str, Value]
+
+SUFFIXES = (".exr", ".hdr", ".png", ".npz")
+_PREFIX = "gonio."  # keeps our attributes apart from the format's own, and finds them again
+
+_KINDS = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture read from `path`; `hdr` is False where the file holds a screen's values (.png)."""
+
+    pixels: RGB
+    path: Path
+    hdr: bool = True
+    metadata: dict[str, Value] = field(default_factory=dict)
+
+
+# --- writing -------------------------------------------------------------------------------------------
+
+
+def check_writable(path: str | Path) -> Path:
+    """The file `path` will become (links followed), or an InputError before hours are spent on it."""
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        hint = did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
+        raise InputError(f"unknown picture format '{target.suffix}'", str(path), hint)
+    return files.check_file(target)
+
+
+@alone
+def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
+    """Write a picture in the format its suffix names, whole or not at all.
+
+    exposure  stops; PNG only, since the other formats keep radiance as it is
+    """
+    target = check_writable(path)
+    if np.iscomplexobj(pixels):
+        raise InputError("complex numbers given, an RGB picture expected", str(path))
+    picture = np.ascontiguousarray(pixels, dtype=np.float32)
+    if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
+        raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))
+    settings = dict(metadata or {})
+    suffix = target.suffix.lower()
+    if suffix == ".png":
+        content = png_bytes(to_screen(picture, exposure), settings)
+    elif suffix == ".npz":
+        content = _npz_bytes(picture, settings)
+    elif suffix == ".hdr":
+        content = _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
+    else:
+        content = _bitmap_bytes(picture, settings, "OpenEXR")
+    return files.write_whole(path, content)
+
+
+class Shown(NamedTuple):
+    """How a picture was written: the stops of a .png, None of other formats; what there is to say about it, or ""."""
+
+    exposure: float | None
+    notice: str
+
+
+def show(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: exposures.Exposure = 0.0) -> Shown:
+    """Write a picture as `write` does, by an exposure that may be "auto", and say where a screen clips it."""
+    if Path(path).suffix.lower() != ".png":
+        write(path, pixels, metadata)
+        kept = f"{Path(path).suffix} keeps radiance as it is: --exposure is for .png"
+        return Shown(None, "" if exposure == 0 else kept)
+    chosen = exposures.stops(exposure, pixels)
+    write(path, pixels, {**(metadata or {}), "exposure": chosen}, chosen)
+    return Shown(chosen, exposures.clipping(chosen, pixels, automatic=exposure == "auto"))
+
+
+def convert(source: str | Path, output: str | Path, exposure: exposures.Exposure = 0.0) -> Shown:
+    """Write a picture again in the format that the suffix names, its settings kept; a .png by `exposure`, in stops.
+
+    A .png as source is decoded from sRGB, and what it clipped stays so. Raises InputError as `read` and `write` do.
+    """
+    check_writable(output)
+    picture = read(source)
+    metadata = {key: value for key, value in picture.metadata.items() if key != "exposure"}
+    return show(output, picture.pixels, metadata, exposure)
+
+
+def to_screen(pixels: RGB, exposure: float = 0.0) -> NDArray[np.uint8]:
+    """Linear radiance to a screen's 8-bit values: times 2^exposure, clamped, sRGB-encoded (IEC 61966-2-1)."""
+    x = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=1.0) * np.float32(2.0**exposure), 0, 1)
+    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
+    return (encoded * 255 + 0.5).astype(np.uint8)
+
+
+def from_screen(values: NDArray[np.floating]) -> RGB:
+    """sRGB-encoded values in [0, 1] to linear ones; the inverse of `to_screen` at exposure 0."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def png_bytes(values: NDArray[np.uint8], metadata: Metadata | None = None) -> bytes:
+    """An 8-bit RGB PNG (ISO 15948) of (H, W, 3) values, with text chunks."""
+    height, width = values.shape[:2]
+    rows = values.reshape(height, width * 3)
+    # Filter 2 (difference to the row above, modulo 256) halves the size of smooth pictures.
+    difference = np.diff(rows, axis=0, prepend=np.uint8(0))
+    filtered = np.concatenate([np.full((height, 1), 2, np.uint8), difference], axis=1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    def text(key: str, value: str) -> bytes:
+        if (key + value).isascii():
+            return chunk(b"tEXt", key.encode() + b"\0" + value.encode())
+        return chunk(b"iTXt", key.encode() + b"\0\0\0\0\0" + value.encode("utf-8"))
+
+    return b"".join(
+        [
+            b"\x89PNG\r\n\x1a\n",
+            chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+            chunk(b"sRGB", b"\0"),
+            *(text(_PREFIX + key, _one_line(value)) for key, value in (metadata or {}).items()),
+            chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
+            chunk(b"IEND", b""),
+        ]
+    )
+
+
+def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
+    mi = engine.load()
+    bitmap = mi.Bitmap(picture)
+    for key, value in metadata.items():
+        bitmap.metadata()[_PREFIX + key] = value
+    stream = mi.MemoryStream()
+    with engine.file_threads():
+        bitmap.write(stream, getattr(mi.Bitmap.FileFormat, file_format))
+    return stream.raw_buffer()
+
+
+def _with_comments(radiance: bytes, metadata: Metadata) -> bytes:
+    """A Radiance file with the settings as comment lines behind its first line."""
+    rest = radiance.split(b"\n", 1)[1]  # Mitsuba opens with "#?RGBE", which not every reader takes
+    lines = [f"# {_PREFIX}{key}={_one_line(value)}".encode() for key, value in metadata.items()]
+    return b"\n".join([b"#?RADIANCE", *lines, rest])
+
+
+def _npz_bytes(picture: RGB, metadata: Metadata) -> bytes:
+    import io
+
+    stream = io.BytesIO()
+    np.savez_compressed(stream, radiance=picture, metadata=np.array(json.dumps(dict(metadata))))
+    return stream.getvalue()
+
+
+def _one_line(value: Value) -> str:
+    return re.sub(r"[\0\r\n]+", " ", value) if isinstance(value, str) else json.dumps(value)
+
+
+# --- reading -------------------------------------------------------------------------------------------
+
+
+@alone
+def read(path: str | Path) -> Picture:
+    """A picture as linear RGB, with the settings that Gonio wrote into it.
+
+    PNG is decoded from sRGB; an .npz holds `radiance` (or one array only). Grey becomes three channels.
+    Raises InputError for a file that is missing, empty, damaged, of another format, or larger than its bytes
+    can hold.
+    """
+    source = Path(path).expanduser()
+    suffix = source.suffix.lower()
+    if suffix not in SUFFIXES:
+        what = f"unknown picture format '{source.suffix}'"
+        raise InputError(what, str(path), "use one of " + ", ".join(SUFFIXES))
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read this picture: {error.strerror}", str(path), _nearby(source)) from error
+    if not content:
+        raise InputError("this picture is an empty file", str(path), "render it again")
+    if suffix == ".npz":
+        pixels, metadata = _read_npz(source)
+    else:
+        pixels, metadata = _read_bitmap(source, content, suffix)
+    return Picture(pixels, source, suffix != ".png", metadata)
+
+
+def _nearby(source: Path) -> str:
+    if not source.parent.is_dir():
+        return f"the folder '{source.parent}' does not exist"
+    near = [entry.name for entry in source.parent.iterdir() if entry.suffix.lower() in SUFFIXES]
+    return did_you_mean(source.name, near) if near and len(near) <= 20 else "check the name"
+
+
+def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[RGB, dict[str, Value]]:
+    kind, where = _KINDS[suffix], str(source)
+    if formats.kind_of(content) != kind:
+        raise InputError(f"this is no {suffix[1:].upper()} picture", where, "check the file or its suffix")
+    try:
+        values, _ = formats.decode(source, content, kind)
+        metadata = _metadata(content, suffix)
+    except formats.Unreadable as error:
+        raise InputError(f"this picture is damaged: {error}", where, "render or copy it again") from error
+    if suffix == ".png":  # by our own decoding: a 16-bit PNG would be taken for linear
+        pixels = from_screen(_three_channels(values, where))
+    else:
+        pixels = _three_channels(values, where)
+    return np.ascontiguousarray(pixels), metadata
+
+
+def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number]:
+    grey = values if values.ndim == 3 else values[..., None]
+    if grey.shape[2] in (1, 2):  # luminance, with or without alpha
+        return np.repeat(grey[..., :1], 3, axis=2)
+    if grey.shape[2] in (3, 4):
+        return grey[..., :3]
+    raise InputError(f"{grey.shape[2]} channels, expected RGB", str(path), "keep one layer only")
+
+
+def _metadata(content: bytes, suffix: str) -> dict[str, Value]:
+    found: Iterator[tuple[str, Value]]
+    if suffix == ".exr":
+        found = _exr_values(content)
+    elif suffix == ".hdr":
+        lines = content.split(b"\n\n", 1)[0].decode("utf-8", "replace").splitlines()
+        ours = (line[2:].partition("=") for line in lines if line.startswith(f"# {_PREFIX}"))
+        found = (_parsed(key, value) for key, _, value in ours)
+    else:
+        found = _png_texts(content)
+    return {key.removeprefix(_PREFIX): value for key, value in found if key.startswith(_PREFIX)}
+
+
+def _exr_values(content: bytes) -> Iterator[tuple[str, Value]]:
+    """The texts and numbers among the attributes (OpenEXR's file layout, "Predefined attribute types")."""
+    numbers = {"int": "<i", "float": "<f", "double": "<d"}
+    for name, kind, value in formats.exr_attributes(content):
+        if kind == "string":
+            yield name, value.decode("utf-8", "replace")
+        elif kind in numbers and len(value) == struct.calcsize(numbers[kind]):
+            yield name, struct.unpack(numbers[kind], value)[0]
+
+
+def _png_texts(content: bytes) -> Iterator[tuple[str, Value]]:
+    for kind, data in formats.png_chunks(content):
+        key, _, value = data.partition(b"\0")
+        if kind == b"tEXt":
+            yield _parsed(key.decode("latin-1"), value.decode("latin-1"))
+        elif kind == b"iTXt" and value[:2] == b"\0\0":  # not compressed
+            yield _parsed(key.decode("latin-1"), value[2:].split(b"\0", 2)[-1].decode("utf-8", "replace"))
+
+
+def _parsed(key: str, value: str) -> tuple[str, Value]:
+    """Numbers come back as numbers."""
+    try:
+        return key, int(value)
+    except ValueError:
+        try:
+            return key, float(value)
+        except ValueError:
+            return key, value
+
+
+def _read_npz(source: Path) -> tuple[RGB, dict[str, Value]]:
+    where = str(source)
+    try:
+        arrays = archives.read(source)
+        metadata = json.loads(str(arrays.pop("metadata", "{}")))
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"this .npz cannot be read: {error}", where, "save it with np.savez(...)") from error
+    name = "radiance" if "radiance" in arrays else next(iter(arrays), "") if len(arrays) == 1 else ""
+    if not name:
+        hint = "save it with np.savez(path, radiance=picture); found: " + ", ".join(arrays)
+        raise InputError("no array named 'radiance'", where, hint)
+    array = arrays[name]
+    if array.ndim not in (2, 3) or array.dtype.kind not in "fiu" or array.size == 0:
+        what = f"'{name}' is {array.dtype} of shape {array.shape}, expected (H, W, 3) numbers"
+        raise InputError(what, where)
+    return _three_channels(array.astype(np.float32), where), metadata if isinstance(metadata, dict) else {}

@@ -1,0 +1,362 @@
+"""From a validated description to a Mitsuba scene."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..bridge.types import MitsubaBSDF, Plugin, PluginDict, Scene
+from ..catalog import documents
+from ..errors import GonioWarning, InputError
+from ..material import Parameter
+from ..materials.combined.normal_map import slopes
+from ..pictures.images import RGB
+from . import meshes, schema, spectra, textures
+from .materials import BY_TYPE, MaterialPart, Value, numbers_in
+from .text import pointer
+from .values import BumpMap, ImageTexture, NormalMap
+
+if TYPE_CHECKING:
+    from .by_shape import Group
+
+MANY = 64  # from so many materials of one structure on one stands for them
+
+# Local +z, +x, +y of Mitsuba's sphere, whose u runs about z from x toward y and whose v falls from +z, onto the
+# format's +y, +z, +x: u about y from z toward x, v from +y.
+_SPHERE_AXES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+def build(description: schema.SceneDescription, mi: ModuleType) -> Scene:
+    """The `mi.Scene`: shapes `shape0`, ..., lights `light0`, ..., and the `sensor` with its film.
+
+    Shapes whose materials are equal share one BSDF. Raises InputError for an image or mesh that cannot be used.
+    """
+    return built(description, mi, gathers=True).scene
+
+
+@dataclass(frozen=True)
+class Built:
+    """A scene, and the BSDF that each material of its description has become."""
+
+    scene: Scene
+    bsdfs: Mapping[MaterialPart, MitsubaBSDF]
+
+
+def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> Built:
+    """As `build`, with the materials, for who changes them.
+
+    gathers  let one BSDF, which is in no list, stand for very many materials that differ in numbers alone
+    """
+    builder = _Builder(description, mi, gathers)
+    return Built(builder.scene(), builder.bsdfs)
+
+
+def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:
+    """What shapes are sorted by: nothing that changes between two runs."""
+    if shape.id():  # a shape of the scene; those that were merged have lost their names
+        return shape.id(), [], 0, b""
+    box = shape.bbox()
+    corners = [float(x) for corner in (box.min, box.max) for x in np.ravel(corner)]
+    vertices = np.asarray(shape.vertex_positions_buffer()) if shape.is_mesh() else np.zeros(0)
+    return "", corners, shape.primitive_count(), vertices.tobytes()
+
+
+class _Builder:
+    def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool) -> None:
+        from ..bridge import adapter
+        from ..transport.lights import lights  # here, since they start Dr.Jit
+
+        adapter.register(mi)
+        self.adapter = adapter
+        lights.register(mi)
+        self.description, self.mi = description, mi
+        self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
+        self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
+        self.gathers = gathers and mi.variant().endswith("rgb")  # spectra are upsampled one by one
+        self.gathered: dict[MaterialPart, tuple[MitsubaBSDF, Group, int]] = {}
+
+    def scene(self) -> Scene:
+        scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
+        if self.gathers:
+            self.gather()
+        shapes: PluginDict = {"type": "merge"}
+        for index, shape in enumerate(self.description.shapes):
+            part = self.shape(shape, pointer("scene", "shapes", index), f"shape{index}")
+            (shapes if isinstance(part, dict) else scene)[f"shape{index}"] = part
+        for index, light in enumerate(self.description.lights):
+            part = self.light(light, pointer("scene", "lights", index), f"light{index}")
+            plain = isinstance(light, schema.AreaLight) and isinstance(part, dict)
+            (shapes if plain else scene)[f"light{index}"] = part
+        # Mitsuba merges the meshes of a scene by itself, and hands them on in an order of chance: with it would go the
+        # order of the lights, and every picture. So they are merged here, and sorted.
+        merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
+        merged = merged if isinstance(merged, list) else [merged]
+        for one in merged:
+            if one.is_mesh():
+                one.recompute_bbox()  # which Mitsuba 3.9 forgets, and then so does the scene
+        for index, one in enumerate(sorted(merged, key=_order)):
+            scene[one.id() or f"merged{index}"] = one
+        found = self.load(scene, "/scene", optimize=False)
+        if self.gathered:
+            from . import by_shape
+
+            by_shape.bind(self.mi, found, {id(group): group for _, group, _ in self.gathered.values()}.values())
+        return found
+
+    def load(self, plugin: PluginDict, where: str, optimize: bool = True) -> Plugin:
+        """A Mitsuba object; what Mitsuba refuses is an error at `where`."""
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", GonioWarning)  # the reader has said it, with the place
+                # one after the other: in parallel their numbers, and with them the kernels, are left to chance
+                return self.mi.load_dict(plugin, parallel=False, optimize=optimize)
+        except InputError as error:
+            raise InputError(error.what, self.description.where(where), error.hint) from None
+        except RuntimeError as error:
+            raise InputError(
+                f"Mitsuba refuses it: {str(error).strip().splitlines()[-1][:200]}",
+                self.description.where(where),
+                "simplify this part, and report it if it should work",
+            ) from error
+
+    def sensor(self) -> PluginDict:
+        camera = self.description.camera
+        placed = camera.transform
+        width, height = camera.film.size
+        if camera.polarizer is not None and not self.mi.is_polarized:
+            what = f"a polarizer, in the variant {self.mi.variant()} that knows no polarization"
+            hint = "`gonio render` and go.render choose one that does; here set llvm_ad_spectral_polarized before"
+            raise InputError(what, self.description.where("/camera/polarizer"), hint)
+        return {
+            "type": "perspective",
+            "fov": camera.vertical_fov,
+            "fov_axis": "y",
+            "near_clip": camera.t_near,
+            "far_clip": camera.t_far,
+            "to_world": self.mi.ScalarTransform4f().look_at(
+                list(placed.position), list(placed.look_at), list(placed.up)
+            ),
+            "film": {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "rfilter": {"type": "box"},  # the lab's pixel is the mean of its samples
+                "pixel_format": "rgb",
+                "component_format": "float32",
+            },
+            "sampler": {"type": "independent", "sample_count": min(self.description.spp, 2**16)},
+        }
+
+    # ------------------------------------------------------------------ lights
+
+    def light(self, light: schema.LightSource, where: str, name: str) -> Plugin | PluginDict:
+        if isinstance(light, schema.AreaLight):
+            # Mitsuba merges Python plugins whose properties are equal: the tag keeps two like lamps apart
+            emitter = {"type": "gonio_area", "radiance": spectra.emitted(light.energy), "tag": name}
+            return self.shape(light.shape, f"{where}/shape", name, emitter)
+        if isinstance(light, schema.SpotLight):
+            intensity = spectra.emitted(light.energy)
+            return {"type": "point", "position": list(light.position), "intensity": intensity}
+        source = light.texture if light.texture is not None else light.radiance
+        assert source is not None, "one of the two is given"
+        if isinstance(source, ImageTexture):
+            return textures.environment(self.mi, self.values(source, f"{where}/texture"))
+        return {"type": "constant", "radiance": spectra.emitted(source)}
+
+    # ------------------------------------------------------------------ shapes
+
+    def shape(
+        self, shape: schema.Shape, where: str, name: str, emitter: PluginDict | None = None
+    ) -> Plugin | PluginDict:
+        matrix = shape.transform.matrix()
+        material = shape.material or BY_TYPE["matte"](type="matte")
+        # An object, not a dict: Mitsuba merges equal dicts, and one emitter cannot belong to two shapes.
+        source = None if emitter is None else self.load(emitter, where)
+        native = self.native_shape(shape, matrix)
+        if native is not None and material in self.gathered:
+            native["bsdf"], group, row = self.gathered[material]
+            group.shapes[name] = row
+        elif native is not None:
+            native["bsdf"] = self.bsdf(material, f"{where}/material")
+        if native is not None:
+            if source is not None:
+                native["emitter"] = source
+            return native
+        bsdf = self.bsdf(material, f"{where}/material")
+        return self.triangles(shape, where).transformed(matrix).to_mitsuba(self.mi, name, bsdf, source)
+
+    def native_shape(self, shape: schema.Shape, matrix: np.ndarray) -> PluginDict | None:
+        """Mitsuba's own exact shape, where it has one."""
+        to_world = np.eye(4)
+        if isinstance(shape, schema.Sphere):
+            turned = shape.transform.rotate
+            axes = _SPHERE_AXES if turned is None else turned.matrix() @ _SPHERE_AXES
+            to_world[:3, :3] = shape.radius * axes
+            to_world[:3, 3] = matrix[:3, :3] @ shape.center + matrix[:3, 3]
+            return {"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world)}
+        if isinstance(shape, schema.Parallelogram):
+            edge0, edge1 = matrix[:3, :3] @ shape.edge0, matrix[:3, :3] @ shape.edge1
+            normal = np.cross(edge0, edge1)
+            # Mitsuba's rectangle is [-1, 1]^2; it stays exact when its edges are sheared.
+            to_world[:3, 0], to_world[:3, 1] = edge0 / 2, edge1 / 2
+            to_world[:3, 2] = normal / np.linalg.norm(normal)
+            to_world[:3, 3] = (matrix @ [*shape.base, 1.0])[:3] + (edge0 + edge1) / 2
+            return {"type": "rectangle", "to_world": self.mi.ScalarTransform4f(to_world)}
+        return None
+
+    def triangles(self, shape: schema.Shape, where: str) -> meshes.Triangles:
+        if isinstance(shape, schema.Disk):
+            return meshes.disk(shape.radius, shape.inner_radius, shape.phi_max)
+        if isinstance(shape, schema.Cylinder):
+            return meshes.cylinder(shape.radius, shape.height, shape.phi_max)
+        if isinstance(shape, schema.Cone):
+            return meshes.cone(shape.radius, shape.height, shape.phi_max)
+        if isinstance(shape, schema.Cube):
+            return meshes.cube()
+        assert isinstance(shape, schema.Mesh), "the others are Mitsuba's own"
+        path = self.description.locate(shape.file, f"{where}/file")
+        return meshes.read_mesh(path, self.description.where(f"{where}/file"))
+
+    # ------------------------------------------------------------------ materials
+
+    def bsdf(self, material: MaterialPart, where: str) -> MitsubaBSDF:
+        if material not in self.bsdfs:
+            self.bsdfs[material] = self.load(self.plugin(material, where), where)
+        return self.bsdfs[material]
+
+    def gather(self) -> None:
+        """Put one BSDF in the place of those of spheres and parallelograms that differ in numbers alone.
+
+        Not of meshes: Mitsuba makes one shape of those that share a BSDF.
+        """
+        places: dict[MaterialPart, str] = {}
+        for index, shape in enumerate(self.description.shapes):
+            if shape.material is not None and isinstance(shape, (schema.Sphere, schema.Parallelogram)):
+                places.setdefault(shape.material, pointer("scene", "shapes", index, "material"))
+        if len(places) < MANY:
+            return
+        from . import by_shape
+
+        groups: dict[Hashable, tuple[Group, list[MaterialPart]]] = {}
+        for material, where in places.items():
+            plugin = self.plugin(material, where)
+            kind = by_shape.structure(plugin)
+            if kind is not None:
+                group, members = groups.setdefault(kind, (by_shape.Group(plugin), []))
+                group.rows.append(dict(by_shape.properties(plugin)))
+                members.append(material)
+        for group, members in groups.values():
+            if len(members) < MANY:
+                continue
+            try:
+                bsdf = self.load(group.plugin(self.mi), places[members[0]])
+            except InputError:
+                continue  # it takes no textures, or one of them is wrong: said where it stands alone
+            if bsdf.placed.model.transmits and bsdf.placed.model.interior is not None:
+                continue  # light asks for its index and absorption elsewhere than on its shape
+            self.gathered |= {member: (bsdf, group, row) for row, member in enumerate(members)}
+
+    def plugin(self, material: MaterialPart, where: str) -> PluginDict:
+        """The material as a Mitsuba dict."""
+        plugin: PluginDict = {"type": self.adapter.register_model(self.mi, material.model)}
+        # Seen from behind nothing is black, as in the lab; a material that transmits has two sides of its own.
+        plugin["two_sided"] = material.two_sided is not False
+        if material.preset is not None:
+            plugin["preset"] = material.preset
+        parameters = material.model.parameters()
+        for name, (value, key, squared) in material.arguments().items():
+            here = where + pointer(key)
+            if isinstance(value, MaterialPart):
+                plugin[name] = self.plugin(value, here)
+            elif parameters[name].kind == "file":
+                plugin[name] = material.located(str(value), self.description.locate, here)
+            elif isinstance(value, (bool, str)):
+                plugin[name] = value
+            elif parameters[name].kind == "spectrum":
+                plugin[name] = self.colour(value, parameters[name], here)
+            elif isinstance(value, tuple):
+                pair = (self.scalar(item, parameters[name], here, squared) for item in value)
+                plugin[f"{name}_x"], plugin[f"{name}_y"] = pair
+            else:
+                plugin[name] = self.scalar(value, parameters[name], here, squared)
+        if material.normalmap is not None:
+            plugin = self.normal_mapped(plugin, material.normalmap, f"{where}/normalmap")
+        if material.bump is not None:
+            plugin = self.bumped(plugin, material.bump, f"{where}/bump")
+        return plugin
+
+    def colour(self, value: Value, parameter: Parameter, where: str) -> PluginDict:
+        if isinstance(value, ImageTexture):
+            pixels = self.values(value, where)
+            self.check_range(pixels, parameter, value, where)
+            if value.mean:
+                return {"type": "rgb", "value": [float(x) for x in np.broadcast_to(pixels.mean((0, 1)), 3)]}
+            return textures.bitmap(self.mi, np.broadcast_to(pixels, (*pixels.shape[:2], 3)), value.filter, value.wrap)
+        numbers = [*numbers_in(value)]
+        return {"type": "rgb", "value": numbers if len(numbers) == 3 else numbers * 3}
+
+    def scalar(self, value: Value, parameter: Parameter, where: str, squared: bool) -> float | PluginDict:
+        if isinstance(value, ImageTexture):
+            pixels = self.values(value, where).mean(axis=2, keepdims=True)
+            pixels = pixels**2 if squared else pixels
+            self.check_range(pixels, parameter, value, where)
+            if value.mean:
+                return float(pixels.mean(dtype=np.float64))
+            return textures.bitmap(self.mi, pixels, value.filter, value.wrap)
+        (number,) = numbers_in(value)
+        return number**2 if squared else number
+
+    def normal_mapped(self, plugin: PluginDict, texture: NormalMap, where: str) -> PluginDict:
+        pixels = self.image(texture, where)
+        if pixels.shape[2] != 3:
+            raise InputError("a normal map has three channels, this has one", self.description.where(where), "use RGB")
+        return self.leaning("normal-map", plugin, slopes(2.0 * pixels - 1.0, texture.scale))
+
+    def bumped(self, plugin: PluginDict, texture: BumpMap, where: str) -> PluginDict:
+        """The slopes of the heights, by differences over two texels; the image repeats."""
+        heights = texture.scale * self.image(texture, where).mean(axis=2)
+        across, down = ((np.roll(heights, -1, axis) - np.roll(heights, 1, axis)) / 2.0 for axis in (1, 0))
+        return self.leaning("bump", plugin, np.dstack([across * heights.shape[1], down * heights.shape[0]]))
+
+    def leaning(self, name: str, plugin: PluginDict, values: np.ndarray) -> PluginDict:
+        """A plugin inside one of those that lean its normal."""
+        maps = (textures.bitmap(self.mi, values[..., [axis]], "bilinear", "repeat") for axis in (0, 1))
+        found = {"type": self.adapter.plugin_name(name), "base": plugin, "two_sided": plugin["two_sided"]}
+        return {**found, **dict(zip(("lean_x", "lean_y"), maps, strict=True))}
+
+    def image(self, texture: ImageTexture | NormalMap | BumpMap, where: str) -> RGB:
+        """The image's own values."""
+        srgb = isinstance(texture, ImageTexture) and texture.color_space == "srgb"
+        channel = texture.channel if isinstance(texture, ImageTexture) else None
+        path, inside = self.description.locate(texture.file, f"{where}/file"), documents.inside(texture.file)[1]
+        key = (path, inside, channel, srgb)
+        if key not in self.images:
+            here = self.description.where(f"{where}/file")
+            self.images[key] = textures.load_image(path, here, srgb=srgb, channel=channel, inside=inside)
+        return self.images[key]
+
+    def values(self, texture: ImageTexture, where: str) -> RGB:
+        """Those times the factor."""
+        pixels = self.image(texture, where)
+        return pixels if texture.factor == 1.0 else pixels * np.asarray(texture.factor, np.float32)
+
+    def check_range(self, pixels: RGB, parameter: Parameter, texture: ImageTexture, where: str) -> None:
+        low, high = float(pixels.min()), float(pixels.max())
+        if low < parameter.low or (high > parameter.high and not parameter.soft_high):
+            wrong = low if low < parameter.low else high
+            raise InputError(
+                f"'{texture.file}' holds {wrong:g}, out of range: {parameter.name} is {parameter.range}",
+                self.description.where(where),
+                "scale the image's values",
+            )
+        if high > parameter.high:
+            self.description._warnings.append(
+                f"{self.description.where(where)}: '{texture.file}' holds {high:g}, over {parameter.high:g}: "
+                "the material gives back more light than it receives"
+            )

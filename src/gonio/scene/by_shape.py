@@ -1,0 +1,163 @@
+"""One material in the place of thousands that differ in their numbers alone.
+
+Dr.Jit traces every material of a scene, .2 ms each at every vertex of the program. Where many shapes have materials of
+one structure, one plugin stands for all of them, and each number in which they differ is a texture that is looked up by
+the shape that was met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import TypeAlias
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bridge import engine
+from ..bridge.types import Colour, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
+
+Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
+Place: TypeAlias = tuple[str, ...]  # of a property, through the plugins around it
+
+PLUGIN = "gonio_by_shape"
+_WHOLE = ("absorption", "priority")  # of what is inside a shape: no texture
+
+
+@dataclass
+class Group:
+    """Materials of one structure.
+
+    prototype  the plugin of the first
+    rows       of each property in which they may differ, its value in each of the materials
+    shapes     for each shape, by name, which of the materials it has
+    """
+
+    prototype: PluginDict
+    rows: list[dict[Place, Numbers]] = field(default_factory=list)
+    shapes: dict[str, int] = field(default_factory=dict)
+    textures: dict[Place, Texture] = field(default_factory=dict)
+
+    def plugin(self, mi: ModuleType) -> PluginDict:
+        """One material for all shapes of the group; `bind` it once these are in a scene."""
+        _register(mi)
+        for place, first in self.rows[0].items():
+            if any(row[place] != first for row in self.rows):
+                texture = mi.load_dict({"type": PLUGIN})
+                texture.hold(np.array([row[place] for row in self.rows]))
+                self.textures[place] = texture
+        return _replaced(self.prototype, self.textures)
+
+    def bind(self, numbers: Mapping[str, int]) -> None:
+        """Tell the textures which number each shape has in kernels."""
+        size = 1 + max(numbers.values())
+        row = np.zeros(size, np.intp)
+        row[[numbers[name] for name in self.shapes]] = list(self.shapes.values())
+        for texture in self.textures.values():
+            texture.bind(row)
+
+
+def structure(plugin: PluginDict) -> Hashable:
+    """Equal for plugins that differ in numbers alone; None for one that holds what is no number, such as an image."""
+    parts: list[Hashable] = []
+    for name, value in plugin.items():
+        if isinstance(value, dict) and value["type"] != "rgb":
+            inner = structure(value) if str(value["type"]).startswith("gonio_") else None
+            if inner is None:
+                return None
+            parts.append((name, inner))
+        elif name not in _WHOLE and _numbers(value) is not None:
+            parts.append(name)
+        else:
+            parts.append((name, repr(value)))
+    return tuple(parts)
+
+
+def properties(plugin: PluginDict, outer: Place = ()) -> Iterator[tuple[Place, Numbers]]:
+    """The numbers in which plugins of one structure may differ."""
+    for name, value in plugin.items():
+        found = None if name in _WHOLE else _numbers(value)
+        if found is not None:
+            yield (*outer, name), found
+        elif isinstance(value, dict) and value["type"] != "rgb":
+            yield from properties(value, (*outer, name))
+
+
+def bind(mi: ModuleType, scene: Scene, groups: Iterable[Group]) -> None:
+    """Bind groups to the shapes of a scene."""
+    numbers = np.array(dr.reinterpret_array(mi.UInt32, scene.shapes_dr()))
+    named = {shape.id(): int(number) for shape, number in zip(scene.shapes(), numbers, strict=True)}
+    for group in groups:
+        group.bind(named)
+
+
+def _numbers(value: object) -> Numbers | None:
+    if isinstance(value, float):
+        return (value,)
+    return tuple(value["value"]) if isinstance(value, dict) and value["type"] == "rgb" else None
+
+
+def _replaced(plugin: PluginDict, values: Mapping[Place, Texture], outer: Place = ()) -> PluginDict:
+    found: PluginDict = {}
+    for name, value in plugin.items():
+        here = (*outer, name)
+        if here in values:
+            found[name] = values[here]
+        elif isinstance(value, dict) and value["type"] != "rgb":
+            found[name] = _replaced(value, values, here)
+        else:
+            found[name] = value
+    return found
+
+
+def _register(mi: ModuleType) -> None:
+    if mi.variant() not in _known:
+        _known[mi.variant()] = _texture_class(mi)
+    made = _known[mi.variant()]
+    mi.register_texture(PLUGIN, lambda props: made(props))
+
+
+_known: dict[str, OfVariant] = {}  # variant -> class
+
+
+def _texture_class(mi: ModuleType) -> OfVariant:
+    base: OfVariant = mi.Texture
+
+    class ByShape(base):
+        """A number, or red, green and blue, for each shape."""
+
+        def __init__(self, props: Properties) -> None:
+            base.__init__(self, props)
+            self.rows: NDArray[np.float64] = np.zeros((1, 1))
+            self.table = mi.Float(0.0)
+
+        def hold(self, rows: NDArray[np.float64]) -> None:
+            self.rows = rows
+
+        @property
+        def span(self) -> NDArray[np.float64]:
+            """The least and the largest value."""
+            return np.array([self.rows.min(axis=0), self.rows.max(axis=0)])
+
+        def bind(self, row: NDArray[np.intp]) -> None:
+            """`row` of each shape, by its number in kernels."""
+            self.table = engine.own(mi.Float, self.rows[row].ravel().astype(np.float32))
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+        def eval(self, si: SurfaceInteraction, active: Mask = True) -> Colour:
+            return mi.UnpolarizedSpectrum(dr.gather(mi.Color3f, self.table, self._number(si), active))
+
+        def eval_1(self, si: SurfaceInteraction, active: Mask = True) -> Float:
+            return dr.gather(mi.Float, self.table, self._number(si), active)
+
+        def _number(self, si: SurfaceInteraction) -> OfVariant:
+            return dr.reinterpret_array(mi.UInt32, si.shape)
+
+        def to_string(self) -> str:
+            return f"ByShape[{len(self.rows)} materials]"
+
+    return ByShape

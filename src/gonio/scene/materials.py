@@ -1,0 +1,532 @@
+"""The materials of a scene file, made from what the models declare about themselves.
+
+Two families share the `type` key. The lab's six types keep the lab's keys, meaning and defaults (`LAB`); every model
+of `gonio.models` can be named too, with its own parameters and defaults: as `gonio-conductor`, and without the
+prefix where the lab does not use the name. A new model file needs no change here, and neither does a material that is
+registered later, or a class in a file beside the scene ("ward.py:Ward"), which runs where code is allowed.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    ForwardRef,
+    Literal,
+    NamedTuple,
+    TypeAlias,
+    TypeVar,
+    Union,
+    cast,
+)
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    PlainValidator,
+    PrivateAttr,
+    Strict,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    create_model,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from ..catalog import documents, library, outside
+from ..catalog.documents import Document
+from ..errors import GonioError, GonioWarning, InputError
+from ..material import BSDF, Parameter, models
+from ..material.parameters import IndexParameter
+from ..measure import SAMPLE, parted
+from ..optics.dispersion import DispersiveIndex
+from .files import located
+from .values import BumpMap, Colour, ImageTexture, Index, NormalMap, Part, Scalar, Width, invalid
+
+Model = type[BSDF]
+Locate: TypeAlias = Callable[[str, str], Path]
+T = TypeVar("T")
+
+# What a parameter may be in a scene file
+Value: TypeAlias = "float | bool | str | ImageTexture | MaterialPart | tuple[float | ImageTexture, ...]"
+
+
+@dataclass(frozen=True)
+class LabType:
+    """How a type of the lab's format maps onto a model.
+
+    renamed   the lab's key -> the parameter it sets, value unchanged
+    defaults  parameters whose default in the lab differs from the model's
+    required  keys that the lab insists on
+    ignored   keys that are accepted without effect
+    """
+
+    model: str
+    doc: str
+    renamed: dict[str, str] = field(default_factory=dict)
+    defaults: Mapping[str, float | str] = field(default_factory=dict)
+    required: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+
+_LAB_MICROFACETS = {"ndf": "beckmann", "masking": "smith-separable", "fresnel": "schlick"}
+LAB = {
+    "matte": LabType("lambert", "Ideal diffuse reflection.", defaults={"albedo": 0.5}),
+    "mirror": LabType("mirror", "Ideal mirror; it reflects 1 whatever `albedo` says.", ignored=("albedo",)),
+    "phong": LabType("phong", "kd cos_i + ks (v.r)^p, as the lab sheet's eq. 1.", required=("p",)),
+    "oren-nayar": LabType(
+        "oren-nayar", "Oren-Nayar; `roughness` is sigma as it stands.", {"roughness": "sigma"}, required=("roughness",)
+    ),
+    "conductor": LabType(
+        "conductor",
+        "Rough metal; `roughness` is alpha itself, not squared. Beckmann, separable Smith, Schlick unless said.",
+        {"roughness": "alpha"},
+        _LAB_MICROFACETS,
+        required=("roughness",),
+    ),
+    "dielectric": LabType(
+        "dielectric",
+        "Rough glass; `roughness` is alpha itself, not squared. Beckmann, separable Smith, Schlick unless said.",
+        {"roughness": "alpha"},
+        _LAB_MICROFACETS,
+        required=("roughness",),
+    ),
+}
+
+
+class Argument(NamedTuple):
+    """A parameter's value in a scene. `key` is its key in the file; `squared`: the parameter is the value's square."""
+
+    value: Value
+    key: str
+    squared: bool = False
+
+
+class MaterialPart(Part):
+    """What all materials share; the subclasses are made by `_declare`."""
+
+    type: str
+    normalmap: NormalMap | None = None
+    """Normals from an image."""
+    bump: BumpMap | None = None
+    """Heights from an image."""
+    two_sided: Annotated[bool, Strict()] | None = None
+    """Whether both sides reflect alike; by default all materials do that let no light through."""
+
+    _given: bool = PrivateAttr(False)  # by a program: its files lie where it says
+    _source: str = PrivateAttr("")  # the document that it is a material of
+    _notices: tuple[str, ...] = PrivateAttr(())  # what that has and it does not
+    model: ClassVar[Model]
+    declared: ClassVar[dict[str, Parameter]]  # key in the file -> the parameter it sets
+    dials: ClassVar[dict[str, str]]  # artist's key -> the width whose square root it is
+    lab: ClassVar[LabType | None]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its type's name: the classes are made, and no module holds them."""
+        return _pickled, (self.type, self.model, dict(self.__dict__), set(self.model_fields_set))
+
+    def get(self, key: str) -> Value | None:
+        return getattr(self, _attribute(key))
+
+    def arguments(self) -> dict[str, Argument]:
+        """Parameter name -> value, for all that the file gives and all that the lab fixes."""
+        found: dict[str, Argument] = {}
+        if self.lab:
+            found.update({name: Argument(value, name) for name, value in self.lab.defaults.items()})
+        for key, parameter in self.declared.items():
+            if (value := self.get(key)) is not None:
+                found[parameter.name] = Argument(value, key)
+        for dial, width in self.dials.items():
+            if (value := self.get(dial)) is not None:
+                found[width] = Argument(value, dial, squared=True)
+        return found
+
+    @property
+    def preset(self) -> str | None:
+        found: str | None = self.__dict__.get(_attribute("preset"))
+        return found
+
+    def located(self, file: str, locate: Locate | None, pointer: str) -> str:
+        """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""
+        path, item = parted(file)
+        if not self._given and locate is not None and path != SAMPLE:
+            path = str(locate(path, pointer))
+        return f"{path}:{item}" if item else path
+
+    def instance(self, locate: Locate | None = None, where: str = "") -> BSDF:
+        """The model with this material's values; a textured parameter keeps its default.
+
+        locate, where  what finds a file of the scene, by its name and a JSON pointer; that of this material
+        Raises InputError where the model refuses a combination (a two-sided glass).
+        """
+        parameters = self.model.parameters()
+        values: dict[str, Any] = {}
+        for name, (value, key, squared) in self.arguments().items():
+            if isinstance(value, MaterialPart):
+                values[name] = value.instance(locate, f"{where}/{key}")
+            elif parameters[name].kind == "file" and isinstance(value, str):
+                values[name] = self.located(value, locate, f"{where}/{key}")
+            elif isinstance(value, (bool, str)):
+                values[name] = value
+            elif not any(isinstance(item, ImageTexture) for item in _items(value)):
+                numbers = [item**2 if squared else item for item in numbers_in(value)]
+                values[name] = tuple(numbers) if isinstance(value, (list, tuple)) else numbers[0]
+        for name, parameter in parameters.items():
+            if parameter.required and name not in values:
+                values[name] = min(max(0.5, parameter.low), parameter.high)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", GonioWarning)  # `reader` has its own, with their place in the file
+            return self.model(**values)
+
+    @classmethod
+    @functools.cache
+    def _spellings(cls) -> dict[str, list[str]]:
+        """Parameter name -> the keys that set it."""
+        spellings: dict[str, list[str]] = {}
+        for key, parameter in cls.declared.items():
+            spellings.setdefault(parameter.name, []).append(key)
+        for dial, width in cls.dials.items():
+            spellings.setdefault(width, []).append(dial)
+        return spellings
+
+    @model_validator(mode="after")
+    def _one_spelling(self) -> MaterialPart:
+        for name, keys in self._spellings().items():
+            given = [key for key in keys if self.get(key) is not None]
+            if len(given) > 1:
+                raise invalid(
+                    f"both '{given[0]}' and '{given[1]}' are given", f"they set the same {name}; keep one", given[1]
+                )
+            needed = [key for key in keys if self.lab and key in self.lab.required]
+            if needed and not given:
+                raise invalid(f"key '{needed[0]}' is missing", f"give one of {', '.join(keys)}")
+        if self.normalmap is not None and self.bump is not None:
+            raise invalid("both 'normalmap' and 'bump' are given", "both say where the normal leans; keep one", "bump")
+        self._check_preset()
+        return self
+
+    def _check_preset(self) -> None:
+        if self.preset is None:
+            return
+        sets = {name for preset in self.model.presets().values() for name in preset.values}
+        taken = [key for key, p in self.declared.items() if p.name in sets and self.get(key) is not None]
+        if taken:
+            raise invalid(f"both 'preset' and '{taken[0]}' are given", f"a preset sets {taken[0]}; keep one", "preset")
+        try:
+            self.model.preset(self.preset)
+        except InputError as error:
+            raise invalid(error.what, error.hint, "preset") from None
+
+
+def _attribute(key: str) -> str:
+    # A prefix keeps a model's parameter from hiding a method of pydantic's (`copy`, `json`) or of ours.
+    return f"value_{key}"
+
+
+_KINDS: dict[str, Any] = {
+    "float": Scalar,
+    "angle": Scalar,
+    "spectrum": Colour,
+    "alpha": Width,
+    "flag": Annotated[bool, Strict()],
+    "file": Annotated[str, Strict(), Field(min_length=1)],
+    "bsdf": ForwardRef("Material"),
+}
+
+
+def numbers_in(value: object) -> tuple[float, ...]:
+    """The plain numbers of a value: itself, a colour's channels, a pair's widths."""
+    if isinstance(value, (list, tuple)):
+        return tuple(number for item in value for number in numbers_in(item))
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return (float(value),)
+    return ()
+
+
+def _items(value: Value) -> tuple[Value, ...]:
+    return tuple(value) if isinstance(value, (list, tuple)) else (value,)
+
+
+def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
+    def check(value: T) -> T:
+        if isinstance(value, str):
+            try:
+                parameter.taken(value, key)
+            except GonioError as error:
+                raise invalid(error.what, error.hint) from None
+        for number in numbers_in(value):
+            if number < parameter.low or (number > parameter.high and not parameter.soft_high):
+                raise invalid(f"{number:g} is out of range: {key} is {parameter.range}", _doc(parameter))
+        return value
+
+    return check
+
+
+def _doc(parameter: Parameter) -> str:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    return f"{parameter.name}: {parameter.doc}{unit}"
+
+
+def _field(parameter: Parameter, key: str, required: bool, doc: str = "") -> tuple[Any, Any]:
+    if parameter.kind == "choice":
+        kind: Any = Literal[tuple(parameter.choices)]
+    else:
+        of_kind = Index if isinstance(parameter, IndexParameter) else _KINDS[parameter.kind]
+        kind = Annotated[of_kind, AfterValidator(_in_range(parameter, key))]
+    doc = doc or f"{parameter.doc} ({parameter.range})"
+    # JSON Schema's minimum and maximum hold for numbers only, so they do no harm beside lists and textures.
+    limits = {"minimum": parameter.low, "maximum": math.inf if parameter.soft_high else parameter.high}
+    extra: dict[str, Any] = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
+    if required:
+        return kind, Field(alias=key, description=doc, json_schema_extra=extra)
+    return kind | None, Field(None, alias=key, description=doc, json_schema_extra=extra)
+
+
+def _declare(names: tuple[str, ...], model: type[BSDF], lab: LabType | None) -> type[MaterialPart]:
+    """The pydantic class of one material type."""
+    parameters = model.parameters()
+    declared = dict(parameters)
+    dials: dict[str, str] = {}
+    docs: dict[str, str] = {}
+    if lab:
+        declared = {key: p for key, p in declared.items() if key not in lab.ignored}
+        for key, name in lab.renamed.items():
+            declared[key] = parameters[name]
+            docs[key] = f"The same as {name} in the lab's format: {parameters[name].doc} ({parameters[name].range})"
+    else:
+        for name, parameter in parameters.items():
+            dial = name.replace("alpha", "roughness")
+            if parameter.kind == "alpha" and dial not in parameters:
+                dials[dial] = name
+                docs[dial] = f"The artist's dial in place of {name}: {name} = {dial}^2. Giving both is an error."
+    fields: dict[str, Any] = {"type": (Literal[names], Field(description=lab.doc if lab else _summary(model)))}
+    for key, parameter in declared.items():
+        # A lab key that has a second spelling is checked by `_one_spelling`, which knows both.
+        required = key in lab.required and key not in lab.renamed if lab else parameter.required
+        fields[_attribute(key)] = _field(parameter, key, required, docs.get(key, ""))
+    for dial, name in dials.items():
+        fields[_attribute(dial)] = _field(parameters[name], dial, False, docs[dial])
+    for key in lab.ignored if lab else ():
+        fields[_attribute(key)] = (Colour | None, Field(None, alias=key, description="Accepted and ignored."))
+    if model.presets():
+        doc = f'Named values in place of the numbers, e.g. "{next(iter(model.presets()))}".'
+        fields[_attribute("preset")] = (Annotated[str, Strict()] | None, Field(None, alias="preset", description=doc))
+    title = "".join(word.capitalize() for word in names[0].split("-"))
+    doc = lab.doc if lab else _summary(model)
+    # pydantic would look for the source of a class that has none, in every module that is loaded
+    made = {"use_attribute_docstrings": False}
+    cls = create_model(title, __base__=MaterialPart, __doc__=doc, __cls_kwargs__=made, **fields)
+    cls.model, cls.declared, cls.dials, cls.lab = model, declared, dials, lab
+    return cls
+
+
+def _summary(model: type[BSDF]) -> str:
+    return (model.__doc__ or model.__name__).strip().splitlines()[0]
+
+
+def _spellings(name: str) -> tuple[str, ...]:
+    """A model's names in a scene, with hyphens or underscores; the lab's own types come first."""
+    plain = () if name in LAB else (name,)
+    return tuple(dict.fromkeys(s for n in (*plain, f"gonio-{name}") for s in (n, n.replace("-", "_"))))
+
+
+class _Declared(Mapping[str, type[MaterialPart]]):
+    """The class of each type, by its names in a scene. One is made when it is asked for: making all takes a second."""
+
+    def __init__(self) -> None:
+        known = models()
+        self._lab = {name: known[lab.model] for name, lab in LAB.items()}
+        self._others = {spelling: name for name in known for spelling in _spellings(name)}
+        self._made: dict[str, type[MaterialPart]] = {}
+        self._lock = threading.RLock()
+
+    def __getitem__(self, name: str) -> type[MaterialPart]:
+        own = name if name in self._lab else self._others[name]
+        with self._lock:
+            if name not in self._made:
+                names = (name,) if name in self._lab else _spellings(own)
+                part = _declare(names, self._lab.get(name) or models()[own], LAB.get(name))
+                part.model_rebuild(_types_namespace={"Material": Material})
+                self._made |= dict.fromkeys(names, part)
+            return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from (*self._lab, *self._others)
+
+    def __len__(self) -> int:
+        return len(self._lab) + len(self._others)
+
+
+BY_TYPE = _Declared()
+OWN = "FILE.py:CLASS"  # tag of materials; those of another program's files have their format's
+
+
+@functools.cache
+def _own_part(name: str, model: Model) -> type[MaterialPart]:
+    part = _declare((name,), model, None)
+    part.model_rebuild(_types_namespace={"Material": Material})
+    return part
+
+
+def part_of(name: str) -> type[MaterialPart] | None:
+    """The part that describes materials of a type, also of one that was registered since; None where there is none."""
+    if name in BY_TYPE:
+        return BY_TYPE[name]
+    if library.knows(name):
+        return BY_TYPE[library.named(name)[0].name]
+    model: Any = models().get(name.replace("_", "-").removeprefix("gonio-"))  # Any: mypy takes it for unhashable
+    return None if model is None else _own_part(name, model)
+
+
+def described(material: BSDF) -> MaterialPart:
+    """A material that a program holds, as a scene has it."""
+    cls: Any = type(material)
+    name = f"gonio-{material.name}"
+    part = BY_TYPE[name] if name in BY_TYPE and BY_TYPE[name].model is cls else _own_part(material.name, cls)
+    fields: dict[str, Any] = {"type": name if part.model.__module__.startswith("gonio.") else material.name}
+    for key, parameter in part.declared.items():
+        value = getattr(material, parameter.name)
+        if parameter.inner:
+            fields[key] = described(value)
+        elif isinstance(value, DispersiveIndex):
+            fields[key] = value.constants.name
+        elif value is not None:
+            fields[key] = np.asarray(value).tolist() if parameter.numeric else value
+    made = part.model_validate(fields)
+    made._given = True
+    return made
+
+
+def _pickled(name: str, model: Model, values: dict[str, Any], given: set[str]) -> MaterialPart:
+    """What `MaterialPart.__reduce__` has taken apart."""
+    known, own = BY_TYPE.get(name), cast(Any, model)
+    cls: Any = known if known is not None and known.model is model else _own_part(name, own)
+    return cls.model_construct(given, **values)
+
+
+class DocumentPart(Part):
+    """A material of another program's file, as Gonio's own materials with its numbers and pictures."""
+
+    type: Literal[tuple(Document.family.all())]  # type: ignore[valid-type]
+    """The file's format."""
+    file: str = Field(min_length=1)
+    """The file, beside the scene; its own pictures lie in its folder."""
+    material: Annotated[str, Strict()] | None = None
+    """Which of its materials, by name, or by number where it has no name of its own; not needed for the only one."""
+    two_sided: Annotated[bool, Strict()] | None = None
+    """As of any material."""
+
+
+def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> MaterialPart:
+    """The material that it names."""
+    if isinstance(part, MaterialPart):
+        return part
+    context = info.context or {}
+    document = Document.family.get(part.type)
+    try:
+        path = located(part.file, context.get("folder", Path()), "", context.get("allow_outside", False))
+        if path.suffix.lower() not in document.suffixes:
+            known = ", ".join(document.suffixes)
+            raise InputError(f"'{part.file}' is no {part.type} file by its name", "", f"it ends in {known}")
+        described = documents.read(document, path, part.material or "")
+    except GonioError as error:
+        what = f"{error.where}: {error.what}" if error.where else error.what
+        raise invalid(what, error.hint, "file") from None
+    fields: Any = _beside(described.notation, Path(part.file).parent)
+    if part.two_sided is not None:
+        fields["two_sided"] = part.two_sided
+    made = part_of(fields["type"])
+    if made is None:
+        raise invalid(f"it needs the material {described.notation['type']}", "see `gonio models`", "file")
+    found = made.model_validate(fields, context=context)
+    found._source, found._notices = part.file, described.notices
+    return found
+
+
+def _beside(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
+    """As scenes have it: Gonio's types by their full names, since the lab's have the short ones; files from the scene's
+    folder."""
+    found: dict[str, object] = {}
+    for key, value in notation.items():
+        if key == "type" and value != "imageTex":
+            found[key] = f"gonio-{value}"
+        elif key == "file":
+            found[key] = (folder / str(value)).as_posix()
+        else:
+            found[key] = _beside(value, folder) if isinstance(value, dict) else value
+    return found
+
+
+def _tag(value: object) -> str | None:
+    if isinstance(value, DocumentPart):
+        return value.type
+    name = value.get("type") if isinstance(value, dict) else OWN
+    return name if name is None or (isinstance(name, str) and name in Document.family.all()) else OWN
+
+
+def _own(value: object, info: ValidationInfo) -> object:
+    """A material by its type: Gonio's, named, registered, or of a file, which runs where the user allowed it."""
+    if isinstance(value, MaterialPart):
+        return value
+    if not isinstance(value, dict):
+        raise PydanticCustomError("dict_type", "an object expected")
+    name, context = value["type"], info.context or {}
+    if not isinstance(name, str):
+        raise invalid(f"unknown type '{name}'", "known: " + ", ".join(sorted(BY_TYPE)), "type")
+    if name not in BY_TYPE and not outside.names_code(name) and library.resembles(name):
+        return _from_library(name, value, context)
+    part = part_of(name)
+    if part is None:
+        if not outside.names_code(name):
+            known = ", ".join(f"'{one}'" for one in (*BY_TYPE, *Document.family.all()))
+            raise PydanticCustomError("union_tag_invalid", "unknown type", {"tag": name, "expected_tags": known})
+        if not context.get("allow_code"):
+            hint = "read the file first; then --allow-code lets the scene run it"
+            raise invalid(f"'{name}' is code, which a scene alone does not run", hint, "type")
+        try:
+            code: Any = outside.load(name, context.get("folder"))
+            part = _own_part(name, code)
+        except InputError as error:
+            raise invalid(f"{error.where}: {error.what}", error.hint, "type") from None
+    return part.model_validate(value, context=context)
+
+
+def _from_library(name: str, value: dict[str, Any], context: dict[str, Any]) -> MaterialPart:
+    """A named material, as its model with a preset."""
+    try:
+        model, preset = library.named(name)
+    except InputError as error:
+        raise invalid(error.what, error.hint, "type") from None
+    return BY_TYPE[model.name].model_validate({**value, "type": model.name, "preset": preset}, context=context)
+
+
+# What stands for any of Gonio's materials in a generated schema: those are many, and each may hold others.
+PLACEHOLDER = {"$comment": "any material"}
+
+if TYPE_CHECKING:
+    Material: TypeAlias = MaterialPart
+else:
+    _members: list[Any] = [
+        Annotated[DocumentPart, AfterValidator(_from_document), Tag(name)] for name in Document.family.all()
+    ]
+    _members.append(Annotated[MaterialPart, PlainValidator(_own), WithJsonSchema(PLACEHOLDER), Tag(OWN)])
+    Material = Annotated[Union[tuple(_members)], Discriminator(_tag)]  # noqa: UP007
+
+
+def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
+    """The schema of any material, from references to those of Gonio's."""
+    pattern = {"type": {"type": "string", "pattern": r"\.py:\w+$"}}
+    own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
+    return {"oneOf": [*references, own]}

@@ -1,0 +1,120 @@
+"""Setting values of a scene by path, as `gonio study --vary shapes.*.material.roughness=.1,.5` does.
+
+A path is a JSON pointer ("/scene/shapes/0/material/p") or dotted ("scene.shapes.0.material.p"); the leading `scene` may
+be left out, and `*` stands for every item. The value goes into the raw JSON, so that validation sees it as if it had
+been written in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..bridge.types import Json
+from ..errors import InputError, did_you_mean
+from ..material import BSDF
+from .materials import described, part_of
+
+
+def apply(raw: dict[str, Json], overrides: Mapping[str, object]) -> None:
+    """Set each path to its value, in place. Raises InputError where a path leads nowhere, or a value is no JSON."""
+    for path, value in overrides.items():
+        _set(raw, path, _plain(value, path))
+
+
+def _plain(value: object, path: str) -> Json:
+    """The value as a scene file would hold it: tuples and arrays are lists."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, path) for key, item in value.items()}
+    if isinstance(value, BSDF):
+        return described(value)  # type: ignore[return-value]  # validation lets it through as it is
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item, path) for item in value]
+    if value is None or isinstance(value, str | int | float):
+        return value
+    raise InputError(f"{value!r} cannot stand in a scene", f"path {path}", "give a number, a name, a list or an object")
+
+
+def _set(raw: dict[str, Json], path: str, value: Json) -> None:
+    steps = _steps(raw, path)
+    holders: list[Json] = [raw]
+    for index, step in enumerate(steps[:-1]):
+        holders = [item for holder in holders for item in _below(holder, step, path, steps[:index], steps)]
+    last = steps[-1]
+    if last == "*":
+        for holder in holders:
+            for key in _keys(holder):
+                _put(holder, key, value, path)
+        return
+    chosen = _that_take(holders, last) if "*" in steps else holders
+    if not chosen:
+        known = sorted({str(key) for holder in holders if isinstance(holder, dict) for key in holder})
+        raise InputError(f"nothing there has the key '{last}'", f"path {path}", did_you_mean(last, known))
+    for holder in chosen:
+        _put(holder, last, value, path)
+
+
+def _put(holder: Json, key: str, value: Json, path: str) -> None:
+    if isinstance(holder, dict):
+        holder[key] = value
+    elif isinstance(holder, list):
+        holder[_index(holder, key, path)] = value
+    else:
+        raise InputError(f"nothing can be set below {holder!r}", f"path {path}", "shorten the path")
+
+
+def _steps(raw: dict[str, Json], path: str) -> list[str]:
+    if path.startswith("/"):
+        steps = [step.replace("~1", "/").replace("~0", "~") for step in path[1:].split("/")]
+    else:
+        steps = path.split(".")
+    if not path.strip("/.") or "" in steps:
+        raise InputError("an empty path", f"path '{path}'", "write e.g. shapes.0.material.roughness")
+    if not path.startswith("/") and steps[0] in ("shapes", "lights", "acceleration"):
+        steps.insert(0, "scene")
+    return steps
+
+
+def _keys(holder: Json) -> list[str]:
+    if isinstance(holder, dict):
+        return list(holder)
+    return [str(index) for index in range(len(holder))] if isinstance(holder, list) else []
+
+
+def _below(holder: Json, step: str, path: str, before: list[str], steps: list[str]) -> list[Json]:
+    """The values one step down; with a `*` before, holders without that key are passed over."""
+    if step == "*":
+        return list(holder.values()) if isinstance(holder, dict) else list(holder) if isinstance(holder, list) else []
+    if isinstance(holder, dict):
+        if step in holder:
+            return [holder[step]]
+        if "*" in before:
+            return []
+        inner = holder.get("scene")  # its keys may stand first in a dotted path
+        known = [*holder, *(inner if isinstance(inner, dict) else ())]
+        raise InputError(f"no key '{step}'", f"path {path}", did_you_mean(step, [str(key) for key in known]))
+    if isinstance(holder, list):
+        return [holder[_index(holder, step, path)]]
+    if "*" in before:
+        return []
+    raise InputError(f"'{'.'.join(before)}' holds nothing that could be named '{step}'", f"path {path}", "shorten it")
+
+
+def _index(holder: list[Json], step: str, path: str) -> int:
+    if not step.isascii() or not step.isdigit() or len(step) > 9 or int(step) >= len(holder):
+        hint = f"0 to {len(holder) - 1}, or *" if holder else "the list is empty"
+        raise InputError(f"no item '{step}' in a list of {len(holder)}", f"path {path}", hint)
+    return int(step)
+
+
+def _that_take(holders: list[Json], key: str) -> list[Json]:
+    """Of several objects, those that have the key; where none has it, those materials that know it."""
+    with_key: list[Json] = []
+    with_key += [h for h in holders if (isinstance(h, dict) and key in h) or (isinstance(h, list) and key.isdigit())]
+    if with_key:
+        return with_key
+    types = [(h, part_of(str(h.get("type")))) for h in holders if isinstance(h, dict)]
+    return [holder for holder, cls in types if cls is not None and key in cls.known_keys()]

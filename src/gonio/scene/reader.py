@@ -1,0 +1,249 @@
+"""From a path to a validated scene: read the text, set overrides, validate, find the files it names."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from ..bridge.types import Json
+from ..catalog import outside
+from ..errors import InputError, did_you_mean
+from . import overrides as override
+from .materials import OWN, MaterialPart, numbers_in
+from .schema import SceneDescription
+from .text import kind_of, pointer, read_json
+from .values import Part
+
+SHOWN = 4  # errors told at once: enough to mend a file in one go, few enough to read
+
+
+def read(
+    path: Path | str,
+    *,
+    allow_outside: bool = False,
+    allow_code: bool = False,
+    overrides: Mapping[str, object] | None = None,
+) -> SceneDescription:
+    """A scene from a folder with a scene.json, or from a .json file.
+
+    allow_outside  let textures and meshes lie outside the scene's folder
+    allow_code     let materials be classes in Python files, "ward.py:Ward", which then run
+    overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
+    Raises InputError for everything that is wrong with the file or with what it names.
+
+        description = read("scenes/phong", overrides={"shapes.*.material.roughness": 0.3})
+    """
+    file = _scene_file(Path(path))
+    raw = read_json(file)
+    if overrides:
+        override.apply(raw, overrides)
+    context = {"folder": file.parent, "allow_code": allow_code, "allow_outside": allow_outside}
+    try:
+        description = SceneDescription.model_validate(raw, context=context)
+    except ValidationError as error:
+        raise explain(error, raw, file) from None
+    description._path = file
+    description._allow_outside = allow_outside
+    description._raw = raw
+    _check_output(description)
+    seen: dict[MaterialPart, list[tuple[str, str]]] = {}
+    for where, part in parts(description):
+        if (name := part.__dict__.get("file")) is not None:
+            description.locate(name, f"{where}/file")
+        if isinstance(part, MaterialPart):
+            if part not in seen:
+                seen[part] = _check_material(description, where, part)
+            description._warnings += [f"{description.where(where + key)}: {text}" for key, text in seen[part]]
+    return description
+
+
+def _scene_file(path: Path) -> Path:
+    try:
+        if path.is_dir():
+            file = path / "scene.json"
+            if not file.is_file():
+                others = sorted(p.name for p in path.glob("*.json"))
+                hint = "give a folder with a scene.json, or a .json file"
+                hint = f"name the file: {path / others[0]}" if others else hint
+                raise InputError("the folder has no scene.json", str(path), hint)
+            return file
+        if path.is_file():
+            return path
+        if path.exists():
+            raise InputError("neither a folder nor a file", str(path), "give a scene's folder or its .json file")
+        near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be opened: {error}", str(path), "check the path") from None
+    hint = did_you_mean(path.name, near[:200]) if near else "check the path"
+    raise InputError("no such file or folder", str(path), hint if hint.startswith("did") else "check the path")
+
+
+def _check_output(description: SceneDescription) -> None:
+    name = Path(description.output.filename)
+    if not description._allow_outside and (name.is_absolute() or ".." in name.parts or "\\" in str(name)):
+        raise InputError(
+            f"the picture '{name}' would be written outside the folder",
+            description.where("/output/filename"),
+            "give a plain file name, or use --allow-outside",
+        )
+
+
+def _check_material(description: SceneDescription, where: str, material: MaterialPart) -> list[tuple[str, str]]:
+    """What to warn of, as (pointer from the material on, text). Raises InputError for one that cannot be."""
+    warnings = [("", f"{material._source}: {notice}") for notice in material._notices]
+    for name, (value, key, _) in material.arguments().items():
+        parameter = material.model.parameters()[name]
+        if parameter.numeric and any(number > parameter.high for number in numbers_in(value)):
+            told = f"{name} over {parameter.high:g}: the material gives back more light than it receives"
+            warnings.append((f"/{key}", told))
+    for key in material.lab.ignored if material.lab else ():
+        if material.get(key) is not None:
+            warnings.append((f"/{key}", f"ignored, as in the lab; 'gonio-{material.model.name}' uses it"))
+    try:
+        outside.probe(material.instance(description.locate, where))
+    except InputError as error:
+        raise InputError(error.what, description.where(where), error.hint or f"see {error.where}") from None
+    return warnings
+
+
+def parts(part: Part) -> Iterator[tuple[str, Part]]:
+    """Every object of a scene with its JSON pointer, parents first, in the order of the file's keys."""
+    todo = [("", part)]
+    while todo:
+        steps, part = todo.pop()
+        yield steps, part
+        below: list[tuple[str, Part]] = []
+        for name, value in part.__dict__.items():
+            if type(value) in _LEAVES:
+                continue
+            if isinstance(value, Part):
+                below.append((steps + _key(type(part), name), value))
+            elif isinstance(value, (list, tuple)):
+                for index, item in enumerate(value):
+                    if type(item) not in _LEAVES and isinstance(item, Part):
+                        below.append((f"{steps}{_key(type(part), name)}/{index}", item))
+        todo += reversed(below)
+
+
+_LEAVES = frozenset((float, int, str, bool, type(None)))  # most of a large scene
+
+
+@functools.cache
+def _key(part: type[Part], field: str) -> str:
+    """The key of a field as a step of a pointer."""
+    return pointer(part.model_fields[field].alias or field)
+
+
+def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str, Path]]:
+    """What writes the scene as text, overrides and all, and the files it names: textures, meshes, Python that runs."""
+    named: dict[str, Path] = {}
+    for where, part in parts(description):
+        if (name := part.__dict__.get("file")) is not None:
+            named[str(name)] = description.locate(name, f"{where}/file")
+        if isinstance(part, MaterialPart) and part._source:
+            named[part._source] = description.locate(part._source, where)
+        if isinstance(part, MaterialPart) and outside.is_outside(part.model):
+            code = Path(inspect.getsourcefile(part.model) or "")
+            named[code.name] = code
+
+    def text() -> str:
+        return json.dumps(description.raw, sort_keys=True, default=lambda part: part.model_dump_json(by_alias=True))
+
+    return text, named
+
+
+# ---------------------------------------------------------------------- pydantic's errors in our words
+
+
+def explain(error: ValidationError, raw: Json, file: Path) -> InputError:
+    """The first error with place, expectation and hint; the next few in a line each."""
+    found: dict[str, tuple[str, str]] = {}
+    for detail in error.errors(include_url=False):
+        where, what, hint = _one(detail, raw)
+        found.setdefault(where, (what, hint))
+    (where, (what, hint)), *others = found.items()
+    lines = [what]
+    lines += [f"also {file}#{place}: {text}" for place, (text, _) in others[: SHOWN - 1]]
+    if len(others) >= SHOWN:
+        lines.append(f"and {len(others) - SHOWN + 1} more")
+    return InputError("\n  ".join(lines), f"{file}#{where}", hint)
+
+
+def _one(detail: ErrorDetails, raw: Json) -> tuple[str, str, str]:
+    """Pointer, what is wrong, and a hint, of one of pydantic's errors."""
+    kind, context = detail["type"], detail.get("ctx", {})
+    steps, value = _place(detail["loc"], raw, keep_last=kind == "missing")
+    got = kind_of(value)
+    more: tuple[str, ...] = ()
+    hint = "`gonio schema` lists every key"
+    if kind == "scene":
+        what, hint = context["what"], context["hint"]
+        more = (context["key"],) if context["key"] else ()
+    elif kind == "unknown_key":
+        what = f"unknown key '{context['key']}' of {context['of']}"
+        hint, more = did_you_mean(context["key"], context["known"]), (context["key"],)
+    elif kind == "missing":
+        *steps, last = steps
+        what = f"key '{last}' is missing"
+        hint = f'add "{last}"'
+    elif kind == "expected":
+        what, hint = f"expected {detail['msg']}, got {got}", _unquote(value) or f"give {detail['msg']}"
+    elif kind == "union_tag_invalid":
+        tag = str(context["tag"])
+        known = [name for item in context["expected_tags"].split(",") if (name := item.strip(" '")) != OWN]
+        what, hint, more = f"unknown type '{tag}'", did_you_mean(tag, known), ("type",)
+    elif kind == "union_tag_not_found":
+        what, hint = "key 'type' is missing", 'add "type": it says what this object is'
+    elif kind == "literal_error":
+        known = [item.strip(" '") for item in context["expected"].replace(" or ", ", ").split(",")]
+        what = f"expected {context['expected']}, got {got}"
+        hint = did_you_mean(value, known) if isinstance(value, str) else "one of the names listed"
+    elif kind in ("float_type", "int_type"):
+        what = f"expected a {'whole number' if kind == 'int_type' else 'number'}, got {got}"
+        hint = _unquote(value) or "give a number"
+    elif kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        sign = {"greater_than": ">", "greater_than_equal": ">=", "less_than": "<", "less_than_equal": "<="}[kind]
+        limit = next(context[name] for name in ("gt", "ge", "lt", "le") if name in context)
+        what, hint = f"expected a number {sign} {limit:g}, got {value}", f"give a number {sign} {limit:g}"
+    elif kind in ("model_type", "model_attributes_type", "dict_type", "dataclass_type"):
+        what, hint = f"expected an object {{...}}, got {got}", "put it in { }"
+    elif kind == "list_type":
+        what, hint = f"expected a list [...], got {got}", "put it in [ ]"
+    elif kind == "bool_type":
+        what, hint = f"expected true or false, got {got}", "without quotes"
+    elif kind == "string_type":
+        what, hint = f"expected a string, got {got}", "put it in double quotes"
+    elif kind == "string_too_short":
+        what, hint = "expected a name, got an empty string", "give a file name"
+    else:
+        what = f"{detail['msg'][0].lower()}{detail['msg'][1:]}, got {got}"
+    return pointer(*steps, *more), what, hint
+
+
+def _unquote(value: Json) -> str:
+    try:
+        return f"write {float(value):g} without quotes" if isinstance(value, str) else ""
+    except ValueError:
+        return ""
+
+
+def _place(location: tuple[str | int, ...], raw: Json, keep_last: bool) -> tuple[list[str | int], Json]:
+    """The steps into the file and the value there. Pydantic's location also names the union's tags: dropped."""
+    steps: list[str | int] = []
+    value = raw
+    for index, step in enumerate(location):
+        # A tag is the object's own `type`, and no key is called like a type.
+        in_object = isinstance(value, dict) and step in value and step != value.get("type")
+        in_list = isinstance(value, list) and isinstance(step, int) and step < len(value)
+        if in_object or in_list:
+            value = value[step]  # type: ignore[index, call-overload]
+        elif not (keep_last and index == len(location) - 1):
+            continue
+        steps.append(step)
+    return steps, value

@@ -1,0 +1,508 @@
+"""The scene format: the lab's JSON, key by key, and Gonio's additions to it.
+
+The classes here are the format: what they accept is what `gonio schema` exports, and their docstrings are its manual.
+Keys are spelled as in the file through their aliases.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic.json_schema import models_json_schema
+
+from ..bridge.types import Json
+from ..errors import InputError, did_you_mean
+from ..members import Family
+from ..pictures.images import SUFFIXES
+from .files import located
+from .film import check_film
+from .materials import BY_TYPE, PLACEHOLDER, Material, any_material
+from .values import Light, NonNegative, Number, Part, Positive, Radiance, Sky, Vector, Whole, invalid
+
+if TYPE_CHECKING:
+    from ..transport import integrators as program
+
+MAX_SAMPLES = 2**30  # samples per pixel; a picture of one pixel could still be counted in 32 bits
+
+
+class Output(Part):
+    """Where the picture goes."""
+
+    filename: str = Field(min_length=1)
+    """.hdr, .png or .exr; the top row comes first."""
+
+    @model_validator(mode="after")
+    def _known_format(self) -> Output:
+        if Path(self.filename).suffix.lower() not in SUFFIXES:
+            known = ", ".join(SUFFIXES)
+            raise invalid(f"'{self.filename}' is no known kind of picture", f"end it in {known}", "filename")
+        return self
+
+
+class Sampler(Part):
+    """How many samples a pixel gets, and from which point set. Give xSamples and ySamples, or samples."""
+
+    type: str = "independent"
+    """The lab's "independent" states no preference and reads as "default"; other names force a sampler."""
+    x_samples: Whole | None = Field(None, alias="xSamples", ge=1, le=MAX_SAMPLES)
+    """Samples per pixel = xSamples * ySamples."""
+    y_samples: Whole | None = Field(None, alias="ySamples", ge=1, le=MAX_SAMPLES)
+    """Samples per pixel = xSamples * ySamples."""
+    samples: Whole | None = Field(None, ge=1, le=MAX_SAMPLES)
+    """Samples per pixel, in place of the other two."""
+    seed: Whole | None = Field(None, ge=0, lt=2**32)
+    """The same seed gives the same picture to the bit."""
+
+    @model_validator(mode="after")
+    def _counts(self) -> Sampler:
+        pair = (self.x_samples, self.y_samples)
+        if self.samples is not None and pair != (None, None):
+            raise invalid("both 'samples' and 'xSamples'/'ySamples' are given", "keep one form", "samples")
+        if self.samples is None and None in pair:
+            key = "xSamples" if self.x_samples is None else "ySamples"
+            raise invalid(f"key '{key}' is missing", "give xSamples and ySamples, or samples")
+        if self.spp > MAX_SAMPLES:
+            raise invalid(f"{self.spp} samples per pixel is too many", f"up to {MAX_SAMPLES}", "xSamples")
+        return self
+
+    @model_validator(mode="after")
+    def _known_type(self) -> Sampler:
+        if self.type not in ("independent", "default"):
+            from ..transport.sampler import SAMPLERS
+
+            if self.type not in SAMPLERS:
+                raise invalid(f"unknown sampler '{self.type}'", did_you_mean(self.type, list(SAMPLERS)), "type")
+        return self
+
+    @property
+    def spp(self) -> int:
+        return self.samples or (self.x_samples or 1) * (self.y_samples or 1)
+
+    @property
+    def preference(self) -> str:
+        """The sampler asked for, "default" where the file does not care."""
+        return "default" if self.type == "independent" else self.type
+
+
+class CameraTransform(Part):
+    """Where the camera stands and looks. right = forward x up."""
+
+    position: Vector
+    """The eye."""
+    look_at: Vector = Field(alias="lookAt")
+    """The point in the middle of the picture."""
+    up: Vector
+    """Upward in the picture; need not be perpendicular to the view."""
+
+    @model_validator(mode="after")
+    def _spans_a_frame(self) -> CameraTransform:
+        forward = np.subtract(self.look_at, self.position)
+        distance, height = np.linalg.norm(forward), np.linalg.norm(self.up)
+        # 32-bit coordinates carry 24 bits: nearer than that, the direction is made of rounding errors.
+        if distance <= 2**-22 * max(1e-30, np.abs(self.position).max(), np.abs(self.look_at).max()):
+            raise invalid("position and lookAt are the same point", "move one of them", "lookAt")
+        if height == 0:
+            raise invalid("up has length 0", "give a direction, e.g. [0, 1, 0]", "up")
+        if np.linalg.norm(np.cross(forward / distance, np.divide(self.up, height))) < 1e-5:
+            raise invalid("up is parallel to the view", "tilt one of them; which way is up cannot be told", "up")
+        return self
+
+
+class Film(Part):
+    """The picture."""
+
+    size: tuple[Whole, Whole]
+    """[width, height] in pixels."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _two_numbers(cls, data: object) -> object:
+        size = data.get("size") if isinstance(data, dict) else None
+        if size is not None and not (isinstance(size, (list, tuple)) and len(size) == 2):
+            raise invalid("expected 2 numbers [width, height]", "give [width, height]", "size")
+        return data
+
+    @model_validator(mode="after")
+    def _fits(self) -> Film:
+        try:
+            check_film(self.size, "size")  # the same limit as `--size`
+        except InputError as error:
+            raise invalid(error.what, error.hint, "size") from None
+        return self
+
+
+class Camera(Part):
+    """A pinhole camera that looks down its -z."""
+
+    type: Literal["pinhole"] = "pinhole"
+    transform: CameraTransform
+    vertical_fov: Number = Field(alias="verticalFov", gt=0, lt=180)
+    """Angle between the lower and the upper edge of the picture, degrees."""
+    film: Film
+    t_near: Positive = Field(1e-4, alias="tNear")
+    """Nothing nearer is seen."""
+    t_far: Positive = Field(1e10, alias="tFar")
+    """Nothing farther is seen."""
+    polarizer: Number | None = None
+    """An ideal linear polarizer over the lens, degrees: the direction that it lets through, counterclockwise from the
+    picture's horizontal. It halves light that is not polarized. Mitsuba's path tracer renders, in a polarized variant.
+    """
+    time_start: Number = Field(0.0, alias="timeStart")
+    """Without effect: nothing moves."""
+    time_end: Number = Field(0.0, alias="timeEnd")
+    """Without effect: nothing moves."""
+
+    @model_validator(mode="after")
+    def _depth_range(self) -> Camera:
+        if self.t_far <= self.t_near:
+            raise invalid(f"tFar {self.t_far:g} is not beyond tNear {self.t_near:g}", "swap or widen them", "tFar")
+        return self
+
+
+def integrators() -> Family[type[program.Integrator]]:
+    """The integrators, those of other packages too."""
+    from ..transport.integrators import Integrator
+
+    return Integrator.family
+
+
+def _list_integrators(schema: dict[str, Any]) -> None:
+    """The names in the JSON Schema, each with what it shows, and which of them need a depth."""
+    family = integrators()
+    names = [{"const": name, "description": title} for name, title in family.titles().items()]
+    schema["properties"]["type"] = {"oneOf": names, "title": "Type"}
+    deep = {"properties": {"type": {"enum": [name for name, member in family.all().items() if member.takes_depth]}}}
+    schema |= {"if": deep, "then": {"required": ["maxDepth"]}, "else": {"properties": {"maxDepth": False}}}
+
+
+class Integrator(Part):
+    """What the picture shows."""
+
+    model_config = ConfigDict(json_schema_extra=_list_integrators)
+
+    type: str
+    max_depth: Whole | None = Field(None, alias="maxDepth", ge=1, le=100_000)
+    """N means N - 1 shaded vertices: 1 shows lights only, 2 is direct light."""
+
+    @model_validator(mode="after")
+    def _known_type(self) -> Integrator:
+        known = integrators().all()
+        if self.type not in known:
+            raise invalid(f"unknown type '{self.type}'", did_you_mean(self.type, list(known)), "type")
+        if known[self.type].takes_depth and self.max_depth is None:
+            raise invalid("key 'maxDepth' is missing", 'add "maxDepth"')
+        if self.max_depth is not None and not known[self.type].takes_depth:
+            raise invalid(f"'{self.type}' takes no maxDepth", "remove it, or use path", "maxDepth")
+        return self
+
+
+class Rotation(Part):
+    """A rotation about an axis through the origin, counter-clockwise seen from the axis' tip."""
+
+    axis: Vector
+    radian: Number
+
+    @model_validator(mode="after")
+    def _has_an_axis(self) -> Rotation:
+        if not any(self.axis):
+            raise invalid("axis has length 0", "give a direction, e.g. [0, 1, 0]", "axis")
+        return self
+
+    def matrix(self) -> np.ndarray:
+        """Rodrigues' formula."""
+        x, y, z = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        return np.eye(3) + math.sin(self.radian) * cross + (1 - math.cos(self.radian)) * cross @ cross
+
+
+class Transform(Part):
+    """translate * rotate * scale: the scale is applied first."""
+
+    translate: Vector = (0.0, 0.0, 0.0)
+    rotate: Rotation | None = None
+    scale: Vector = (1.0, 1.0, 1.0)
+
+    @model_validator(mode="after")
+    def _keeps_volume(self) -> Transform:
+        # Below this a unit shape is smaller than what 32 bits resolve at a distance of 1, and its inverse overflows.
+        if min(abs(s) for s in self.scale) < 1e-12:
+            raise invalid(f"scale {list(self.scale)} flattens the shape", "use factors other than 0", "scale")
+        return self
+
+    def matrix(self) -> np.ndarray:
+        matrix = np.eye(4)
+        if self.rotate is not None:
+            matrix[:3, :3] = self.rotate.matrix() @ np.diag(self.scale)
+        elif self.scale != (1.0, 1.0, 1.0):
+            np.fill_diagonal(matrix[:3, :3], self.scale)
+        matrix[:3, 3] = self.translate
+        return matrix
+
+
+class ShapePart(Part):
+    """What all shapes share."""
+
+    material: Material | None = None
+    """Without one: matte, albedo 0.5."""
+    transform: Transform = Transform()
+
+
+class Sphere(ShapePart):
+    """u = atan2(x, z) / 2pi, v = angle from +y / pi."""
+
+    type: Literal["sphere"]
+    center: Vector
+    radius: Positive
+    """Not scaled by `transform`."""
+
+
+class Parallelogram(ShapePart):
+    """base + u edge0 + v edge1, u and v in [0, 1]; its normal is normalize(edge0 x edge1)."""
+
+    type: Literal["parallelogram"]
+    base: Vector
+    edge0: Vector
+    edge1: Vector
+
+    @model_validator(mode="after")
+    def _has_an_area(self) -> Parallelogram:
+        lengths = [float(np.linalg.norm(edge)) for edge in (self.edge0, self.edge1)]
+        for key, length in zip(("edge0", "edge1"), lengths, strict=True):
+            if length == 0:
+                raise invalid(f"{key} has length 0", "give two edges that span an area", key)
+        if np.linalg.norm(np.cross(self.edge0, self.edge1)) < 1e-6 * lengths[0] * lengths[1]:
+            raise invalid("edge0 and edge1 are parallel", "give two edges that span an area", "edge1")
+        return self
+
+
+class Cube(ShapePart):
+    """[-1, 1]^3. On the face across axis i, u runs along axis i + 1 and v along i + 2, from -1 to 1."""
+
+    type: Literal["cube"]
+
+
+def _turn(value: float) -> float:
+    if value > 2 * math.pi * (1 + 1e-3):  # room for 6.2832 and the like
+        raise invalid(f"phi_max {value:g} is more than a full turn", "give radians in (0, 2pi]")
+    return min(value, 2 * math.pi)
+
+
+Turn = Annotated[Positive, AfterValidator(_turn)]
+
+
+class Disk(ShapePart):
+    """In z = 0 with normal +z; u = phi / phi_max from +x toward +y, v from the rim inward."""
+
+    type: Literal["disk"]
+    radius: Positive = 1.0
+    inner_radius: NonNegative = 0.0
+    """Radius of the hole."""
+    phi_max: Turn = 2 * math.pi
+    """Angle of the sector, radians."""
+
+    @model_validator(mode="after")
+    def _has_an_area(self) -> Disk:
+        if self.inner_radius >= self.radius * (1 - 1e-6):
+            raise invalid(
+                f"inner_radius {self.inner_radius:g} leaves nothing of radius {self.radius:g}",
+                "make it smaller than radius",
+                "inner_radius",
+            )
+        return self
+
+
+class Cylinder(ShapePart):
+    """Stands from z = 0 to z = height, open at both ends; u = phi / phi_max, v = z / height."""
+
+    type: Literal["cylinder"]
+    radius: Positive = 1.0
+    height: Positive = 1.0
+    phi_max: Turn = 2 * math.pi
+    """Angle of the sector, radians."""
+
+
+class Cone(ShapePart):
+    """Base circle in z = 0, apex at z = height, open below; u = phi / phi_max, v = z / height."""
+
+    type: Literal["cone"]
+    radius: Positive = 1.0
+    height: Positive = 1.0
+    phi_max: Turn = 2 * math.pi
+    """Angle of the sector, radians."""
+
+
+class Mesh(ShapePart):
+    """Triangles from a file beside the scene: .obj or .ply. `triangle` is the lab's name for it."""
+
+    type: Literal["triangle", "mesh"]
+    file: str = Field(min_length=1)
+    """Texture coordinates are taken as they stand, v = 0 is the top of a texture; without normals it is faceted."""
+
+
+Shape = Annotated[Sphere | Parallelogram | Cube | Disk | Cylinder | Cone | Mesh, Field(discriminator="type")]
+
+
+class AreaLight(Part):
+    """A shape that emits the same radiance everywhere, in all directions, from both sides."""
+
+    type: Literal["areaLight"]
+    energy: Radiance
+    """Emitted radiance."""
+    shape: Shape
+
+
+class SpotLight(Part):
+    """A point that shines alike in all directions (the name is the lab's)."""
+
+    type: Literal["spotLight"]
+    position: Vector
+    energy: Radiance
+    """Intensity, W/sr."""
+
+
+class EnvironmentLight(Part):
+    """Light from everywhere: direction (sin t sin p, cos t, sin t cos p) sees u = p/2pi, v = t/pi."""
+
+    type: Literal["environmentLight"]
+    texture: Sky | None = None
+    """Radiance from an image or [r, g, b]."""
+    radiance: Radiance | None = None
+    """Radiance that is the same in all directions, in place of a texture."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> EnvironmentLight:
+        if (self.texture is None) == (self.radiance is None):
+            what = "key 'texture' is missing" if self.texture is None else "both 'texture' and 'radiance' are given"
+            raise invalid(what, "give one of texture, radiance")
+        return self
+
+
+LightSource = Annotated[AreaLight | SpotLight | EnvironmentLight, Field(discriminator="type")]
+
+
+class Contents(Part):
+    """What stands before the camera."""
+
+    acceleration: Literal["embree", "linear", "bvh", "octree"] = "embree"
+    """Without effect: there is one, and it is fast."""
+    shapes: list[Shape] = Field(default_factory=list)
+    lights: list[LightSource] = Field(default_factory=list)
+    ambient: Light | None = None
+    """Radiance Ia of the ambient light of the lab sheet's eq. 1, for materials with `ka`."""
+
+    @model_validator(mode="after")
+    def _one_environment(self) -> Contents:
+        if sum(isinstance(light, EnvironmentLight) for light in self.lights) > 1:
+            raise invalid("more than one environmentLight", "keep one", "lights")
+        return self
+
+
+class SceneDescription(Part):
+    """A scene in the lab's JSON format with Gonio's additions. `read` makes one; `build` renders from it."""
+
+    json_schema: str | None = Field(None, alias="$schema")
+    """For editors."""
+    output: Output
+    sampler: Sampler
+    camera: Camera
+    integrator: Integrator
+    contents: Contents = Field(alias="scene")
+    top_ambient: Light | None = Field(None, alias="ambient")
+    """The same as scene.ambient."""
+
+    _path: Path = PrivateAttr(default=Path("scene.json"))
+    _allow_outside: bool = PrivateAttr(default=False)
+    _warnings: list[str] = PrivateAttr(default_factory=list)
+    _raw: dict[str, Json] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _one_ambient(self) -> SceneDescription:
+        if self.top_ambient is not None and self.contents.ambient is not None:
+            raise invalid("both 'ambient' and 'scene.ambient' are given", "keep one", "ambient")
+        return self
+
+    @property
+    def spp(self) -> int:
+        """Samples per pixel."""
+        return self.sampler.spp
+
+    @property
+    def seed(self) -> int | None:
+        return self.sampler.seed
+
+    @property
+    def ambient(self) -> tuple[float, float, float] | None:
+        return self.top_ambient or self.contents.ambient
+
+    @property
+    def shapes(self) -> list[Shape]:
+        return self.contents.shapes
+
+    @property
+    def lights(self) -> list[LightSource]:
+        return self.contents.lights
+
+    @property
+    def path(self) -> Path:
+        """The scene file."""
+        return self._path
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the scene's files lie in."""
+        return self._path.parent
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is odd but usable, each with its place in the file."""
+        return list(self._warnings)
+
+    @property
+    def raw(self) -> dict[str, Json]:
+        """The file's JSON after overrides, as plain values."""
+        return self._raw
+
+    def where(self, pointer: str) -> str:
+        """A place in this scene's file, for messages."""
+        return f"{self._path}#{pointer}"
+
+    def locate(self, file: str, pointer: str) -> Path:
+        """The path of a file that the scene names. Raises InputError where it is missing or outside the folder."""
+        return located(file, self.folder, self.where(pointer), self._allow_outside)
+
+
+MATERIAL = "#/$defs/AnyMaterial"
+
+
+def json_schema() -> dict[str, Any]:
+    """The format as a JSON Schema (draft 2020-12), for editors and other checkers."""
+    parts = dict.fromkeys(BY_TYPE.values())
+    wanted: list[tuple[Any, Literal["validation"]]] = [(part, "validation") for part in (SceneDescription, *parts)]
+    references, pool = models_json_schema(wanted, by_alias=True)
+    definitions = pool["$defs"]
+    schema = definitions.pop(references[SceneDescription, "validation"]["$ref"].rpartition("/")[2])
+    material = any_material(references[part, "validation"] for part in parts)
+    schema["$defs"] = {**definitions, MATERIAL.rpartition("/")[2]: material}
+    schema = _finished(schema)
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["title"] = "Gonio scene"
+    return schema
+
+
+def _finished(schema: Any) -> Any:
+    """The schema without `null`, which stands for an absent key here and which the reader refuses in a file, and with
+    materials where they may stand."""
+    if isinstance(schema, list):
+        return [_finished(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if PLACEHOLDER.items() <= schema.items():
+        schema = {**{key: item for key, item in schema.items() if key not in PLACEHOLDER}, "$ref": MATERIAL}
+    options = [item for item in schema.get("anyOf", ()) if item != {"type": "null"}]
+    if len(options) == 1:
+        schema = {**{key: item for key, item in schema.items() if key != "anyOf"}, **options[0]}
+    return {key: _finished(item) for key, item in schema.items() if not (key == "default" and item is None)}

@@ -1,0 +1,100 @@
+"""Images that a scene names: bounded, decoded to linear float32, and handed to Mitsuba as textures."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import ModuleType
+
+import numpy as np
+
+from ..bridge.types import PluginDict
+from ..catalog import documents
+from ..errors import InputError
+from ..pictures import formats, images
+from ..pictures.images import RGB
+
+
+def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | None = None, inside: str = "") -> RGB:
+    """The image as float32 (height, width, 1 or 3), row 0 on top; 8-bit values as v/255, decoded where `srgb`.
+
+    channel  "r", "g", "b" or "a" alone; alpha is never decoded, and 1 where the image has none
+    inside   the number of the image, in a document that holds several
+    Raises InputError where the file is no image, claims more pixels than it can hold, or holds NaN.
+    """
+    name = path.name
+    if path.stat().st_size > formats.MOST_BYTES:
+        raise InputError(f"'{name}' is larger than {formats.MOST_BYTES >> 20} MiB", where, "scale it down")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"'{name}' cannot be read: {error.strerror or error}", where, "check the file") from None
+    with ExitStack() as stack:
+        if inside:
+            name, content = f"{name}#{inside}", _inside(path, inside)
+            path = Path(stack.enter_context(TemporaryDirectory())) / "image"  # Mitsuba reads files
+            path.write_bytes(content)
+        values, whole = _decoded(path, content, name, where)
+    if channel == "a":
+        values = values[..., -1:] if values.shape[2] in (2, 4) else np.ones_like(values[..., :1])
+    else:
+        values = values[..., :3] if values.shape[2] >= 3 else values[..., :1]  # without alpha
+        if whole and srgb:
+            values = images.from_screen(values)
+        if channel is not None and values.shape[2] == 3:
+            values = values[..., ["rgb".index(channel)]]
+    values = np.ascontiguousarray(values, np.float32)
+    if not np.isfinite(values).all():
+        row, column = np.argwhere(~np.isfinite(values))[0][:2]
+        raise InputError(f"'{name}' is not finite at row {row}, column {column}", where, "mend the image")
+    return values
+
+
+def _inside(path: Path, index: str) -> bytes:
+    found = documents.parted(str(path))
+    assert found is not None, "the name says so"
+    return found[0].image(path, index)
+
+
+def _decoded(path: Path, content: bytes, name: str, where: str) -> formats.Decoded:
+    kind = formats.kind_of(content)
+    if kind is None:
+        raise InputError(f"'{name}' is no image that can be read", where, "use .png, .jpg, .exr or .hdr")
+    try:
+        return formats.decode(path, content, kind)
+    except formats.Unreadable as error:
+        raise InputError(f"'{name}' cannot be decoded: {error}", where, "save it again") from None
+
+
+def bitmap(mi: ModuleType, values: RGB, filter_type: str, wrap: str) -> PluginDict:
+    """A Mitsuba texture of values that are linear already. v = 0 is the top row there too."""
+    # With `raw` a colour reaches the material as it stands; spectral variants must make a spectrum of it.
+    raw = values.shape[2] == 1 or not mi.variant().endswith("spectral")
+    return {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(np.array(values, np.float32, order="C")),
+        "raw": raw,
+        "filter_type": filter_type,
+        "wrap_mode": wrap,
+    }
+
+
+def environment(mi: ModuleType, values: RGB) -> PluginDict:
+    """An environment from an image in which direction (sin t sin p, cos t, sin t cos p) is u = p/2pi, v = t/pi.
+
+    Mitsuba's `envmap` differs in two ways. It runs the other way round, (sin p, -cos p): mirrored left to right, and
+    turned by half a turn. And its rows lie at v = j/(h - 1), the poles included, not at (j + .5)/h: the rows are laid
+    out at twice the density, row 2j + 1 being row j, those between them means. A mean lies on the line between its
+    neighbours, so that linear interpolation is unchanged.
+    """
+    values = np.broadcast_to(values, (*values.shape[:2], 3))
+    rows = np.empty((2 * values.shape[0] + 1, values.shape[1], 3), np.float32)
+    rows[1::2] = values
+    rows[2:-1:2] = (values[1:] + values[:-1]) / 2
+    rows[0], rows[-1] = values[0], values[-1]
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(np.array(np.maximum(rows[:, ::-1], 0), order="C")),
+        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180.0),
+    }

@@ -1,0 +1,6 @@
+"""Shader code written from the models' own source. `go.emit(model)` is `bundle.emit`."""
+
+from .bundle import Bundle, bundle, emit
+from .languages import Language
+
+__all__ = ["Bundle", "Language", "bundle", "emit"]

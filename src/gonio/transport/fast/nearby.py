@@ -1,0 +1,83 @@
+"""Which of many lamps to look at, from where one is.
+
+The scene's box is cut into cells. For each there is a table of the lamps by the light that they would send there with
+nothing in between, so that distance and orientation count; a part of the choice is even.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import ModuleType
+
+import drjit as dr
+import numpy as np
+
+from ...bridge import engine
+from ...bridge.types import Emitter, Float, Mask, Point, Scene, UInt
+from ..lights.sky import Choice
+
+CELLS = 8  # a side, at most
+MOST = 1 << 21  # numbers of a table
+POINTS = 4  # of a cell, at which lamps are looked at
+EVEN = 0.25  # of the choice, or one over their number: of a lamp and a sky each gets a quarter of the samples at least
+
+
+class Nearby:
+    """Probabilities of lamps, cell by cell."""
+
+    def __init__(self, mi: ModuleType, scene: Scene, emitters: Sequence[Emitter]) -> None:
+        self.mi, count = mi, len(emitters)
+        self.columns = 1 << (count - 1).bit_length()
+        self.cells = CELLS
+        while self.cells > 1 and self.cells**3 * self.columns > MOST:
+            self.cells //= 2
+        box = scene.bbox()
+        low, size = (
+            (mi.Point3f(box.min), mi.Vector3f(box.extents())) if box.valid() else (mi.Point3f(0), mi.Vector3f(1))
+        )
+        self._low, self._scale = low, self.cells / dr.maximum(size, 1e-6)
+        dr.make_opaque(self._low, self._scale)
+        n = self.cells**3
+        index = dr.arange(mi.UInt32, n * POINTS)
+        cell = index // POINTS
+        corner = mi.Point3f(cell % self.cells, (cell // self.cells) % self.cells, cell // self.cells**2)
+        # multiples of the plastic number's kin mod 1 (R3 sequence, M. Roberts): even, and the same every time
+        inside = mi.Point3f(*(_fraction(mi.Float(index) * a) for a in (0.8191725, 0.6710436, 0.5497005)))
+        it = dr.zeros(mi.SurfaceInteraction3f, n * POINTS)
+        it.p = self._low + (corner + inside) / self._scale
+        if mi.is_spectral:
+            it.wavelengths = type(it.wavelengths)(550)
+        u = mi.Point2f(_fraction(mi.Float(index) * 0.7548777), _fraction(mi.Float(index) * 0.5698403))
+        table = np.zeros((n, self.columns))
+        for place, emitter in enumerate(emitters):
+            weight = dr.mean(emitter.sample_direction(it, u, True)[1], axis=0)
+            light = np.broadcast_to(np.array(weight, np.float64), n * POINTS)
+            table[:, place] = np.where(np.isfinite(light) & (light > 0), light, 0).reshape(n, POINTS).mean(1)
+        total = table.sum(1, keepdims=True)
+        table[:, :count] = np.where(total > 0, table[:, :count] / np.maximum(total, 1e-300), 1 / count)
+        even = max(EVEN, 1.0 / count)
+        table[:, :count] = (1.0 - even) * table[:, :count] + even / count
+        sums = np.cumsum(table, axis=1)
+        sums[:, count - 1 :] = 1.0
+        self._chance = engine.own(mi.Float, table.ravel().astype(np.float32))
+        self._choice = Choice(mi, sums)
+
+    def _row(self, p: Point) -> UInt:
+        mi = self.mi
+        at = [dr.clip((p[i] - self._low[i]) * self._scale[i], 0.0, self.cells - 1.0) for i in range(3)]
+        x, y, z = (mi.UInt32(v) for v in at)
+        return x + self.cells * (y + self.cells * z)
+
+    def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
+        """(number of a lamp, what is left of `u`, in [0, 1], the lamp's probability)."""
+        row = self._row(p)
+        index, left = self._choice.of(row, u)
+        return index, left, dr.gather(self.mi.Float, self._chance, row * self.columns + index)
+
+    def probability(self, p: Point, index: UInt, active: Mask) -> Float:
+        """That `choose` gives this lamp."""
+        return dr.gather(self.mi.Float, self._chance, self._row(p) * self.columns + index, active)
+
+
+def _fraction(x: Float) -> Float:
+    return x - dr.floor(x)

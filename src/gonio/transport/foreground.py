@@ -1,0 +1,116 @@
+"""Surfaces without their background: radiance and coverage, for comparing with a picture that a GPU draws.
+
+    >>> render = Foreground(balls, Settings("direct"), lights=lamps)
+    >>> render.advance(16)
+    >>> render.image()              # (height, width, 4): light of the surfaces alone, and the share of the pixel
+
+The lights may stand in a scene of their own. Then each point of a surface sees all of them with nothing in between: no
+shadow ray is traced, and no surface lights another. That is what a shader computes that knows one point, and it is
+physically what would be seen if every surface stood alone and were convex.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from types import ModuleType
+from typing import ClassVar
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bridge.types import Float, Mask, Point, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
+from ..errors import InputError
+from .integrators import Integrator, Render, Settings, Transport
+from .integrators.transport import PathState
+from .lights.lights import Lights
+
+
+class Foreground(Render):
+    """A render whose camera sees surfaces only, neither lights nor environment.
+
+    scene   the surfaces
+    lights  a scene that holds the lights alone; None where they stand among the surfaces, with all shadows
+    """
+
+    features = 1
+
+    def __init__(self, scene: Scene, settings: Settings, sensor: Sensor | None = None, lights: Scene | None = None):
+        program = settings.program
+        if not issubclass(program, Transport):
+            raise InputError(f"'{settings.integrator}' shows no light", "integrator", "give one that does")
+        if lights is not None and program.depth(settings) > 2:
+            raise InputError("paths meet other surfaces", "integrator", "give direct, or put the lights in the scene")
+        self._surfaces = type("Surfaces", (_Surfaces, program), {"apart": lights})
+        super().__init__(scene, settings, sensor)
+
+    def _program(self) -> Integrator:
+        return self._surfaces(self.mi, self.scene, self.sensor, self.settings, aovs=False)
+
+    def image(self) -> NDArray[np.float32]:
+        """(height, width, 4) float32: linear RGB, averaged over the whole pixel, and coverage; row 0 on top."""
+        return self._mean([*self._sums.radiance, *self._sums.features])
+
+
+class _Surfaces(Transport):
+    """What `Foreground` changes in an integrator; `apart` is the scene of the lights, where they have their own."""
+
+    apart: ClassVar[Scene | None] = None
+
+    def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
+        super().__init__(mi, scene, sensor, settings, aovs)
+        if self.apart is not None:
+            self.lights = _Transparent(mi, self.apart)
+
+    def first(self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True) -> PathState:
+        """As the base's, for lanes that meet a surface."""
+        path = super().first(pixel, key, index, begins)
+        return dataclasses.replace(path, active=path.hit.is_valid())
+
+    def extend(self, path: PathState, key: UInt, first: bool = False) -> tuple[PathState, list[Float]]:
+        """As the base's; the feature is 1 where there is a surface."""
+        following, _ = super().extend(path, key, first)
+        return following, [dr.select(path.active, self.mi.Float(1), 0)]
+
+    def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
+        """All lights are in sight where they stand apart."""
+        return active if self.apart is not None else super().unoccluded(si, point, active)
+
+
+class _Transparent(Lights):
+    """Lights that do not hide each other: a ray meets every lamp on its way, and the environment behind them.
+
+    Light sampling traces no shadow ray here, so what a sampled direction finds must not be hidden either.
+    """
+
+    def last_hit(
+        self, ray: Ray, solid_angle: Float, active: Mask, weigh: Callable[[Radiance, Float], Radiance]
+    ) -> Radiance:
+        """The sum over all lights on the ray, each weighed with its own density."""
+        if self.rectangle is not None or self.count == 0:
+            return super().last_hit(ray, solid_angle, active, weigh)
+        mi, origin = self.mi, ray.o
+        found, still = mi.Spectrum(0), active
+        for _ in self.scene.shapes():
+            si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, still)
+            still = still & si.is_valid()
+            found += self._arriving(origin, si, solid_angle, still, weigh)
+            ray = si.spawn_ray(ray.d)
+        if self.has_environment:
+            beyond = dr.zeros(mi.SurfaceInteraction3f)
+            beyond.t, beyond.wi, beyond.wavelengths = dr.inf, -ray.d, ray.wavelengths
+            found += self._arriving(origin, beyond, solid_angle, active, weigh)
+        return found
+
+    def _arriving(
+        self,
+        origin: Point,
+        si: SurfaceInteraction,
+        solid_angle: Float,
+        active: Mask,
+        weigh: Callable[[Radiance, Float], Radiance],
+    ) -> Radiance:
+        radiance = dr.select(active, self.emitted(si, active), 0)
+        pdf = self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
+        return dr.select(active, weigh(radiance, pdf), 0)

@@ -1,0 +1,15 @@
+"""Shading normals."""
+
+from __future__ import annotations
+
+from ...bridge.types import Colour, SurfaceInteraction, UInt
+from .base import Integrator
+
+
+class Normal(Integrator):
+    """The shading normal as a colour, (n + 1) / 2; black where nothing is hit."""
+
+    name = "normal"
+
+    def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Colour:
+        return (si.sh_frame.n + 1) * 0.5

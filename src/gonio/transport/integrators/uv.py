@@ -1,0 +1,15 @@
+"""Surface parameters."""
+
+from __future__ import annotations
+
+from ...bridge.types import Colour, SurfaceInteraction, UInt
+from .base import Integrator
+
+
+class UV(Integrator):
+    """The surface parameters as a colour, (u, v, 0)."""
+
+    name = "uv"
+
+    def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Colour:
+        return self.mi.Color3f(si.uv.x, si.uv.y, 0)

@@ -1,0 +1,1 @@
+"""Light sources: sampling, densities and emission."""

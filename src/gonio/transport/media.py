@@ -1,0 +1,141 @@
+"""What light passes through between surfaces: absorption, and which of several media that overlap is there.
+
+By Schmidt2002 every medium has a priority, and where several overlap the highest counts: water that reaches a little
+into the glass around it has no surface there. Only a surface between the highest on both sides is one; through any
+other light goes straight on. Of equal priorities the material that the scene names first counts as the higher.
+
+A path carries how often it is inside of each medium, four bits each in one number, in the order of priorities: so the
+highest medium is where the number's highest bit stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import ModuleType
+from typing import NamedTuple
+
+import drjit as dr
+import numpy as np
+
+from ..bridge.types import Float, Mask, MitsubaBSDF, Point, Radiance, Scene, SurfaceInteraction, UInt
+from ..errors import InputError
+from ..material.bsdf import Interior
+
+MOST = 8  # media, four bits each in 32
+CROSSINGS = 256  # on the way out of the scene, from where a camera stands
+
+
+class Crossing(NamedTuple):
+    """What a path meets at a surface.
+
+    here     the path's media before it, and beyond the surface
+    beyond
+    surface  whether there is one: else light goes straight on
+    outer    index of what the surface's own medium borders on
+    """
+
+    here: UInt
+    beyond: UInt
+    surface: Mask
+    outer: Float
+
+
+class Media:
+    """The media of a scene, where any of them absorbs or has a priority; else none are known, and nothing is asked."""
+
+    def __init__(self, mi: ModuleType, scene: Scene):
+        self.mi, self.scene = mi, scene
+        found = list(_interiors(scene))
+        plain = [(bsdf, bsdf.placed.model.interior) for bsdf in found]
+        self.known = any(np.any(np.asarray(i.absorption) > 0) or np.any(np.asarray(i.priority) != 0) for _, i in plain)
+        if not self.known:
+            return
+        if len(found) > MOST:
+            what = f"{len(found)} transparent materials, {MOST} at most where one absorbs or has a priority"
+            raise InputError(what, "absorption, priority", "give shapes the same material")
+        order = sorted(range(len(found)), key=lambda i: (float(np.max(np.asarray(plain[i][1].priority))), -i))
+        self.bsdfs = [found[i] for i in order]
+        numbers = [int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0]) for bsdf in self.bsdfs]
+        place = np.full(max([*numbers, *_pointers(mi, scene)]) + 1, MOST, np.uint32)
+        place[numbers] = np.arange(len(numbers))
+        self.place = mi.UInt32(place)
+        dr.make_opaque(self.place)
+
+    def around(self, point: Point) -> UInt:
+        """The media that a point lies in, found by what a ray from there leaves without having entered it."""
+        mi, depth, inside = self.mi, [0] * MOST, [0] * MOST
+        ray = mi.Ray3f(point, dr.normalize(mi.Vector3f(0.29, 0.83, 0.47)))
+        for _ in range(CROSSINGS):
+            si = self.scene.ray_intersect(ray)
+            if not dr.any(si.is_valid()):
+                break
+            number = int(self._number(si.bsdf(ray))[0])
+            if number < MOST:
+                depth[number] += 1 if si.wi.z[0] > 0.0 else -1
+                inside[number] = max(inside[number], -depth[number])
+            ray = si.spawn_ray(ray.d)
+        packed = sum(min(count, 15) << (4 * number) for number, count in enumerate(inside))
+        return dr.opaque(mi.UInt32, packed)
+
+    def crossing(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, inside: UInt, active: Mask) -> Crossing:
+        """What it means to meet a surface while inside of these media."""
+        mi = self.mi
+        number = self._number(bsdf, active)
+        medium = active & (number < MOST)
+        one = mi.UInt32(1) << (4 * dr.minimum(number, MOST - 1))
+        entering = si.wi.z > 0.0
+        counted = (inside & (15 * one)) != 0  # else the path began in there, or the surface is an open one
+        others = dr.select(entering | ~counted, inside, inside - one)
+        beyond = dr.select(medium, dr.select(entering, inside + one, others), inside)
+        surface = ~medium | (others < one)  # all others are lower
+        return Crossing(inside, beyond, surface, self.eta(others, si))
+
+    def eta(self, inside: UInt, si: SurfaceInteraction) -> Float:
+        """The index of the highest of these media; 1 outside of all."""
+        value = self.mi.Float(1.0)
+        for here, interior in self._each(inside, si):
+            value = dr.select(here, interior.eta, value)
+        return value
+
+    def absorption(self, inside: UInt, si: SurfaceInteraction) -> Radiance:
+        """Light lost per unit length in the highest of these media."""
+        value = self.mi.UnpolarizedSpectrum(0.0)
+        for here, interior in self._each(inside, si):
+            value = dr.select(here, interior.absorption, value)
+        return value
+
+    def transmitted(self, inside: UInt, si: SurfaceInteraction, length: Float) -> Radiance:
+        """What arrives after a length in the highest of these media: exp(-absorption length) (Beer and Lambert)."""
+        loss = self.absorption(inside, si)
+        return self.mi.Spectrum(dr.select(loss > 0.0, dr.exp(-loss * length), 1.0))
+
+    def _each(self, inside: UInt, si: SurfaceInteraction) -> Iterator[tuple[Mask, Interior]]:
+        """Each medium, and where it is the highest."""
+        for number, bsdf in enumerate(self.bsdfs):
+            lowest = 1 << (4 * number)
+            here = (inside >= lowest) & ((inside >> (4 * number)) <= 15)
+            interior = bsdf.placed.at(si, True, separates=True).interior
+            assert interior is not None, "only materials that have one are kept"
+            yield here, interior
+
+    def _number(self, bsdf: MitsubaBSDF, active: Mask = True) -> UInt:
+        """The place of a surface's material in the order of priorities, MOST for one without an inside."""
+        return dr.gather(self.mi.UInt32, self.place, dr.reinterpret_array(self.mi.UInt32, bsdf), active)
+
+
+def _interiors(scene: Scene) -> Iterator[MitsubaBSDF]:
+    """The plugins of Gonio's that light enters, each once, in the order of the scene."""
+    seen: set[int] = set()
+    for shape in scene.shapes():
+        bsdf = shape.bsdf()
+        placed = getattr(bsdf, "placed", None)
+        if placed is None or id(bsdf) in seen:
+            continue
+        seen.add(id(bsdf))
+        if placed.model.transmits and placed.model.interior is not None:
+            yield bsdf
+
+
+def _pointers(mi: ModuleType, scene: Scene) -> list[int]:
+    """What kernels hold in place of each material."""
+    return [int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(shape.bsdf()))[0]) for shape in scene.shapes()]

@@ -1,0 +1,83 @@
+"""A scene rendered by one of Mitsuba's own integrators, in passes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bridge.types import Plugin, Scene
+from ..work import garbage
+from .passes import power_of_two
+
+# Samples in flight of Mitsuba's own integrators, which hold one in each lane: half a second or so on a CPU.
+WAVEFRONT = 1 << 21
+
+
+class MitsubaRender:
+    """A Mitsuba scene by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
+
+    The picture depends on the seed and the film, not on the clock, up to the last bit: Mitsuba's film adds up with
+    atomics, in an order of their own. A sampler that needs a square number of
+    samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
+    """
+
+    def __init__(
+        self,
+        mi: ModuleType,
+        scene: Scene,
+        spp: int,
+        seed: int = 0,
+        integrator: Plugin = None,
+        wavefront: int | None = None,
+    ) -> None:
+        self._mi, self._scene, self._seed = mi, scene, seed
+        self._integrator = scene.integrator() if integrator is None else integrator
+        self._sensor = scene.sensors()[0]
+        width, height = self._sensor.film().crop_size()
+        self.pass_size = min(spp, power_of_two(max(1, (wavefront or WAVEFRONT) // (int(width) * int(height)))))
+        self._sum: NDArray[np.float64] | None = None
+        self._passes = 0
+        self.done = 0
+
+    def advance(self, count: int) -> None:
+        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
+        picture = self._render(self._integrator, count, seed)
+        taken = int(self._sensor.sampler().sample_count())
+        # In float64: a sum of thousands of float32 passes would lose digits.
+        weighted = picture.astype(np.float64) * taken
+        self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
+        self._passes += 1
+        self.done += taken
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """The sum so far, and which passes it is of."""
+        assert self._sum is not None, "advance() comes first"
+        return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError for another film."""
+        width, height = self._sensor.film().crop_size()
+        if "sum" not in state or "passes" not in state or state["sum"].shape[:2] != (int(height), int(width)):
+            raise ValueError("no sum of this film")
+        self._sum, (self._passes, self.pass_size) = state["sum"], map(int, state["passes"])
+        self.done = done
+
+    def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:
+        with garbage.kept():
+            tensor = self._mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
+            return np.array(tensor, dtype=np.float32)
+
+    def image(self) -> NDArray[np.float32]:
+        assert self._sum is not None, "advance() comes first"
+        mean = (self._sum / self.done).astype(np.float32)
+        return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
+
+    def aov(self) -> dict[str, NDArray[np.float32]]:
+        """Guides for the denoiser: 16 samples see every surface of a pixel that matters to an edge."""
+        aovs = self._mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
+        channels = self._render(aovs, 16, self._seed)[..., -6:]
+        return {"albedo": channels[..., :3], "normal": channels[..., 3:]}

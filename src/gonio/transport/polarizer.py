@@ -1,0 +1,71 @@
+"""A scene through a polarizer: Mitsuba's path tracer with Mueller matrices, and what the filter lets through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bridge import engine
+from ..bridge.types import Scene
+from ..errors import InputError
+from .integrators import Settings
+from .mitsuba_render import MitsubaRender
+
+# A vertex multiplies two matrices of 4 x 4 spectra: what is in flight is sixteen times as large as without
+WAVEFRONT = 1 << 19
+
+TRACED = ("path", "direct")  # the integrators that Mitsuba's path tracer stands for
+
+
+class PolarizedRender(MitsubaRender):
+    """A picture of the light that passes a linear polarizer.
+
+    The Stokes vector of each pixel is gathered, with Q > 0 along the picture's horizontal and U > 0 halfway to its
+    vertical. A filter that is turned by theta then lets (I + Q cos 2 theta + U sin 2 theta) / 2 through (Born1999).
+
+    degrees  the direction that the polarizer lets through, counterclockwise from the picture's horizontal
+    """
+
+    def __init__(self, mi: ModuleType, scene: Scene, spp: int, settings: Settings, degrees: float) -> None:
+        depth = settings.program.depth(settings)  # type: ignore[attr-defined]  # of all in TRACED
+        stokes = {"type": "stokes", "nested": {"type": "path", "max_depth": depth}}
+        super().__init__(mi, scene, spp, settings.seed, mi.load_dict(stokes), WAVEFRONT)
+        self._variant, self._angle = str(mi.variant()), np.radians(degrees)
+
+    def advance(self, count: int) -> None:
+        with engine.using(self._variant):
+            super().advance(count)
+
+    def image(self) -> NDArray[np.float32]:
+        intensity, Q, U = (self.stokes[..., part, :] for part in range(3))
+        seen = 0.5 * (intensity + np.cos(2.0 * self._angle) * Q + np.sin(2.0 * self._angle) * U)
+        return seen.astype(np.float32)
+
+    @property
+    def stokes(self) -> NDArray[np.float64]:
+        """I, Q, U and V of each pixel, (height, width, 4, 3), linear RGB."""
+        assert self._sum is not None, "advance() comes first"
+        mean = self._sum / self.done
+        return mean[..., 3:15].reshape(*mean.shape[:2], 4, 3)  # behind the picture itself
+
+    def aov(self) -> dict[str, NDArray[np.float32]]:
+        with engine.using(self._variant):
+            return super().aov()
+
+    def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
+        super().restore(done, state)
+        if self._sum is not None and self._sum.shape[2] != 15:
+            raise ValueError("no sum of Stokes vectors")
+
+
+def check(settings: Settings, where: str) -> None:
+    """Raise InputError for a picture that a polarizer cannot be laid over."""
+    if settings.integrator not in TRACED:
+        what = f"a polarizer, and the integrator '{settings.integrator}', which follows no polarized light"
+        raise InputError(what, where, "take " + " or ".join(TRACED))
+    if settings.ambient is not None and any(settings.ambient):
+        raise InputError("a polarizer, and ambient light, which has no polarization", where, "remove one of them")

@@ -1,0 +1,1 @@
+"""What explains a failed law: ratios, factors, causes, diagnosis and reproduction."""

@@ -1,0 +1,138 @@
+"""A ratio of two values that should be one, and what can be read from it: `factors` says what it may be, `causes` what
+that means.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..subject import Subject
+
+SPREAD = 1e-3  # largest 5..95 % spread of a ratio that is called clean
+COVER = 0.97  # share of the pairs that must follow
+
+# (subject, wo, wi): the denominator of a ratio, of another subject or with other arguments
+Denominator: TypeAlias = "Callable[[Subject, np.ndarray, np.ndarray, str], np.ndarray]"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cause:
+    """A probable cause.
+
+    words   what it looks like, as a sentence of the report
+    key     the same without figures: failures with one key have one cause
+    """
+
+    words: str
+    key: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Ratio:
+    """Two values that should be one, over pairs of directions.
+
+    top, bottom    their names, "weight x pdf" and "eval"
+    wo, wi         (N, 3)
+    above, below   the values, (N, channels)
+    again          computes `below` anew for another subject, other directions or the other mode
+    numbers        constants that this ratio may be, beside the usual ones: "2 alpha"
+    zero           what a ratio of 0 suggests
+    antisymmetric  whether exchanging wo and wi inverts the ratio: what two directions share cancels
+    """
+
+    top: str
+    bottom: str
+    wo: np.ndarray
+    wi: np.ndarray
+    above: np.ndarray
+    below: np.ndarray
+    subject: Subject
+    again: Denominator | None = None
+    antisymmetric: bool = False
+    numbers: dict[str, float] = dataclasses.field(default_factory=dict)
+    zero: str = "a value that never arrives"
+
+    @property
+    def name(self) -> str:
+        return f"the ratio of {self.top} to {self.bottom}"
+
+    def take(self, rows: np.ndarray, channels: np.ndarray | None = None) -> Ratio:
+        """The same over some pairs, and some channels."""
+        above, below = self.above[rows], self.below[rows]
+        if channels is not None:
+            above, below = above[:, channels], below[:, channels]
+        return dataclasses.replace(self, wo=self.wo[rows], wi=self.wi[rows], above=above, below=below)
+
+
+class Fit(NamedTuple):
+    """What a ratio is: as a formula, what that suggests, and how well it holds; of a constant, the constant."""
+
+    formula: str
+    guess: str
+    spread: float
+    cover: float
+    number: float | None = None
+
+
+# what numbers are written as, and what leaves them behind
+NUMBERS = {
+    "pi": np.pi,
+    "2 pi": 2.0 * np.pi,
+    "4 pi": 4.0 * np.pi,
+    "pi^2": np.pi**2,
+    "2": 2.0,
+    "3": 3.0,
+    "4": 4.0,
+    "8": 8.0,
+    "16": 16.0,
+    "sqrt 2": np.sqrt(2.0),
+}
+NUMBERS |= {f"1 / {f'({name})' if ' ' in name else name}": 1.0 / value for name, value in NUMBERS.items()}
+NUMBERS |= {"4 / pi": 4.0 / np.pi, "pi / 4": np.pi / 4.0, "2 / pi": 2.0 / np.pi, "pi / 2": np.pi / 2.0}
+
+
+def written(value: float, allowed: float = SPREAD) -> str:
+    """A number as a formula where it is a known one, else in digits."""
+    for name, known in NUMBERS.items():
+        if abs(value / known - 1.0) < allowed:
+            return name
+    return f"{value:.5g}"
+
+
+def factor_key(number: float) -> str:
+    """One key for a factor and its inverse: which of two values lacks it, the ratio does not say."""
+    return f"factor {max(number, 1.0 / number):.3g}" if number > 0.0 else f"factor {number:.3g}"
+
+
+def tolerance(ratio: Ratio) -> float:
+    """What two values may differ by and still be the same."""
+    return 1e-5 if ratio.subject.best == "float64" else 5e-3
+
+
+def scalar(ratio: Ratio) -> np.ndarray | None:
+    """One number a pair (N,), where all channels have the same ratio; None where they have not."""
+    lit = np.abs(ratio.below) > 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
+    r = np.divide(ratio.above, ratio.below, out=np.full_like(ratio.above, np.nan), where=lit)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows in which nothing is lit stay no number
+        middle = np.nanmedian(r, axis=1)
+        spread = np.nanmax(np.abs(r - middle[:, None]), axis=1)
+    apart = ~(spread <= max(SPREAD, tolerance(ratio)) * np.abs(middle))
+    return middle if apart.mean() < 1.0 - COVER else None
+
+
+def holds(ratio: Ratio, quotient: np.ndarray) -> tuple[float, float] | None:
+    """(spread, cover) of values that should be 1; None where they are not, cleanly."""
+    allowed = max(SPREAD, tolerance(ratio))
+    good = np.isfinite(quotient)
+    cover = float(np.mean(good & (np.abs(quotient - 1.0) < allowed)))
+    if cover < COVER:
+        return None
+    low, high = np.percentile(quotient[good], [5.0, 95.0])
+    return (float(high - low), cover) if high - low < allowed else None

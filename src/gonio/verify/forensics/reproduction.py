@@ -1,0 +1,256 @@
+"""A failure of a Mitsuba plugin as a program of a few lines that needs Mitsuba alone: for its authors to run.
+
+The program ends with an AssertionError, which says by how much, for as long as the fault is there.
+
+    script("energy", subject, finding)     "" where the BSDF is no plugin of Mitsuba's own, or nothing of it is known
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from .. import directions
+from ..figures import SampleCells
+from ..laws.base import where_found
+from ..subject import Subject
+from ..verdict import Finding
+from . import crowding
+
+HEAD = """import drjit as dr
+import mitsuba as mi
+
+mi.set_variant("llvm_ad_rgb")
+bsdf = mi.load_dict({plugin})
+n = 1 << 24
+si, ctx, rng = dr.zeros(mi.SurfaceInteraction3f, n), mi.BSDFContext(), mi.PCG32(n)
+si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1], [0.5, 0.5]
+si.dp_du, si.dp_dv, si.t, si.prim_index = [1, 0, 0], [0, 1, 0], 1, 0
+si.wi = {wo}
+"""
+# a grid of directions that is finer towards the horizon, and the solid angle of each
+GRID = """i = dr.arange(mi.UInt32, n)
+t, phi = (mi.Float(i >> 12) + 0.5) / 2048 - 1, (mi.Float(i & 4095) + 0.5) * (dr.pi / 2048)
+z = t * dr.abs(t)
+wo, area = mi.Vector3f(*(dr.sqrt(1 - z * z) * v for v in (dr.cos(phi), dr.sin(phi))), z), 8 * dr.pi * dr.abs(t) / n
+"""
+SAMPLE = "bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
+
+
+def script(law: str, subject: Subject, finding: Finding) -> str:
+    """The program for a law's finding."""
+    make = MAKERS.get(law)
+    there = where_found(subject, finding)
+    if make is None or getattr(there.model, "plugin", None) is None:
+        return ""
+    return make(there, finding)
+
+
+def _head(subject: Subject, wo: np.ndarray) -> str:
+    return HEAD.format(plugin=_literal(subject.model.plugin), wo=_vector(wo))
+
+
+def _vector(w: np.ndarray) -> str:
+    return f"mi.Vector3f({', '.join(f'{x:.9g}' for x in np.asarray(w, float))})"
+
+
+def _literal(value: object) -> str:
+    """A property of a plugin as Python writes it."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(name)}: {_literal(one)}" for name, one in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_literal(one) for one in value) + "]"
+    if isinstance(value, float | int | str):
+        return json.dumps(value) if isinstance(value, str) else f"{value!r}"
+    if type(value).__name__ == "Bitmap":
+        pixels = np.asarray(value, dtype=np.float32)
+        numbers = ", ".join(f"{float(x):.4g}" for x in pixels.ravel())
+        return f"mi.Bitmap(mi.TensorXf([{numbers}], {pixels.shape}))"
+    return str(value)
+
+
+# --------------------------------------------------------------------------- one a law
+
+
+def _energy(subject: Subject, finding: Finding) -> str:
+    """What it reflects, by a grid of directions; and where that is no gain, what its samples say."""
+    from ..laws.energy import white_twin
+
+    mode = "ctx.mode = mi.TransportMode.Importance  # power, without the factor eta^2 of radiance\n"
+    curves = finding.evidence
+    wo, gain = curves.wo, curves.quadrature.max(1)  # type: ignore[union-attr]
+    if finding.figure > finding.tolerance:
+        white = white_twin(subject) if finding.worst.startswith("white furnace") else None
+        furnace = curves.furnace.max(1) if white is not None else gain  # type: ignore[union-attr]
+        row = int(np.argmax(furnace))
+        text = _head(white or subject, wo[row]) + (mode if subject.transmits else "")
+        if subject.model.delta == "never":
+            text += GRID + "albedo = dr.max(dr.sum(bsdf.eval(ctx, si, wo) * area, axis=1))\n"
+        else:  # a delta lobe has no values
+            text += SAMPLE + "albedo = dr.max(dr.mean(weight, axis=1))\n"
+        return text + (
+            f'assert albedo < {1.0 + 0.5 * (furnace[row] - 1.0):.5g}, f"reflects {{albedo}} times the light it gets"\n'
+        )
+    off = np.abs(curves.quadrature - curves.sampling).mean(1)  # type: ignore[union-attr]
+    row = int(np.argmax(off))
+    text = _head(subject, wo[row]) + (mode if subject.transmits else "") + GRID + SAMPLE
+    return text + (
+        "values, samples = dr.sum(bsdf.eval(ctx, si, wo) * area, axis=1), dr.mean(weight, axis=1)\n"
+        f"assert dr.all(dr.abs(values - samples) < {0.5 * off[row]:.2g}), "
+        'f"values reflect {values}, samples {samples}"\n'
+    )
+
+
+def _pdf(subject: Subject, finding: Finding) -> str:
+    """The share of samples that the pdf claims somewhere, against those that fall there."""
+    cells = finding.evidence
+    if not isinstance(cells, SampleCells) or cells.wo is None:
+        return ""
+    claimed, found = cells.expected / cells.drawn, cells.observed / cells.drawn
+    sides = [(f"{{}}.z {'>' if side > 0 else '<'} 0", k) for k, side in enumerate(cells.sides)]
+    places = {"True": float(claimed.sum() - found.sum())}
+    places |= {where: float(claimed[k].sum() - found[k].sum()) for where, k in sides}
+    where, off = max(places.items(), key=lambda item: abs(item[1]))
+    held = crowding.blocks(cells)
+    if held is not None and abs(off) < 2e-3:  # nothing as a whole: the cap in which most is missing
+        expected = held.joined(held.expected) / held.drawn
+        middle = np.stack([held.joined(held.wi[:, k] * held.expected) for k in range(3)], -1)
+        middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)
+        for cosine in (0.9999, 0.999, 0.99, 0.95, 0.8):
+            near = (middle @ middle.T > cosine) @ (expected - held.seen / held.drawn)
+            row = int(np.argmax(np.abs(near)))
+            if abs(near[row]) > 1.2 * abs(off):
+                where, off = f"dr.dot({{}}, {_vector(middle[row])}) > {cosine}", float(near[row])
+    text = _head(subject, cells.wo) + GRID + SAMPLE
+    inside = "mi.Bool(True)" if where == "True" else where
+    return text + (
+        f"claimed = dr.sum(dr.select({inside.format('wo')}, bsdf.pdf(ctx, si, wo) * area, 0))\n"
+        f"found = dr.mean(dr.select(dr.any(weight > 0) & ({inside.format('bs.wo')}), 1.0, 0.0))\n"
+        f"assert dr.abs(claimed - found) < {0.5 * abs(off):.2g}, "
+        'f"pdf claims {claimed} of all samples, {found} come"\n'
+    )
+
+
+def _weight(subject: Subject, finding: Finding) -> str:
+    if finding.at is None:
+        return ""
+    text = _head(subject, finding.at[0]) + SAMPLE
+    return text + (
+        "values, samples = bsdf.eval(ctx, si, bs.wo), weight * bs.pdf\n"
+        "wrong = dr.any(dr.abs(values - samples) > 0.01 * dr.maximum(values, samples)) & dr.any(weight > 0)\n"
+        'assert dr.count(wrong) < 1e-3 * n, f"{dr.count(wrong)} of {n} weights are not eval / pdf"\n'
+    )
+
+
+def _reciprocity(subject: Subject, finding: Finding) -> str:
+    if finding.at is None:
+        return ""
+    wo, wi = finding.at
+    return _head(subject, wo).replace("1 << 24", "1") + (
+        f"wo = {_vector(wi)}\n"
+        "there = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)\n"
+        "ctx.mode = mi.TransportMode.Importance  # the same path, followed the other way\n"
+        "si.wi, wo = wo, mi.Vector3f(si.wi)\n"
+        "back = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)\n"
+        f"assert dr.all(dr.abs(there - back) <= {0.5 * min(finding.figure, 1.0):.2g} * dr.maximum(there, back)), "
+        'f"{there} one way, {back} the other"\n'
+    )
+
+
+def _positivity(subject: Subject, finding: Finding) -> str:
+    if finding.at is None or "gradient" in finding.problems[0]:
+        return ""
+    wo, wi = finding.at
+    return _head(subject, wo) + (
+        f"wo = {_vector(wi)}\n" + SAMPLE + "found = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]\n"
+        "good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in found]\n"
+        'assert dr.all(good, axis=None), f"numbers >= 0, of eval, pdf, weight and its pdf: {good}"\n'
+    )
+
+
+def _isotropy(subject: Subject, finding: Finding) -> str:
+    if finding.at is None:
+        return ""
+    wo, wi = finding.at
+    # Dr.Jit has no turn about an axis for plain vectors: x and y are one complex number
+    return _head(subject, wo).replace("1 << 24", "24") + (
+        "turn = dr.arange(mi.Float, n) * (2 * dr.pi / n)\n"
+        "(s, c), turned = dr.sincos(turn), lambda w: mi.Vector3f(c * w.x - s * w.y, s * w.x + c * w.y, w.z)\n"
+        "si.wi = turned(si.wi)\n"
+        f"value = bsdf.eval(ctx, si, turned({_vector(wi)}))[0]\n"
+        'assert dr.max(value) < 1.05 * dr.min(value), f"{dr.min(value)} to {dr.max(value)} as both directions turn"\n'
+    )
+
+
+def _linearity(subject: Subject, finding: Finding) -> str:
+    name = finding.worst.partition(":")[0]
+    if finding.at is None or name == "mix":
+        return ""
+    wo, wi = finding.at
+    at = {v: subject.replace(**{name: v}).model.plugin for v in (0.125, 0.3125, 0.875)}
+    head = HEAD.format(plugin=_literal(at[0.125]), wo=_vector(wo)).replace("1 << 24", "1")
+    head = head.replace(f"bsdf = mi.load_dict({_literal(at[0.125])})", f"plugin = {_literal(at[0.125])}")
+    return head + (
+        f"wo, values = {_vector(wi)}, []\n"
+        "for v in (0.125, 0.3125, 0.875):\n"
+        f'    plugin["{name}"]["value"] = [v, v, v]\n'
+        "    values.append(mi.load_dict(plugin).eval(ctx, si, wo))\n"
+        "between = 0.75 * values[0] + 0.25 * values[2]\n"
+        f"assert dr.all(dr.abs(values[1] - between) <= {0.5 * finding.figure:.2g} * between), "
+        f'f"{{values[1]}} where {name} is between two others, which give {{between}}"\n'
+    )
+
+
+def _calls(subject: Subject, finding: Finding) -> str:
+    wrong = {answer.what: answer for answer in finding.details}  # type: ignore[attr-defined]
+    above = directions.at(30.0, 20.0)
+    for what, body in CALLS.items():
+        if what in wrong:
+            x, y, z = (f"{v:.6g}" for v in above)
+            both = f"mi.Vector3f({x}, {y}, dr.select(rng.next_float32() > 0.5, {z}, -{z}))"
+            text = _head(subject, above).replace("1 << 24", "1 << 16")
+            return (text.replace(_vector(above), both) if -1 in subject.sides else text) + body
+    return ""
+
+
+CALLS = {
+    "eval_pdf": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
+    "value, pdf = bsdf.eval_pdf(ctx, si, wo)\n"
+    "wrong = dr.any(value != bsdf.eval(ctx, si, wo)) | (pdf != bsdf.pdf(ctx, si, wo))\n"
+    'assert dr.count(wrong) < 0.01 * n, f"eval_pdf is not eval and pdf for {dr.count(wrong)} of {n} pairs"\n',
+    "flags": SAMPLE + "last = dr.max(dr.select(dr.any(weight > 0), bs.sampled_component, 0))\n"
+    "count, kinds = bsdf.component_count(), [bsdf.flags(k) for k in range(bsdf.component_count())]\n"
+    'assert dr.all(last < count), f"samples of component {last}, of {count}: {kinds}"\n',
+    "components": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
+    "whole, parts, seen = bsdf.eval(ctx, si, wo), mi.Color3f(0), {}\n"
+    "for ctx.component in range(bsdf.component_count()):\n"
+    "    parts += bsdf.eval(ctx, si, wo)\n"
+    "    " + SAMPLE + "    got = dr.select(dr.any(weight > 0), bs.sampled_component, ctx.component)\n"
+    "    seen[ctx.component] = (dr.min(got)[0], dr.max(got)[0])\n"
+    "parts, whole = dr.mean(parts, axis=None), dr.mean(whole, axis=None)\n"
+    "assert all(pair == (k, k) for k, pair in seen.items()) and dr.allclose(parts, whole, 1e-3), "
+    'f"asked for one component, samples are of {seen}; values sum to {parts}, eval is {whole}"\n',
+    "types": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
+    "whole, parts = bsdf.eval(ctx, si, wo), mi.Color3f(0)\n"
+    "for kind in (mi.BSDFFlags.Reflection, mi.BSDFFlags.Transmission):\n"
+    "    ctx.type_mask = int(kind)\n"
+    "    parts += bsdf.eval(ctx, si, wo)\n"
+    "parts, whole = dr.mean(parts, axis=None), dr.mean(whole, axis=None)\n"
+    'assert dr.allclose(parts, whole, 1e-3), f"reflected and transmitted sum to {parts}, eval is {whole}"\n',
+    "eval_diffuse_reflectance": "value = bsdf.eval_diffuse_reflectance(si)\n"
+    "least, most = dr.min(value, axis=None), dr.max(value, axis=None)\n"
+    'assert 0 <= least and most <= 1, f"a share of the light is from {least} to {most}"\n',
+}
+
+MAKERS: dict[str, Callable[[Subject, Finding], str]] = {
+    "energy": _energy,
+    "pdf": _pdf,
+    "weight": _weight,
+    "reciprocity": _reciprocity,
+    "positivity": _positivity,
+    "isotropy": _isotropy,
+    "linearity": _linearity,
+    "calls": _calls,
+}

@@ -1,0 +1,59 @@
+"""A time limit around the BSDF's own code: sampling that never ends must not hang the trial."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import Any
+
+LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds a law; the slowest takes some ten
+GRACE = 20.0  # a loop inside a kernel does not hear the signal; after this the process ends
+watched = False  # whether a parent watches this process, and ends it where the signal is not heard
+# around each call of a BSDF, given the model and the method; the process that is watched says there where it is
+calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = None
+
+
+def words(seconds: float) -> str:
+    """What is said of a law that did not end."""
+    return f"no end after {seconds:g} s: does `sample` loop until something that may never come?"
+
+
+@contextlib.contextmanager
+def limited(what: str, seconds: float | None = None) -> Iterator[None]:
+    """Raise TimeoutError in the block after that many seconds.
+
+    A loop in Python is interrupted. A loop in a compiled kernel is not: then the process says so and exits with 2,
+    unless a parent watches it (`gonio.verify.isolation.child`).
+    Elsewhere than in the main thread, and where there is no SIGALRM, only the second happens.
+    """
+    seconds = seconds or LIMIT
+    text = words(seconds)
+
+    def ring(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError(text)
+
+    def give_up() -> None:
+        print(f"error: {what}: {text}\n hint: the loop runs inside a kernel and cannot be stopped", file=sys.stderr)
+        sys.stderr.flush()
+        os._exit(2)
+
+    by_signal = hasattr(signal, "SIGALRM") and threading.current_thread() is threading.main_thread()
+    last = threading.Timer(seconds + GRACE, give_up)
+    last.daemon = True
+    if not watched:
+        last.start()
+    if by_signal:
+        before = signal.signal(signal.SIGALRM, ring)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        if by_signal:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)
+        last.cancel()
