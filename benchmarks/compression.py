@@ -16,7 +16,7 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio import measure
+from gonio.measure import read
 from gonio.measure.compression import sphere
 from gonio.measure.compression.base import Method
 from gonio.measure.compression.network import trained
@@ -40,7 +40,7 @@ def names() -> list[str]:
 
 def networks() -> dict[str, Measurement]:
     """The tables that the published networks are."""
-    return {name: measure.read(f"{DATA / 'nbrdf' / 'merl.npz'}:{name}") for name in names()}
+    return {name: read(f"{DATA / 'nbrdf' / 'merl.npz'}:{name}") for name in names()}
 
 
 def published() -> dict[str, Network]:
@@ -61,7 +61,7 @@ def error(old: Measurement, new: Measurement) -> float:
 
 
 def rgl() -> dict[str, Measurement]:
-    return {path.stem.removesuffix("_rgb"): measure.read(path) for path in sorted((DATA / "rgl").glob("*.bsdf"))}
+    return {path.stem.removesuffix("_rgb"): read(path) for path in sorted((DATA / "rgl").glob("*.bsdf"))}
 
 
 def curve() -> None:

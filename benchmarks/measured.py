@@ -19,8 +19,8 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio import measure, ops
-from gonio.measure import compare
+from gonio import ops
+from gonio.measure import compare, read
 from gonio.measure.colours import LUMINANCE
 from gonio.measure.formats.base import Format
 from gonio.measure.tables import adaptive, half_difference
@@ -166,13 +166,13 @@ def convert() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for source in files():
             row = []
-            own = measure.read(source).name
+            own = read(source).name
             for name, one in written.items():
                 there = Path(folder) / f"there{one.suffixes[0]}"
                 back = Path(folder) / f"back{next(w.suffixes[0] for w in written.values() if w.writes == own)}"
                 steps = [source, str(there), str(back)]
                 said = [compare.convert(a, b).error for a, b in pairwise(steps)]
-                again = [compare.difference(measure.read(a), measure.read(b), seed=7) for a, b in pairwise(steps)]
+                again = [compare.difference(read(a), read(b), seed=7) for a, b in pairwise(steps)]
                 ratios = [
                     max(s, a) / max(min(s, a), 1e-12) for s, a in zip(said, again, strict=True) if max(s, a) > 1e-6
                 ]

@@ -44,7 +44,7 @@ def given(value: object) -> str:
 )
 def test_a_render_asks_for_what_its_annotations_say(arguments: dict[str, object], text: str) -> None:
     with pytest.raises(InputError, match=text):
-        render.render(go.Lambert(), **arguments)  # type: ignore[arg-type]
+        render(go.Lambert(), **arguments)  # type: ignore[arg-type]
 
 
 def test_whole_numbers_of_numpy_serve() -> None:

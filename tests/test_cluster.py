@@ -18,6 +18,7 @@ from types import SimpleNamespace
 import gonio as go
 import numpy as np
 import pytest
+from gonio.catalog import notation
 from gonio.errors import GonioWarning, InputError, MachineError
 from gonio.render import checkpoints, run, tiles
 from gonio.transport import passes
@@ -163,7 +164,7 @@ def test_a_picture_goes_on_to_more_samples_by_a_crew(two: Cluster, scene: Path, 
 def test_files_travel_and_so_does_code_that_the_user_named(two: Cluster, scene: Path, tmp_path: Path) -> None:
     source = "import gonio as go\n\nclass Flat(go.Lambert):\n    'Flat.'\n    name = 'flat-for-cluster'\n"
     (tmp_path / "flat.py").write_text(source)
-    material = go.models.notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]  # type: ignore[attr-defined]
+    material = notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]
     alone = go.render(material, spp=2, size=(24, 16))
     with crew.working(two):
         assert np.array_equal(go.render(material, spp=2, size=(24, 16)), alone)

@@ -42,7 +42,7 @@ def variant():
 
 def plugin():
     from gonio.owner import COMPUTING
-    from gonio.render import foreign
+    from gonio.bridge import foreign
     with COMPUTING:
         return foreign.load({"type": "roughplastic", "alpha": 0.2}).eval(WO, WI)
 

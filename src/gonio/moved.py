@@ -31,6 +31,7 @@ _MOVED = {
     "measure.materials": "materials.measured",
     "models": "material",
     "models.ashikhmin_shirley": "materials.historic.ashikhmin_shirley",
+    "models.base": "material",
     "models.blinn_phong": "materials.empirical.blinn_phong",
     "models.conductor": "materials.microfacet.conductor",
     "models.cook_torrance": "materials.historic.cook_torrance",

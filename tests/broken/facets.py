@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from gonio import ops
-from gonio.material import BSDF, Sample
-from gonio.material.base import Value, never, spectrum, width
+from gonio.material import BSDF, Sample, never, spectrum, width
+from gonio.material.parameters import Value
 from gonio.ops import abs, dot, safe_div, sqr, where
 from gonio.optics import frame
 from gonio.optics.ndf.ggx import GGX

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from gonio import ops
-from gonio.material import BSDF, Sample
-from gonio.material.base import Value, never, number, spectrum
+from gonio.material import BSDF, Sample, never, number, spectrum
+from gonio.material.parameters import Value
 from gonio.ops import dot, inv_pi, maximum, safe_div, sqr, vec3, where
 from gonio.optics import frame, warp
 

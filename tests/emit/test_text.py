@@ -12,7 +12,7 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio import cli, models, ops
+from gonio import cli, ops
 from gonio.energy.compensation import curves
 from gonio.ops import Table, lookup
 from gonio.shaders import bundle
@@ -294,8 +294,8 @@ def test_a_field_by_a_reserved_name_is_the_same_in_shader_and_manifest() -> None
     class Odd(go.BSDF):
         """A grey surface whose parameters have unlucky names."""
 
-        half: float = models.base.number(0.5, "share of light that is reflected", low=0.0, high=1.0)
-        sample_: float = models.base.number(0.5, "another")
+        half: float = go.number(0.5, "share of light that is reflected", low=0.0, high=1.0)
+        sample_: float = go.number(0.5, "another")
 
         def eval(self, wo, wi, mode="radiance"):  # type: ignore[no-untyped-def]
             """half times another |cos theta_i| / pi."""

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gonio import ops
 from gonio.energy.albedo import quadrature
-from gonio.material import binding
-from gonio.material.base import BSDF, Value, spectrum
+from gonio.material import BSDF, binding, spectrum
+from gonio.material.parameters import Value
 from gonio.ops import RecordingError, backend
 
 MU = np.array([0.05, 0.1, 0.2, 0.4, 0.7, 0.95, 0.985, 0.996, 1.0])  # Oren-Nayar bends like sin(theta) at the normal

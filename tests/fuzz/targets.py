@@ -444,12 +444,12 @@ def _measured(name: str) -> tuple[bytes, ...]:
 def _measurement(name: str, tokens: Sequence[bytes] = ()) -> None:
     @target(name, lambda: _measured(name), tokens)
     def read(data: bytes, folder: Path) -> object:
-        from gonio import measure
+        from gonio.measure import read
         from gonio.measure.formats.base import Format
 
         path = saved(folder / f"a{Format.family.get(name).suffixes[0]}", data)
         with _small_merl():
-            table = measure.read(path)
+            table = read(path)
         wo, wi = np.array([[0.6, 0.0, 0.8], [0.0, 0.0, 1.0]]), np.array([[0.0, -0.28, 0.96], [0.8, 0.0, 0.6]])
         scattered = table.name == "samples" and zlib.crc32(data) % 8  # these fit a surface first, which takes .3 s
         return None if scattered else table.rgb(wo, wi), table.flaws, table.range, table.reciprocal
@@ -477,10 +477,10 @@ def _networks() -> tuple[bytes, ...]:
 
 @target("networks", _networks, [b"PK\x01\x02", b"(6, 21)", b"'|O'", b"a/b1"])
 def trained(data: bytes, folder: Path) -> object:
-    from gonio import measure
+    from gonio.measure import read
 
     with _small_merl():
-        return measure.read(f"{saved(folder / 'a.npz', data)}:a").range
+        return read(f"{saved(folder / 'a.npz', data)}:a").range
 
 
 # ---------------------------------------------------------------------- tables, notation, messages, options

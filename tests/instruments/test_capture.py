@@ -11,12 +11,12 @@ from typing import Any
 import gonio as go
 import numpy as np
 import pytest
-from gonio import measure
 from gonio.errors import InputError
 from gonio.fitting.parameters import Free
 from gonio.instruments.capture import calibration, fitting, geometry, photographs, pixels, planning, rehearsal, run
 from gonio.material import tree
 from gonio.materials.combined.sum import Sum
+from gonio.measure import read
 from gonio.pictures import images
 
 MIDDLE, AWAY, SIZE = np.array([0.0, 0.0, 500.0]), 400.0, 64
@@ -172,7 +172,7 @@ def test_samples_are_values_of_the_brdf(found: run.Capture) -> None:
 
 
 def test_a_capture_becomes_a_table_and_a_report(found: run.Capture, tmp_path: Path) -> None:
-    table = measure.read(found.save(tmp_path / "paint.gonio"))
+    table = read(found.save(tmp_path / "paint.gonio"))
     assert table.name == "samples" and table.shape["sample"] == len(found.samples.count)
     wo, wi = found.samples.table.pairs()
     seen = np.arange(0, len(wo), 50)

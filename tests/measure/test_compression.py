@@ -8,15 +8,15 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio import measure
 from gonio.errors import InputError
-from gonio.measure import compare, report
+from gonio.measure import SAMPLE, compare, read, report
 from gonio.measure.compression import network as networks
 from gonio.measure.compression import sphere
 from gonio.measure.compression.base import Method
 from gonio.measure.formats.own import Own
 from gonio.measure.tables import log_table
 from gonio.measure.tables.network import Network
+from gonio.shaders import bundle
 from gonio.verify import verify
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
@@ -35,8 +35,8 @@ def _small_pictures() -> Iterator[None]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the sample as an RGL file, and a half of it."""
     made = tmp_path_factory.mktemp("compression")
-    compare.convert(measure.SAMPLE, made / "a.bsdf")
-    sample = measure.read(measure.SAMPLE)
+    compare.convert(SAMPLE, made / "a.bsdf")
+    sample = read(SAMPLE)
     half = type(sample).from_arrays({**sample.arrays(), "values": 0.5 * sample.values})
     (made / "half.gonio").write_bytes(Own().write(half))
     return made
@@ -48,9 +48,9 @@ def network(folder: Path) -> Network:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(networks, "STEPS", 150)
         patch.setattr(networks, "ROUNDS", 3)
-        row = go.compress(measure.SAMPLE, folder / "network.gonio", method="network")[0]
+        row = go.compress(SAMPLE, folder / "network.gonio", method="network")[0]
     assert row.kind == "network" and row.size < 6000
-    found = measure.read(row.path)
+    found = read(row.path)
     assert isinstance(found, Network)
     return found
 
@@ -58,9 +58,9 @@ def network(folder: Path) -> Network:
 @pytest.mark.parametrize(("method", "size"), [("log", 2048), ("log", 4096), ("lowrank", 4096)])
 def test_a_table_fits_into_the_bytes_with_the_error_that_is_said(method: str, size: int, folder: Path) -> None:
     path = folder / f"{method}-{size}.gonio"
-    row = go.compress(measure.SAMPLE, path, method=method, bytes=size)[0]
+    row = go.compress(SAMPLE, path, method=method, bytes=size)[0]
     assert path.stat().st_size == row.size <= size
-    sample, table = measure.read(measure.SAMPLE), measure.read(path)
+    sample, table = read(SAMPLE), read(path)
     assert table.name == row.kind
     assert compare.difference(sample, table, seed=2) == pytest.approx(row.error, rel=0.25)
     assert row.error < (0.1 if size == 2048 else 0.02)
@@ -68,21 +68,21 @@ def test_a_table_fits_into_the_bytes_with_the_error_that_is_said(method: str, si
 
 
 def test_more_bytes_err_less(folder: Path) -> None:
-    errors = [go.compress(measure.SAMPLE, folder / "more.gonio", bytes=size)[0].sphere for size in (1500, 2500, 8000)]
+    errors = [go.compress(SAMPLE, folder / "more.gonio", bytes=size)[0].sphere for size in (1500, 2500, 8000)]
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.2 * errors[0]
 
 
 def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
     path = folder / "both.gonio"
-    rows = go.compress([measure.SAMPLE, folder / "half.gonio"], path, method="lowrank", bytes=4096)
+    rows = go.compress([SAMPLE, folder / "half.gonio"], path, method="lowrank", bytes=4096)
     assert [row.path for row in rows] == [f"{path}:sample", f"{path}:half"]
     assert path.stat().st_size <= 2 * 4096 + 1 and report.describe(path)["items"] == ["sample", "half"]
-    one, half = (measure.read(row.path) for row in rows)
+    one, half = (read(row.path) for row in rows)
     assert one.arrays()["basis_theta_h"].tobytes() == half.arrays()["basis_theta_h"].tobytes()
     with pytest.raises(InputError, match="2 materials in it, one expected"):
-        measure.read(path)
+        read(path)
     with pytest.raises(InputError, match="no material 'halb' in it"):
-        measure.read(f"{path}:halb")
+        read(f"{path}:halb")
     # as a material like any other
     wo, wi = np.array([[0.0, 0.6, 0.8]]), np.array([[0.0, -0.6, 0.8]])
     np.testing.assert_allclose(
@@ -93,7 +93,7 @@ def test_several_materials_share_their_bases_in_one_file(folder: Path) -> None:
 def test_visible_normals_are_rebuilt(folder: Path) -> None:
     row = go.compress(folder / "a.bsdf", folder / "a.gonio", method="rgl")[0]
     assert row.size < 0.6 * (folder / "a.bsdf").stat().st_size and row.error < 1e-4
-    old, new = measure.read(folder / "a.bsdf"), measure.read(row.path)
+    old, new = read(folder / "a.bsdf"), read(row.path)
     for there, here in zip(old.vndf[0], new.vndf[0], strict=True):
         np.testing.assert_allclose(here / here.mean(), there / there.mean(), atol=1e-5 * there.max() / there.mean())
     # and written as an RGL file again
@@ -120,7 +120,7 @@ def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: 
 
 def test_a_network_is_near_what_it_has_seen(network: Network) -> None:
     assert network.shape == {"weight": 675}
-    assert compare.difference(measure.read(measure.SAMPLE), network) < 0.1
+    assert compare.difference(read(SAMPLE), network) < 0.1
 
 
 def test_a_network_is_recorded_as_it_is_computed(network: Network, folder: Path) -> None:
@@ -128,8 +128,8 @@ def test_a_network_is_recorded_as_it_is_computed(network: Network, folder: Path)
     rng = np.random.default_rng(3)
     wo, wi = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in np.abs(rng.normal(size=(2, 200, 3))))
     wi[:, 0] *= -1.0
-    read = model.record("eval").evaluate(wo=wo.T, wi=wi.T)
-    np.testing.assert_allclose(np.asarray(read).T, model.eval(wo, wi, precision="float64"), rtol=1e-9, atol=1e-12)
+    values = model.record("eval").evaluate(wo=wo.T, wi=wi.T)
+    np.testing.assert_allclose(np.asarray(values).T, model.eval(wo, wi, precision="float64"), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(model.eval(wo, wi), model.eval(wi, wo) * wi[:, 2:] / wo[:, 2:], rtol=1e-4)
 
 
@@ -140,7 +140,7 @@ def test_a_network_keeps_the_laws(network: Network, folder: Path) -> None:
 
 @pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl"])
 def test_a_shader_carries_the_weights(language: str, network: Network, folder: Path) -> None:
-    made = go.emit.bundle(go.Measured(str(folder / "network.gonio")), language, functions=("eval",))
+    made = bundle(go.Measured(str(folder / "network.gonio")), language, functions=("eval",))
     assert not made.tables
     assert f"{float(np.float32(network.weights['bias0'][0])):.5g}"[:6] in made.text
 
@@ -155,7 +155,7 @@ def test_a_published_network_says_what_its_table_does() -> None:
     if not path.is_file():
         pytest.skip("the shared folder with measured materials is not beside this checkout")
     parts = arrays(path.read_bytes(), str(path))
-    network, table = Network({part: parts[f"nickel/{part}"] for part in SHAPES}), measure.read(f"{path}:nickel")
+    network, table = Network({part: parts[f"nickel/{part}"] for part in SHAPES}), read(f"{path}:nickel")
     wo, wi = (w[::997] for w in centres((90, 90, 180)))
     lit = np.minimum(wo[:, 2], wi[:, 2]) > 1e-3
     np.testing.assert_allclose(network.rgb(wo[lit], wi[lit]), table.rgb(wo[lit], wi[lit]), rtol=2e-3, atol=1e-6)
@@ -172,18 +172,18 @@ def test_what_cannot_be_compressed_is_said(folder: Path) -> None:
         ({"bytes": 1100}, "1100 bytes, a table takes"),
     ):
         with pytest.raises(InputError, match=match):
-            go.compress(measure.SAMPLE, folder / "none.gonio", **words)
+            go.compress(SAMPLE, folder / "none.gonio", **words)
     with pytest.raises(InputError, match="gonio file expected"):
-        go.compress(measure.SAMPLE, folder / "none.binary")
+        go.compress(SAMPLE, folder / "none.binary")
     with pytest.raises(InputError, match="no file given"):
         go.compress([], folder / "none.gonio")
     with pytest.raises(InputError, match="same name"):
-        go.compress([measure.SAMPLE, measure.SAMPLE], folder / "none.gonio")
+        go.compress([SAMPLE, SAMPLE], folder / "none.gonio")
     assert not (folder / "none.gonio").exists()
 
 
 def test_damaged_codes_are_one_error(folder: Path) -> None:
-    made = Method.family.get("log").compress([measure.read(measure.SAMPLE)], 2048)[0]
+    made = Method.family.get("log").compress([read(SAMPLE)], 2048)[0]
     parts = made.arrays()
     own, codes = Own(), parts["codes"]
     for damaged, match in (

@@ -8,10 +8,12 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
+from gonio.catalog import notation
 from gonio.errors import InputError
 from gonio.fitting import batch, data, solver
 from gonio.fitting.fit import fit, modelled
 from gonio.fitting.parameters import free_of, start_of
+from gonio.material import tree
 from gonio.materials.combined.sum import Sum
 from gonio.measure import format_of
 from gonio.measure.tables.half_difference import HalfDifference, sampled
@@ -36,7 +38,7 @@ def truth(material: go.BSDF, names: tuple[str, ...]) -> np.ndarray:
     for name in names:
         path, _, channel = name.rpartition(".")
         whole = path if channel in ("r", "g", "b") else name
-        value = go.models.tree.value_at(material, whole)
+        value = tree.value_at(material, whole)
         found.append(np.broadcast_to(value, 3)["rgb".index(channel)] if whole != name else value)
     return np.array(found, float)
 
@@ -56,7 +58,7 @@ def test_a_sum_of_lobes_is_found_again() -> None:
     assert found.relative == pytest.approx(0.016, abs=0.002)  # mean of |2 % of a normal number|
     assert isinstance(found.material, Sum)
     np.testing.assert_allclose(
-        go.models.notation.named(found.text)[0].eval([0.6, 0, 0.8], [0, 0, 1.0]),
+        notation.named(found.text)[0].eval([0.6, 0, 0.8], [0, 0, 1.0]),
         found.material.eval([0.6, 0, 0.8], [0, 0, 1.0]),
         rtol=1e-4,
     )

@@ -8,10 +8,9 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio import measure
 from gonio.catalog import notation
 from gonio.errors import InputError
-from gonio.measure import compare
+from gonio.measure import SAMPLE, compare
 from gonio.measure.warp import Warp
 from gonio.ops import backend
 from gonio.verify import verify
@@ -26,7 +25,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     found = {}
     for suffix in (".binary", ".bsdf", ".zbsdf", ".brdf"):
         found[suffix] = str(folder / f"a{suffix}")
-        compare.convert(measure.SAMPLE, found[suffix])
+        compare.convert(SAMPLE, found[suffix])
     return found
 
 
@@ -43,9 +42,9 @@ def test_a_table_is_recorded_as_it_is_computed(suffix: str, files: dict[str, str
     wo, wi = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in np.abs(rng.normal(size=(2, 200, 3))))
     wi[:, 0] *= -1.0
     for method in ("eval", "pdf"):
-        read = model.record(method).evaluate(wo=wo.T, wi=wi.T)
+        values = model.record(method).evaluate(wo=wo.T, wi=wi.T)
         computed = getattr(model, method)(wo, wi, precision="float64")
-        np.testing.assert_allclose(np.asarray(read).T, computed, rtol=1e-7, atol=1e-12)
+        np.testing.assert_allclose(np.asarray(values).T, computed, rtol=1e-7, atol=1e-12)
 
 
 @pytest.mark.parametrize("language", ["glsl", "wgsl", "hlsl"])

@@ -11,9 +11,8 @@ from pathlib import Path
 import gonio as go
 import numpy as np
 import pytest
-from gonio import measure
 from gonio.errors import InputError
-from gonio.measure import compare, report
+from gonio.measure import SAMPLE, compare, read, report
 from gonio.measure.formats.base import Format
 from gonio.measure.formats.merl import SCALE
 from gonio.measure.formats.npz import written
@@ -50,13 +49,13 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     found = {}
     for name, one in formats().items():
         found[name] = folder / f"a{one.suffixes[0]}"
-        compare.convert(measure.SAMPLE, found[name])
+        compare.convert(SAMPLE, found[name])
     return found
 
 
 @pytest.mark.parametrize("name", formats())
 def test_what_is_written_is_read_back_with_the_error_that_was_said(name: str, files: dict[str, Path]) -> None:
-    sample, table = measure.read(measure.SAMPLE), measure.read(files[name])
+    sample, table = read(SAMPLE), read(files[name])
     assert table.name == formats()[name].resampled(sample).name
     said = compare.difference(sample, table, seed=1)
     again = compare.difference(sample, table, seed=2)
@@ -67,7 +66,7 @@ def test_what_is_written_is_read_back_with_the_error_that_was_said(name: str, fi
 @pytest.mark.parametrize("name", formats())
 def test_a_second_writing_changes_nothing(name: str, files: dict[str, Path]) -> None:
     one = formats()[name]
-    table = measure.read(files[name])
+    table = read(files[name])
     kept = one.resampled(table)
     assert kept is table
     again = one.read(one.write(kept), "again")
@@ -76,7 +75,7 @@ def test_a_second_writing_changes_nothing(name: str, files: dict[str, Path]) -> 
 
 
 def test_invalid_cells_of_merl_are_kept_and_are_no_light(files: dict[str, Path]) -> None:
-    table = measure.read(files["merl"])
+    table = read(files["merl"])
     assert table.flaws["invalid"] == pytest.approx(0.248, abs=0.002)
     raw = np.frombuffer(files["merl"].read_bytes(), "<f8", offset=12)
     assert (raw == -1.0).mean() == pytest.approx(table.flaws["invalid"])
@@ -103,7 +102,7 @@ def test_a_whole_turn_of_phi_d_tells_a_direction_from_its_opposite(tmp_path: Pat
     planes[:, :, :, 180:] = 3.0
     path = tmp_path / "whole.binary"
     path.write_bytes(struct.pack("<3i", *shape) + planes.tobytes())
-    table = measure.read(path)
+    table = read(path)
     wo, wi = half_difference.pair_at(np.full(2, 0.3), np.full(2, 0.5), np.radians([90.0, 270.0]))
     np.testing.assert_allclose(table.rgb(wo, wi) / wi[:, 2:], np.array([[1.0], [3.0]]) * SCALE, rtol=1e-12)
     assert not table.reciprocal
@@ -169,7 +168,7 @@ def test_a_damaged_file_is_one_error(name: str, files: dict[str, Path], tmp_path
         path = tmp_path / f"bad{one.suffixes[0]}"
         path.write_bytes(spoilt)
         try:
-            measure.read(f"{path}:x" if name == "networks" else path)
+            read(f"{path}:x" if name == "networks" else path)
         except InputError as error:
             assert str(path) in str(error), how
         else:
@@ -199,7 +198,7 @@ def test_no_claim_of_an_archive_is_believed(data: bytes, tmp_path: Path) -> None
     path = tmp_path / "a.gonio"
     path.write_bytes(data)
     with pytest.raises(InputError, match=r"a\.gonio"):
-        measure.read(path)
+        read(path)
 
 
 def test_a_tensor_of_endless_size_is_refused(files: dict[str, Path]) -> None:
@@ -217,13 +216,13 @@ def test_a_merl_file_without_a_valid_cell_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "dark.binary"
     path.write_bytes(struct.pack("<3i", 90, 90, 180) + np.full(3 * 90 * 90 * 180, -1.0).tobytes())
     with pytest.raises(InputError, match="every cell is invalid"):
-        measure.read(path)
+        read(path)
     path.write_bytes(struct.pack("<3i", 90, 90, 180) + np.full(3 * 90 * 90 * 180, np.nan).tobytes())
     with pytest.raises(InputError, match="are not finite"):
-        measure.read(path)
+        read(path)
     path.write_bytes(struct.pack("<3i", 90, -90, 180) + b"\0" * 64)
     with pytest.raises(InputError, match="90 x -90 x 180"):
-        measure.read(path)
+        read(path)
 
 
 def test_a_wrong_count_in_a_text_is_said() -> None:
@@ -242,12 +241,12 @@ def test_a_wrong_count_in_a_text_is_said() -> None:
 def test_the_shared_files_are_read_with_their_faults() -> None:
     if not SHARED.is_dir():
         pytest.skip("the shared folder with measured materials is not beside this checkout")
-    sunflower = measure.read(SHARED / "rgl" / "cg_sunflower_rgb.bsdf")
+    sunflower = read(SHARED / "rgl" / "cg_sunflower_rgb.bsdf")
     assert sunflower.flaws["negative"] == pytest.approx(0.264, abs=1e-3)
     satin = report.describe(SHARED / "rgl" / "satin_rosaline_rgb.bsdf")
     assert satin["albedo"]["rgb"][7][0] == pytest.approx(1.11, abs=0.01)
-    cayman = measure.read(SHARED / "cornell" / "cayman.brdf")
+    cayman = read(SHARED / "cornell" / "cayman.brdf")
     assert cayman.shape == {"sample": 1439, "channel": 31}
     assert len(report.describe(SHARED / "nbrdf" / "merl.npz")["items"]) == 13
     with pytest.raises(InputError, match="did you mean 'chrome'"):
-        measure.read(f"{SHARED / 'nbrdf' / 'merl.npz'}:crome")
+        read(f"{SHARED / 'nbrdf' / 'merl.npz'}:crome")

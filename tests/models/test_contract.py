@@ -224,7 +224,7 @@ def test_every_parameter_is_documented_and_its_range_admits_its_default(name: st
 class Velvet(go.BSDF):
     """Only eval is written: albedo sin^2 of the angle to the light."""
 
-    from gonio.material.base import spectrum
+    from gonio.material import spectrum
 
     albedo: Any = spectrum(0.5, "colour", high=1.0)
 

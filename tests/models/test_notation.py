@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from gonio.catalog import notation
 from gonio.errors import InputError
-from gonio.material.base import BSDF, Value, number, spectrum
+from gonio.material import BSDF, number, spectrum
+from gonio.material.parameters import Value
 
 
 def same(a: BSDF, b: BSDF) -> bool:

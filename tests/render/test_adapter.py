@@ -417,7 +417,7 @@ def test_registering_again_changes_nothing() -> None:
 
 SPECTRAL = """
 import gonio as go
-from gonio.render import engine
+from gonio.bridge import engine
 mi = engine.load()
 import gonio.mitsuba
 import drjit as dr, numpy as np

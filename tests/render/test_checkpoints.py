@@ -12,6 +12,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.bridge import engine
+from gonio.catalog import notation
 from gonio.errors import GonioWarning, InputError
 from gonio.pictures import images
 from gonio.render import checkpoints, run
@@ -153,7 +154,7 @@ def test_what_has_changed_is_refused_by_name(scene: Path, tmp_path: Path, monkey
 def test_a_checkpoint_runs_no_code_unasked(scene: Path, tmp_path: Path) -> None:
     source = "import gonio as go\n\nclass Flat(go.Lambert):\n    'Flat.'\n    name = 'flat-for-checkpoints'\n"
     (tmp_path / "flat.py").write_text(source)
-    material = go.models.notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]  # type: ignore[attr-defined]
+    material = notation.named(f"{tmp_path / 'flat.py'}:Flat")[0]
     stopped_after(material, 2, tmp_path / "c", spp=4, size=(24, 16))
     with pytest.raises(InputError, match="runs Python files") as caught:
         go.resume(tmp_path / "c")

@@ -81,7 +81,7 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
 
 def test_a_disk_that_fills_up_while_writing_leaves_nothing(tmp_path: Path) -> None:
     program = (
-        "import numpy as np, sys; from gonio.render import images; from gonio.errors import MachineError\n"
+        "import numpy as np, sys; from gonio.pictures import images; from gonio.errors import MachineError\n"
         "try: images.write(sys.argv[1], np.random.rand(64, 64, 3))\n"
         "except MachineError as error: print(error); sys.exit(3)"
     )

@@ -229,7 +229,7 @@ def test_our_integrators_say_in_which_variants_they_do_not_work(name: str, what:
 
 WARD = """
 import gonio as go
-from gonio.models import BSDF, spectrum, width
+from gonio import BSDF, spectrum, width
 from gonio.ops import where, exp, sqr, inv_pi
 
 class Ward(BSDF):

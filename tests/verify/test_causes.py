@@ -10,8 +10,8 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.material import Sample
-from gonio.material.base import Value, number
+from gonio.material import Sample, number
+from gonio.material.parameters import Value
 from gonio.ops import abs, dot, safe_div, sqr, vec3, where
 from gonio.optics import frame
 from gonio.verify import verify

@@ -10,7 +10,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.material.base import Breach
+from gonio.material import Breach
 from gonio.verify import report, verify
 from gonio.verify.laws import Law
 from gonio.verify.run import decide

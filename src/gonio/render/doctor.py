@@ -20,7 +20,7 @@ from ..pictures import denoise
 
 # Rays through Embree or OptiX, a Gonio material by its plugin, a compiled kernel: all that a render needs.
 _TRIAL = """
-from gonio.render import engine
+from gonio.bridge import engine
 mi = engine.load({device!r})
 import drjit as dr
 import gonio.mitsuba

@@ -1,6 +1,7 @@
 """Scenes: the lab's JSON and Gonio's additions to it, validated, and built for Mitsuba.
 
-from gonio.render import engine, scene
+from gonio import scene
+from gonio.bridge import engine
 description = scene.read("examples/phong")
 mitsuba_scene = scene.build(description, engine.load())
 """

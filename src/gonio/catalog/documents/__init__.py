@@ -4,7 +4,7 @@
     chest.gltf:Wood             one of several, by its name, or by its number where it has none of its own
 
 A reader writes a material down in Gonio's notation (`notation`), as a tree of types and values; the formats themselves
-stand in the room `gonio.documents`.
+are the modules of this package.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ class Document:
         raise InputError(f"{self.name} files cannot be written", "OUT", "choose another suffix")
 
 
-Document.family = Family("document", "gonio.documents", ["gonio.documents"], instances_of(Document), where="FILE")
+Document.family = Family(
+    "document", "gonio.documents", ["gonio.catalog.documents"], instances_of(Document), where="FILE"
+)
 
 
 def parted(text: str) -> tuple[Document, Path, str] | None:

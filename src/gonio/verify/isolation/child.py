@@ -135,7 +135,8 @@ class _Worker:
         self.log = self.folder / PRINTED
         (self.folder / CALLING).write_bytes(b"\n" * 512)
         handle = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-        code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.verify import worker; worker.main(sys.argv[1])"
+        start = "from gonio.verify.isolation import worker; worker.main(sys.argv[1])"
+        code = f"import sys; sys.path[:] = {sys.path!r}; {start}"
         self.process = subprocess.Popen(
             [sys.executable, "-c", code, str(self.folder)],
             stdin=subprocess.PIPE,
