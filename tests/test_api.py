@@ -16,11 +16,11 @@ from gonio.pictures import images
 FUNCTIONS: dict[str, Callable[..., object]] = {
     "bake": go.bake,
     "compare": go.compare,
-    "emit": emit.emit,
+    "emit": emit,
     "plot": go.plot,
-    "render": render.render,
+    "render": render,
     "study": go.study,
-    "verify": verify.verify,
+    "verify": verify,
 }
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
 TEXT = {"param", "preset", "as_json"}
@@ -53,7 +53,7 @@ def test_docstrings_name_every_option() -> None:
     for function in FUNCTIONS.values():
         text = inspect.getdoc(function) or ""
         for key in inspect.signature(function).parameters:
-            assert key in text or key in (inspect.getdoc(render.render) or ""), f"{function.__name__}: {key}"
+            assert key in text or key in (inspect.getdoc(render) or ""), f"{function.__name__}: {key}"
 
 
 def test_a_picture_goes_to_a_file_and_back(tmp_path: Path, scene: Path) -> None:

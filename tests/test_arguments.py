@@ -48,17 +48,17 @@ def test_a_render_asks_for_what_its_annotations_say(arguments: dict[str, object]
 
 
 def test_whole_numbers_of_numpy_serve() -> None:
-    assert render.render(go.Lambert(), spp=np.int64(1), size=np.array([3, 2]), integrator="normal").shape == (2, 3, 3)  # type: ignore[arg-type]
+    assert render(go.Lambert(), spp=np.int64(1), size=np.array([3, 2]), integrator="normal").shape == (2, 3, 3)  # type: ignore[arg-type]
 
 
 # Of each, one argument after the other is something else; the others are these, which are refused before much is done.
 CALLS: dict[str, tuple[Callable[..., object], dict[str, object]]] = {
-    "render": (render.render, {"scene": go.Lambert(), "integrator": "none", "size": (0, 0)}),
+    "render": (render, {"scene": go.Lambert(), "integrator": "none", "size": (0, 0)}),
     "bake": (go.bake, {"target": "gxg"}),
     "compare": (go.compare, {"test": PICTURE, "reference": PICTURE}),
     "study": (go.study, {"scene": "nowhere", "vary": {}}),
-    "verify": (verify.verify, {"target": go.Lambert(), "law": "none", "isolated": False}),
-    "emit": (emit.emit, {"model": go.Lambert(), "lang": "glls"}),
+    "verify": (verify, {"target": go.Lambert(), "law": "none", "isolated": False}),
+    "emit": (emit, {"model": go.Lambert(), "lang": "glls"}),
     "albedo": (go.albedo, {"model": go.Lambert(), "method": "none"}),
 }
 
