@@ -24,7 +24,9 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.render import run, tiles
+from gonio.render import tiles
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 from gonio.work import cluster, crew
 from gonio.work.cluster import Cluster
 
@@ -75,7 +77,7 @@ def main() -> None:
             print(f"{workers:7}  {rates[-1]:7.0f}  {bands[-1] / 1e6:4.0f}   {',  '.join(row)}", flush=True)
     cluster.PACE = PACE
     rate, band = statistics.median(rates), statistics.median(bands)
-    prepared = run.prepare(run.Request(SCENE, spp=1))
+    prepared = prepare(Request(SCENE, spp=1))
     spec, _ = tiles.travelling(prepared)
     lanes = (1 << 25) // 4096
     there = len(pickle.dumps((spec, 0, lanes, 0, 4096, None)))

@@ -20,7 +20,10 @@ import numpy as np
 import pytest
 from gonio.catalog import notation
 from gonio.errors import GonioWarning, InputError, MachineError
-from gonio.render import checkpoints, run, tiles
+from gonio.render import checkpoints, tiles
+from gonio.render.execute import execute
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 from gonio.transport import passes
 from gonio.transport.polarizer import PolarizedRender
 from gonio.work import crew, facts, parts
@@ -143,9 +146,9 @@ def test_what_is_done_when_it_is_stopped_goes_on_alone_and_together(
     alone = go.render(scene, spp=6)
     for other in (two, crew.Here()):
         path, seen = tmp_path / type(other).__name__, list[int]()
-        prepared = run.prepare(run.Request(scene, checkpoint=path, spp=6))
+        prepared = prepare(Request(scene, checkpoint=path, spp=6))
         with crew.working(two):
-            stopped, _ = run.work(
+            stopped, _ = execute(
                 prepared, report=lambda p, seen=seen: seen.append(p.done), interrupted=lambda seen=seen: seen
             )
         assert stopped == "interrupt" and path.is_file()
@@ -221,8 +224,8 @@ def test_pictures_survive_workers_that_die_at_random(scene: Path, seed: int) -> 
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(cluster._processes[int(chance.integers(2))].pid, signal.SIGKILL)
 
-        prepared = run.prepare(run.Request(scene, size=LARGE, spp=8000, seed=seed))
-        run.work(prepared, report=look)
+        prepared = prepare(Request(scene, size=LARGE, spp=8000, seed=seed))
+        execute(prepared, report=look)
         assert cluster.restarts > 0
     assert np.array_equal(prepared.render.image(), alone)
 
@@ -280,13 +283,13 @@ def test_a_worker_whose_link_stalls_loses_nothing(scene: Path) -> None:
         cluster._address = direct
         while len(cluster._alive()) < 2:
             time.sleep(0.1)
-        prepared = run.prepare(run.Request(scene, size=LARGE, spp=8000))
+        prepared = prepare(Request(scene, size=LARGE, spp=8000))
 
         def look(progress: passes.Progress) -> None:
             if progress.done > progress.wanted / 8:
                 link.stalled.set()
 
-        run.work(prepared, report=look)
+        execute(prepared, report=look)
         assert link.stalled.is_set()
     link.stalled.clear()
     link.close()

@@ -66,6 +66,6 @@ def test_an_import_path_of_the_former_layout_works_and_names_the_new_one(old: st
 
 
 def test_a_package_does_not_hide_the_function_of_its_name() -> None:
-    code = "import gonio as go, gonio.render.run, gonio.measure; print(callable(go.render), callable(go.measure))"
+    code = "import gonio as go, gonio.render.finish, gonio.measure; print(callable(go.render), callable(go.measure))"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert ran.stdout.split() == ["True", "True"], ran.stderr

@@ -37,12 +37,12 @@ def test_materials_go_to_spawned_processes() -> None:
 
 
 def test_scenes_go_through_pickle(scene: Path) -> None:
-    from gonio.render import run
+    from gonio.render.request import Request
     from gonio.scene import read
 
     description = pickle.loads(pickle.dumps(read(scene)))
     assert description.raw == read(scene).raw and description.path == read(scene).path
-    request = run.Request(scene, spp=2, overrides={"shapes.0.material": MATERIALS[0]})
+    request = Request(scene, spp=2, overrides={"shapes.0.material": MATERIALS[0]})
     again = pickle.loads(pickle.dumps(request))
     assert again.overrides["shapes.0.material"].eval(W, W[::-1]) == pytest.approx(value(MATERIALS[0]))
 

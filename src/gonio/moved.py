@@ -94,6 +94,7 @@ _MOVED = {
     "render.photons": "transport.photons",
     "render.polarizer": "transport.polarizer",
     "render.sampler": "transport.sampler",
+    "render.run": "render.finish",
     "render.scene": "scene",
     "render.sky": "transport.lights.sky",
     "render.solid_angles": "transport.lights.solid_angles",

@@ -15,7 +15,10 @@ from gonio.bridge import engine
 from gonio.catalog import notation
 from gonio.errors import GonioWarning, InputError
 from gonio.pictures import images
-from gonio.render import checkpoints, run
+from gonio.render import checkpoints
+from gonio.render.finish import render_to_file
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 from gonio.transport import passes
 from gonio.work import facts, kept
 
@@ -35,13 +38,13 @@ def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options
     class Killed(Exception):
         pass
 
-    request = run.Request(
+    request = Request(
         Path(scene.name) if isinstance(scene, go.BSDF) else scene,
         checkpoint=checkpoint,
         material=scene if isinstance(scene, go.BSDF) else None,
         **options,  # type: ignore[arg-type]
     )
-    prepared = run.prepare(request)
+    prepared = prepare(request)
     keeper = checkpoints.Keeper(checkpoint, prepared)
 
     def after(progress: passes.Progress) -> None:
@@ -51,7 +54,7 @@ def stopped_after(scene: Path | go.BSDF, count: int, checkpoint: Path, **options
             raise Killed
 
     with pytest.raises(Killed):
-        run.run(prepared.render, prepared.spp, 24 * 16, report=after)
+        passes.run(prepared.render, prepared.spp, 24 * 16, report=after)
 
 
 @pytest.mark.parametrize("options", [{}, {"integrator": "path"}, {"denoise": True}, {"integrator": "normal"}])
@@ -188,26 +191,26 @@ def test_a_long_render_has_a_checkpoint_beside_it_until_it_is_done(
         time.sleep(0.05)  # the file is written by a thread of its own
         seen.append(checkpoints.beside(output).exists())
 
-    run.render(run.Request(scene, output, spp=6), report=look)
+    render_to_file(Request(scene, output, spp=6), report=look)
     assert seen[-1]
     assert [entry.name for entry in tmp_path.iterdir() if entry.is_file()] == ["a.exr"]
 
 
 def test_a_short_render_has_none(scene: Path, tmp_path: Path) -> None:
-    result = run.render(run.Request(scene, tmp_path / "a.exr", spp=2**20, timeout=0.2))
+    result = render_to_file(Request(scene, tmp_path / "a.exr", spp=2**20, timeout=0.2))
     assert result.stopped == "timeout"
-    monkey = run.render(run.Request(scene, tmp_path / "b.exr", spp=3))
+    monkey = render_to_file(Request(scene, tmp_path / "b.exr", spp=3))
     assert (monkey.stopped, monkey.checkpoint) == ("", None)
     assert not (tmp_path / "b.exr.checkpoint").exists()
 
 
 def test_a_time_limit_leaves_what_goes_on_and_the_end_removes_it(scene: Path, tmp_path: Path) -> None:
     output = tmp_path / "a.exr"
-    result = run.render(run.Request(scene, output, spp=2**29, timeout=0.2))
+    result = render_to_file(Request(scene, output, spp=2**29, timeout=0.2))
     assert result.checkpoint == tmp_path / "a.exr.checkpoint" and result.checkpoint.is_file()
     told: list[str] = []
-    change = run.Request(Path(), spp=result.spp + 3)
-    again = run.render(checkpoints.asked_again(result.checkpoint, change, False), tell=told.append)
+    change = Request(Path(), spp=result.spp + 3)
+    again = render_to_file(checkpoints.asked_again(result.checkpoint, change, False), tell=told.append)
     assert (again.spp, again.stopped, again.checkpoint) == (result.spp + 3, "", None)
     assert f"{result.spp} of {result.spp + 3}" in told[0]
     assert np.array_equal(images.read(output).pixels, go.render(scene, spp=again.spp))
@@ -216,8 +219,8 @@ def test_a_time_limit_leaves_what_goes_on_and_the_end_removes_it(scene: Path, tm
 
 def test_one_that_does_not_fit_is_told_and_not_used(scene: Path, tmp_path: Path) -> None:
     output, told = tmp_path / "a.exr", list[str]()
-    run.render(run.Request(scene, output, spp=2**29, timeout=0.2))
-    result = run.render(run.Request(scene, output, spp=3, seed=9), tell=told.append)
+    render_to_file(Request(scene, output, spp=2**29, timeout=0.2))
+    result = render_to_file(Request(scene, output, spp=3, seed=9), tell=told.append)
     assert result.spp == 3 and "is not used, and removed: settings" in told[0]
     assert np.array_equal(images.read(output).pixels, go.render(scene, spp=3, seed=9))
 
@@ -229,7 +232,7 @@ def test_a_full_disk_costs_the_checkpoint_and_not_the_picture(
         raise go.MachineError("the disk is full", "c")
 
     monkeypatch.setattr(kept, "write", full)
-    result = run.render(run.Request(scene, tmp_path / "a.exr", spp=4, checkpoint=tmp_path / "c"))
+    result = render_to_file(Request(scene, tmp_path / "a.exr", spp=4, checkpoint=tmp_path / "c"))
     assert result.warnings == ("no checkpoint was written: the disk is full",)
     assert images.read(tmp_path / "a.exr").metadata["spp"] == 4
 

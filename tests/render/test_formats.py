@@ -10,7 +10,8 @@ import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError
 from gonio.pictures import formats, images
-from gonio.render import run
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 
 
 def radiance(width: int, height: int, lines: bytes) -> bytes:
@@ -120,4 +121,4 @@ def test_a_mitsuba_scene_opens_no_picture_that_would_corrupt_it(tmp_path: Path) 
     )
     for allowed in (False, True):
         with pytest.raises(InputError, match="longer than its scanline"):
-            run.prepare(run.Request(scene, allow_outside=allowed))
+            prepare(Request(scene, allow_outside=allowed))

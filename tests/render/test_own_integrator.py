@@ -14,7 +14,8 @@ import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError
 from gonio.pictures import images
-from gonio.render import run
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 from gonio.transport import integrators
 
 mi = engine.load()
@@ -83,7 +84,7 @@ def registered(tmp_path: Path) -> Iterator[dict[str, type]]:
 
 
 def _picture(scene: Path, **options: object) -> np.ndarray:
-    prepared = run.prepare(run.Request(scene, **options))  # type: ignore[arg-type]
+    prepared = prepare(Request(scene, **options))  # type: ignore[arg-type]
     prepared.render.advance(prepared.spp)
     return prepared.render.image()
 
@@ -94,12 +95,12 @@ def test_a_registered_integrator_renders_by_the_scenes_word_and_by_the_options(
     assert np.all(_picture(scene) == 1.0), "nothing hides the sky from a plane"
     paths = _picture(scene, integrator="path", max_depth=3)
     assert np.array_equal(_picture(scene, integrator="shallow", max_depth=9), paths)
-    assert run.prepare(run.Request(scene, integrator="shallow")).settings["max_depth"] == 5
+    assert prepare(Request(scene, integrator="shallow")).settings["max_depth"] == 5
 
 
 def test_an_integrator_that_is_not_there_is_one_clear_error(scene: Path) -> None:
     with pytest.raises(InputError, match=r"(?s)unknown type 'occlusion'.*known: caustics, direct"):
-        run.prepare(run.Request(scene))
+        prepare(Request(scene))
     scene.write_text(json.dumps({**SCENE, "integrator": {"type": "normal"}}))
     with pytest.raises(InputError, match=r"(?s)--integrator: unknown integrator 'whited'.*did you mean 'whitted'"):
         _picture(scene, integrator="whited")

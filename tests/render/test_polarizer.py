@@ -13,7 +13,8 @@ import pytest
 from gonio import scene
 from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import run
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 
 ETA = 1.5
 SIZE = (24, 16)
@@ -113,10 +114,10 @@ def test_the_variant_is_as_it_was_afterwards(tmp_path: Path) -> None:
 def test_a_render_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
     file = tmp_path / "scene.json"
     file.write_text(json.dumps(description(polarizer=45)))
-    render = run.prepare(run.Request(file, spp=4)).render
+    render = prepare(Request(file, spp=4)).render
     render.advance(4)
     state, picture = render.state(), render.image()
-    again = run.prepare(run.Request(file, spp=4)).render
+    again = prepare(Request(file, spp=4)).render
     again.restore(4, state)
     np.testing.assert_array_equal(again.image(), picture)
     with pytest.raises(ValueError, match="Stokes"):

@@ -15,7 +15,9 @@ import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError, MachineError
 from gonio.pictures import denoise, images
-from gonio.render import run
+from gonio.render.finish import render_to_file
+from gonio.render.prepare import prepare
+from gonio.render.request import Request, parse_size
 from gonio.transport import mitsuba_render, passes
 
 PIXELS = 300_000
@@ -133,11 +135,11 @@ def test_a_mitsuba_scene_has_passes_of_one_size() -> None:
 @pytest.mark.parametrize("text", ["640", "x", "640x", "-3x4", "6.5x4", "640x480x3", "99999999999x1"])
 def test_a_bad_size_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="is no size"):
-        run.parse_size(text)
+        parse_size(text)
 
 
 def test_a_size_is_width_times_height() -> None:
-    assert run.parse_size("640x480") == (640, 480)
+    assert parse_size("640x480") == (640, 480)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +159,7 @@ def test_a_size_is_width_times_height() -> None:
     ],
 )
 def test_options_are_checked_before_anything_is_loaded(option: dict[str, object], where: str) -> None:
-    request = run.Request(Path("nowhere"), **option)  # type: ignore[arg-type]
+    request = Request(Path("nowhere"), **option)  # type: ignore[arg-type]
     with pytest.raises(InputError) as caught:
         request.check()
     assert caught.value.where == where
@@ -166,7 +168,7 @@ def test_options_are_checked_before_anything_is_loaded(option: dict[str, object]
 def test_a_missing_denoiser_is_told_before_the_render(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(denoise, "available", lambda: "")
     with pytest.raises(MachineError):
-        run.Request(Path("nowhere"), denoise=True).check()
+        Request(Path("nowhere"), denoise=True).check()
 
 
 @pytest.fixture
@@ -179,7 +181,7 @@ def scene(tmp_path: Path) -> Path:
 
 def test_a_render_writes_the_picture_and_its_settings(scene: Path, tmp_path: Path) -> None:
     output = tmp_path / "a.exr"
-    result = run.render(run.Request(scene, output, spp=8, seed=5))
+    result = render_to_file(Request(scene, output, spp=8, seed=5))
     picture = images.read(output)
     assert picture.pixels.shape == (16, 24, 3) and picture.pixels.max() > 0
     assert result.spp == picture.metadata["spp"] == 8
@@ -193,13 +195,13 @@ def test_the_picture_goes_into_the_current_folder_by_the_scenes_name(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run.render(run.Request(scene)).output == Path("ball.exr")
+    assert render_to_file(Request(scene)).output == Path("ball.exr")
     assert (tmp_path / "ball.exr").is_file()
 
 
 def test_same_seed_same_bits_whatever_the_passes(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def rendered(seed: int) -> np.ndarray:
-        prepared = run.prepare(run.Request(scene, spp=13, seed=seed))
+        prepared = prepare(Request(scene, spp=13, seed=seed))
         passes.run(prepared.render, prepared.spp, 24 * 16)
         return prepared.render.image()
 
@@ -215,7 +217,7 @@ def test_another_value_compiles_no_kernel(scene: Path) -> None:
     import drjit as dr
 
     def compiled(albedo: list[float]) -> int:
-        prepared = run.prepare(run.Request(scene, overrides={"shapes.0.material.albedo": albedo}))
+        prepared = prepare(Request(scene, overrides={"shapes.0.material.albedo": albedo}))
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             passes.run(prepared.render, 4, 24 * 16)
@@ -227,7 +229,7 @@ def test_another_value_compiles_no_kernel(scene: Path) -> None:
 
 
 def test_the_scene_is_overridden_by_options(scene: Path) -> None:
-    prepared = run.prepare(run.Request(scene, size=(10, 6), integrator="normal", sampler="independent"))
+    prepared = prepare(Request(scene, size=(10, 6), integrator="normal", sampler="independent"))
     assert prepared.size == (10, 6)
     assert prepared.settings["integrator"] == "normal" and prepared.settings["sampler"] == "independent"
     assert prepared.spp == 4
@@ -235,12 +237,12 @@ def test_the_scene_is_overridden_by_options(scene: Path) -> None:
 
 def test_an_unknown_integrator_gets_a_suggestion(scene: Path) -> None:
     with pytest.raises(InputError) as caught:
-        run.prepare(run.Request(scene, integrator="pth"))
+        prepare(Request(scene, integrator="pth"))
     assert (caught.value.where, caught.value.hint) == ("--integrator", "did you mean 'path'?")
 
 
 def test_a_timeout_keeps_the_picture_and_says_so(scene: Path, tmp_path: Path) -> None:
-    result = run.render(run.Request(scene, tmp_path / "a.npz", spp=2**29, timeout=0.3))
+    result = render_to_file(Request(scene, tmp_path / "a.npz", spp=2**29, timeout=0.3))
     metadata = images.read(result.output).metadata
     assert metadata["stopped"] == result.stopped == "timeout"
     assert metadata["spp"] == result.spp < metadata["wanted_spp"] == 2**29
@@ -257,7 +259,7 @@ def xml(tmp_path: Path) -> Path:
 
 
 def test_a_mitsuba_scene_renders_with_gonio_materials(xml: Path, tmp_path: Path) -> None:
-    result = run.render(run.Request(xml, tmp_path / "a.npz"))
+    result = render_to_file(Request(xml, tmp_path / "a.npz"))
     pixels = images.read(result.output).pixels
     assert pixels.shape == (16, 24, 3) and result.spp == 4
     ball = pixels[8, 12]
@@ -269,7 +271,7 @@ def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monke
     monkeypatch.setattr(mitsuba_render, "WAVEFRONT", 24 * 16 * 2)  # passes of two samples
 
     def rendered(seed: int) -> np.ndarray:
-        prepared = run.prepare(run.Request(xml, spp=6, seed=seed))
+        prepared = prepare(Request(xml, spp=6, seed=seed))
         passes.run(prepared.render, prepared.spp, 24 * 16)
         assert prepared.render.done == 6
         return prepared.render.image()
@@ -282,7 +284,7 @@ def test_a_mitsuba_scene_has_the_same_picture_for_the_same_seed(xml: Path, monke
 def test_both_ways_through_a_mitsuba_scene_agree(xml: Path) -> None:
     pictures = []
     for integrator in (None, "path"):
-        prepared = run.prepare(run.Request(xml, spp=512, integrator=integrator, max_depth=3 if integrator else None))
+        prepared = prepare(Request(xml, spp=512, integrator=integrator, max_depth=3 if integrator else None))
         passes.run(prepared.render, prepared.spp, 24 * 16)
         pictures.append(prepared.render.image())
     # Mitsuba's default filter spreads samples over pixels, so means are compared, not pixels.
@@ -290,10 +292,10 @@ def test_both_ways_through_a_mitsuba_scene_agree(xml: Path) -> None:
 
 
 def test_a_mitsuba_scene_takes_size_and_parameters(xml: Path) -> None:
-    prepared = run.prepare(run.Request(xml, size=(12, 20), overrides={"alpha": 0.5}))
+    prepared = prepare(Request(xml, size=(12, 20), overrides={"alpha": 0.5}))
     assert prepared.size == (12, 20)
     with pytest.raises(InputError, match="alhpa"):
-        run.prepare(run.Request(xml, overrides={"alhpa": 0.5}))
+        prepare(Request(xml, overrides={"alhpa": 0.5}))
 
 
 @pytest.mark.parametrize(
@@ -309,7 +311,7 @@ def test_a_mitsuba_scene_takes_size_and_parameters(xml: Path) -> None:
 def test_a_bad_mitsuba_scene_is_one_clear_error(xml: Path, old: str, new: str, message: str) -> None:
     xml.write_text(XML.replace(old, new))
     with pytest.raises(InputError, match=message) as caught:
-        run.prepare(run.Request(xml))
+        prepare(Request(xml))
     assert "Traceback" not in caught.value.what and ".cpp" not in caught.value.what
     assert caught.value.where == str(xml)
 
@@ -323,15 +325,15 @@ def test_a_mitsuba_scene_may_not_read_outside_its_folder(tmp_path: Path) -> None
         XML.replace('<shape type="sphere">', '<shape type="ply"><string name="filename" value="../secret.ply"/>')
     )
     with pytest.raises(InputError, match="outside the scene's folder"):
-        run.prepare(run.Request(scene))
+        prepare(Request(scene))
     with pytest.raises(InputError) as caught:  # allowed, it is read, and found to be no mesh
-        run.prepare(run.Request(scene, allow_outside=True))
+        prepare(Request(scene, allow_outside=True))
     assert "outside" not in caught.value.what
 
 
 def test_options_that_mitsubas_integrator_would_ignore_are_refused(xml: Path) -> None:
     with pytest.raises(InputError) as caught:
-        run.prepare(run.Request(xml, max_depth=3))
+        prepare(Request(xml, max_depth=3))
     assert "--integrator" in caught.value.hint
 
 

@@ -13,7 +13,8 @@ import pytest
 from gonio import scene
 from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.render import run
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 
 
 def scene_with(shapes: list, lights: list | None = None, **changes: Any) -> dict:
@@ -426,7 +427,7 @@ def test_shapes_and_lights_come_in_the_same_order_every_time() -> None:
     orders = set()
     kept = []  # so that addresses differ
     for _ in range(8):
-        prepared = run.prepare(run.Request(Path("ball"), material=material, spp=1, size=(8, 8)))
+        prepared = prepare(Request(Path("ball"), material=material, spp=1, size=(8, 8)))
         kept.append(prepared)
         shapes = prepared.render.scene.shapes()  # type: ignore[attr-defined]
         orders.add(tuple((shape.id(), str(shape.bbox())) for shape in shapes))

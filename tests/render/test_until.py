@@ -12,7 +12,9 @@ from gonio.bridge import engine
 from gonio.bridge.types import Scene
 from gonio.errors import GonioWarning, InputError
 from gonio.pictures import images
-from gonio.render import run
+from gonio.render.finish import render_to_file
+from gonio.render.prepare import prepare
+from gonio.render.request import Request
 from gonio.transport import until
 from gonio.transport.integrators import Render, Settings, caustics
 from gonio.transport.integrators.progressive import SHARE, tiles
@@ -33,8 +35,8 @@ def shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def drawing(scene: Path, error: float, tmp_path: Path, **options: object) -> until.Until:
-    request = run.Request(scene, tmp_path / "a.exr", until_error=error, **OPTIONS | options)  # type: ignore[arg-type]
-    found = run.prepare(request).render
+    request = Request(scene, tmp_path / "a.exr", until_error=error, **OPTIONS | options)  # type: ignore[arg-type]
+    found = prepare(request).render
     assert isinstance(found, until.Until)
     return found
 
@@ -247,7 +249,7 @@ def test_shares_follow_the_noise_and_cost_nothing() -> None:
 
 
 def test_a_bound_that_is_reached_first_is_told(scene: Path, tmp_path: Path) -> None:
-    result = run.render(run.Request(scene, tmp_path / "a.exr", spp=20, until_error=1e-7))
+    result = render_to_file(Request(scene, tmp_path / "a.exr", spp=20, until_error=1e-7))
     assert result.spp == 20 and result.stopped == "" and result.error is not None
     assert result.warnings == (
         f"relMSE is estimated to be {result.error:.3g} after 20 samples per pixel, 1e-07 was asked for",

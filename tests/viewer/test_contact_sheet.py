@@ -121,10 +121,10 @@ def test_same_names_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_too_many_pictures_are_refused_before_the_first(tmp_path: Path) -> None:
-    from gonio.render import run
+    from gonio.render.request import Request
 
     variations = [Variation("a", tuple(range(20))), Variation("b", tuple(range(20)))]
     with pytest.raises(InputError, match="400 pictures"):
-        contact_sheet.render_sheet(run.Request(Path("nowhere")), variations, tmp_path / "a.png")
+        contact_sheet.render_sheet(Request(Path("nowhere")), variations, tmp_path / "a.png")
     with pytest.raises(InputError, match="varied twice"):
-        contact_sheet.render_sheet(run.Request(Path("nowhere")), [Variation("a", (1,))] * 2, tmp_path / "a.png")
+        contact_sheet.render_sheet(Request(Path("nowhere")), [Variation("a", (1,))] * 2, tmp_path / "a.png")

@@ -15,7 +15,7 @@ from . import completion
 
 if TYPE_CHECKING:
     from ..material import BSDF
-    from ..render.run import Request
+    from ..render.request import Request
 
 Model = Annotated[
     str, Argument(metavar="MODEL", help="A material's name; see `gonio models`.", autocompletion=completion.materials)
@@ -126,15 +126,15 @@ class Rendering:
         """The request to render a scene, or a material on a ball. Raises InputError for a size or an exposure that is
         none."""
         from ..pictures import exposures
-        from ..render import run
+        from ..render.request import Request, parse_size
 
-        return run.Request(
+        return Request(
             Path(material.name) if material else scene,
             output,
             timeout=timeout,
             **vars(self)
             | {
-                "size": None if self.size is None else run.parse_size(self.size),
+                "size": None if self.size is None else parse_size(self.size),
                 "exposure": exposures.parse(self.exposure),
                 "material": material,
                 "checkpoint": checkpoint,

@@ -71,9 +71,9 @@ def render(
     Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
     """
     from ..material import BSDF
-    from . import run
+    from .request import Request
 
-    request = run.Request(
+    request = Request(
         Path(scene.name) if isinstance(scene, BSDF) else Path(scene),
         output=None if output is None else Path(output),
         spp=spp,
@@ -118,9 +118,10 @@ def resume(
     allow_code  let it run Python files that its scene names
     Raises InputError where the checkpoint is damaged, and where anything that the picture depends on has changed.
     """
-    from . import checkpoints, run
+    from . import checkpoints
+    from .request import Request
 
-    change = run.Request(
+    change = Request(
         Path(),
         output=None if output is None else Path(output),
         spp=spp,
@@ -138,17 +139,19 @@ def _picture(request: Request, level: int) -> RGB:
     from ..bridge import engine
     from ..errors import GonioWarning
     from ..pictures import images
-    from . import checkpoints, run
+    from . import checkpoints, finish
+    from .execute import execute
+    from .prepare import prepare
 
     notices: list[str] = []
     output, exposure = request.output, request.exposure
     with engine.put_back():
-        prepared = run.prepare(request)
+        prepared = prepare(request)
         notices += prepared.warnings
         beside = None if output is None else checkpoints.beside(output)
-        stopped, keeper = run.work(prepared, temporary=beside, tell=notices.append)
-        picture = run.finished(prepared.render, request.denoise)
-        error, unmet = run.estimated(prepared)
+        stopped, keeper = execute(prepared, temporary=beside, tell=notices.append)
+        picture = finish.picture_of(prepared.render, request.denoise)
+        error, unmet = finish.estimated(prepared)
         notices += filter(None, [unmet])
         if output is not None:
             settings = prepared.settings | {"spp": prepared.render.done}
@@ -160,4 +163,4 @@ def _picture(request: Request, level: int) -> RGB:
         notices.append(f"no checkpoint was written: {keeper.error.what}")
     for notice in notices:
         warnings.warn(notice, GonioWarning, stacklevel=level)
-    return picture if not request.gradient else run.with_slopes(prepared, picture)
+    return picture if not request.gradient else finish.with_slopes(prepared, picture)

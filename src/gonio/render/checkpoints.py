@@ -7,153 +7,29 @@ file that it names, of the settings, of Gonio's own code, and of what computes, 
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..bridge import engine
-from ..catalog import notation
 from ..errors import GonioError, InputError
-from ..material import BSDF
 from ..transport.passes import Progress, Renders
-from ..work import facts, garbage, kept
+from ..work import garbage, kept
 from ..work.kept import Arrays, Facts
+from .identity import check
+from .prepare import Prepared
 from .request import Request
-
-if TYPE_CHECKING:
-    from .run import Prepared
+from .request_json import described, request_of
 
 EVERY = 3.0  # seconds between two checkpoints: with a pass and the writing, less than 5 are lost
 MOST_COST = 0.015  # of the time; where writing takes more, it is done less often
 LONG = 60.0  # seconds that a job must take for a checkpoint that nobody asked for
 SUFFIX = ".checkpoint"  # beside the picture
 KIND = "render"
-
-
-@dataclass(frozen=True)
-class Sources:
-    """What a picture is made from.
-
-    text     writes down the scene as it is rendered, overrides and all; which takes a while where it is large
-    files    those that it names, by the name that it gives them
-    how      integrator, sampler, seed and what else there is to set
-    version  of Gonio and Mitsuba
-    device   what computes
-    """
-
-    text: Callable[[], str]
-    files: Mapping[str, Path]
-    how: str
-    version: str
-    device: str
-
-    @staticmethod
-    def of(mi: ModuleType, text: Callable[[], str], files: Mapping[str, Path], how: str) -> Sources:
-        return Sources(text, files, how, facts.versions(), _device(mi))
-
-    def identity(self) -> dict[str, str]:
-        """A hash or a name of each thing that the picture depends on, by what a person calls it."""
-        found = {"version": self.version, "code of Gonio": facts.code(), "device": self.device}
-        found |= {"settings": self.how, "scene": _hash(self.text().encode("utf-8", "surrogateescape"))}
-        for name, path in self.files.items():
-            found[f"file {name}"] = facts.file_hash(path)
-        return found
-
-
-def _hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
-def _device(mi: ModuleType) -> str:
-    """What computes: another compiler or another processor may round otherwise."""
-    variant = str(mi.variant())
-    return f"{variant}, {facts.processor() if variant.startswith('llvm') else engine.cuda_device()}"
-
-
-# ---------------------------------------------------------------------- a request as JSON
-
-
-def described(request: Request) -> Facts:
-    """A request as a file can hold it. Raises InputError for a material that this program alone knows."""
-    found: Facts = {}
-    for one in fields(Request):
-        value = getattr(request, one.name)
-        if one.name in ("checkpoint", "timeout"):
-            continue
-        if isinstance(value, Path):
-            value = str(value.absolute()) if one.name == "output" or request.material is None else str(value)
-        found[one.name] = _plain(value)
-    return found
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, BSDF):
-        return {"$material": notation.as_json(value)}
-    if isinstance(value, Mapping):
-        return {str(name): _plain(item) for name, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
-
-
-def request_of(found: Facts, where: str, allow_code: bool) -> Request:
-    """The request that `described` made. A file alone never makes Gonio run Python: `allow_code` is asked for again."""
-    if not allow_code and (found.get("allow_code") or ".py:" in json.dumps(found)):
-        raise InputError(
-            "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
-        )
-    try:
-        values = {name: _rebuilt(value) for name, value in found.items()}
-        for name in ("scene", "output"):
-            values[name] = None if values[name] is None else Path(values[name])
-        values["size"] = None if values["size"] is None else tuple(values["size"])
-        values["gradient"] = tuple(values["gradient"])
-        return Request(**values)
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, GonioError):
-            raise
-        raise InputError("this checkpoint is of another version of Gonio", where, "render anew") from None
-
-
-def _rebuilt(value: Any) -> Any:
-    if isinstance(value, dict):
-        if set(value) == {"$material"}:
-            return notation.from_json(value["$material"])
-        return {name: _rebuilt(item) for name, item in value.items()}
-    return [_rebuilt(item) for item in value] if isinstance(value, list) else value
-
-
-# ---------------------------------------------------------------------- going on
-
-
-def check(found: Facts, identity: Mapping[str, str], where: str) -> None:
-    """Raise InputError that names the first thing that is not as it was."""
-    before = found.get("identity")
-    before = before if isinstance(before, dict) else {}
-    for name in [*identity, *before]:
-        old, new = before.get(name), identity.get(name)
-        if old == new:
-            continue
-        if name in ("version", "device", "settings"):
-            what = f"{name}: the checkpoint was made with {old}, this is {new}"
-        elif name == "code of Gonio":
-            what = "the code of Gonio has changed since the checkpoint was made"
-        elif new == "missing":
-            what = f"the {name} is no longer there"
-        else:
-            what = f"the {name} has changed since the checkpoint was made"
-        raise InputError(what, where, "put back what it was, or render anew without this checkpoint")
 
 
 def load(path: Path) -> kept.Kept:

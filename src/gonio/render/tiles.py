@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,9 @@ from ..transport.passes import Progress
 from ..transport.polarizer import PolarizedRender
 from ..work import crew, facts
 from ..work.kept import Arrays, Facts
-from . import checkpoints
+from .prepare import Prepared, prepare
 from .request import Request
-
-if TYPE_CHECKING:
-    from .run import Prepared
+from .request_json import described, request_of
 
 ALIGNED = 64  # lanes: whole vectors of any processor, and whole tiles of the camera's rays
 MOST_SAMPLES = 1 << 25  # of a part: some seconds of one machine
@@ -45,7 +43,7 @@ PARTS = 20  # for each worker at least, so that none waits long for the last
 
 
 class Gathered:
-    """What a crew has sent so far, as `checkpoints.Keeper` and `run` see a render."""
+    """What a crew has sent so far, as `checkpoints.Keeper` sees a render."""
 
     def __init__(self, render: Render, wanted: int) -> None:
         self._render, self._wanted = render, wanted
@@ -190,7 +188,7 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
             if not path.resolve().is_relative_to(folder):
                 raise InputError(f"'{name}' lies outside the scene's folder", where, "copy it there: it has to travel")
     places = {str(path.resolve()): facts.file_hash(path) for path in named.values()}
-    found = {"request": checkpoints.described(replace(request, output=None, threads=None)), "folder": folder}
+    found = {"request": described(replace(request, output=None, threads=None)), "folder": folder}
     text = json.dumps({**found, "files": places}, sort_keys=True)
     return text, {content: Path(path) for path, content in places.items()}
 
@@ -220,15 +218,13 @@ def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays |
 
 
 def _prepared(spec: str) -> Prepared:
-    from . import run
-
     if spec not in _last:
         _last.clear()
         _rates.clear()
         folder = tempfile.TemporaryDirectory(prefix="gonio-scene-")
         known: Facts = json.loads(spec)
         _last[spec] = (
-            run.prepare(replace(_unpacked(known, Path(folder.name)), output=Path(folder.name, "a.exr"))),
+            prepare(replace(_unpacked(known, Path(folder.name)), output=Path(folder.name, "a.exr"))),
             folder,
         )
     return _last[spec][0]
@@ -243,7 +239,7 @@ def _unpacked(known: Facts, folder: Path) -> Request:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(crew.file(content), target)
         text = text.replace(json.dumps(path)[1:-1] + ":", json.dumps(str(target))[1:-1] + ":")  # FILE.py:CLASS
-    described = json.loads(text)
+    known_request = json.loads(text)
     if known["folder"]:
-        described["scene"] = str(folder / os.path.relpath(described["scene"], known["folder"]))
-    return checkpoints.request_of(described, "cluster", allow_code=True)  # whoever asked for the job has allowed it
+        known_request["scene"] = str(folder / os.path.relpath(known_request["scene"], known["folder"]))
+    return request_of(known_request, "cluster", allow_code=True)  # whoever asked for the job has allowed it

@@ -25,7 +25,11 @@ from ..catalog import notation
 from ..errors import GonioWarning, InputError
 from ..owner import public
 from ..pictures import exposures, images
-from ..render import checkpoints, run
+from ..render.execute import by_crew, execute
+from ..render.finish import picture_of
+from ..render.prepare import Prepared, prepare
+from ..render.request import Request
+from ..render.request_json import described
 from ..transport import passes
 from ..work import crew, parts
 from . import figures
@@ -125,7 +129,7 @@ def study(
     title     heading of the sheet; the scene's name if not given
     Other options as in `go.render`. Returns a Sheet, which a notebook shows. Raises InputError, MachineError.
     """
-    request = run.Request(
+    request = Request(
         Path(scene),
         spp=spp,
         size=size,
@@ -148,7 +152,7 @@ def study(
 
 
 def render_sheet(
-    request: run.Request,
+    request: Request,
     variations: Sequence[Variation],
     output: Path | None,
     title: str = "",
@@ -175,7 +179,7 @@ def render_sheet(
     cells = tuple(dict(zip(names, combination, strict=True)) for combination in combinations)
     pictures: list[exposures.RGB] = []
     notices: dict[str, None] = {}
-    whole = sorted(checkpoints.described(request).items()), [(one.path, repr(one.values)) for one in variations]
+    whole = sorted(described(request).items()), [(one.path, repr(one.values)) for one in variations]
     with passes.Interrupts() as interrupts, parts.job("study", *whole) as job:
         if job.found:
             tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
@@ -185,7 +189,7 @@ def render_sheet(
             state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
             report(start, len(cells), state)
             # Each picture has the same seed, so that what differs is the parameter, not the noise.
-            prepared = [run.prepare(replace(request, overrides={**request.overrides, **cell})) for cell in some]
+            prepared = [prepare(replace(request, overrides={**request.overrides, **cell})) for cell in some]
             notices |= dict.fromkeys(text for one in prepared for text in one.warnings)
             pictures += _pictures(prepared, job, interrupts)
         last = prepared[-1]
@@ -203,7 +207,7 @@ def render_sheet(
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
 
 
-def _pictures(prepared: Sequence[run.Prepared], job: parts.Parts, interrupts: passes.Interrupts) -> list[exposures.RGB]:
+def _pictures(prepared: Sequence[Prepared], job: parts.Parts, interrupts: passes.Interrupts) -> list[exposures.RGB]:
     """Some pictures of a study: as an earlier run has left them, or from where that one was stopped."""
     keys = [
         parts.key_of(sorted(one.sources.identity().items()), one.spp, one.request.denoise, one.size) for one in prepared
@@ -215,16 +219,16 @@ def _pictures(prepared: Sequence[run.Prepared], job: parts.Parts, interrupts: pa
 
     def keep(number: int) -> None:
         key, one = missing[number]
-        found[key] = run.finished(one.render, one.request.denoise)
+        found[key] = picture_of(one.render, one.request.denoise)
         job.put(key, {"picture": found[key]})
 
     if crew.current().size > 1 and missing:
-        run.by_crew([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
+        by_crew([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
         interrupts.check()
     else:
         for number, (key, one) in enumerate(missing):
             begun = job.path(key, ".checkpoint")
-            _, keeper = run.work(one, temporary=begun, long=0.0, interrupted=lambda: interrupts.asked)
+            _, keeper = execute(one, temporary=begun, long=0.0, interrupted=lambda: interrupts.asked)
             interrupts.check()
             keep(number)
             keeper.remove()

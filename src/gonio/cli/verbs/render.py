@@ -19,7 +19,8 @@ from .base import PICTURES, verb
 
 if TYPE_CHECKING:
     from ...pictures.exposures import Exposure
-    from ...render.run import Request, Result
+    from ...render.finish import Result
+    from ...render.request import Request
 
 
 @verb(PICTURES, place=1)
@@ -64,10 +65,10 @@ def render(
 
 def carry_out(request: Request, title: str, as_json: bool, crew: Crew) -> None:
     """Render with a bar, and say what came of it."""
-    from ...render import run
+    from ...render.finish import render_to_file
 
     with Bar(title) as bar, crew.working():
-        result = run.render(request, report=bar.update, notice=bar.stopping, tell=bar.tell)
+        result = render_to_file(request, report=bar.update, notice=bar.stopping, tell=bar.tell)
     try:
         if as_json:
             print(json.dumps(result.as_dict()))

@@ -38,8 +38,9 @@ def resume(
       gonio resume phong.exr.checkpoint
       gonio resume night.checkpoint --spp 4096 -o night.exr
     """
-    from ...render import checkpoints, run
+    from ...render import checkpoints
+    from ...render.request import Request
 
-    change = run.Request(checkpoint, output=output, spp=spp, timeout=timeout, threads=threads)
+    change = Request(checkpoint, output=output, spp=spp, timeout=timeout, threads=threads)
     change.check()
     carry_out(checkpoints.asked_again(checkpoint, change, allow_code), checkpoint.name, as_json, crew)

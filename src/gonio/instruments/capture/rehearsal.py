@@ -20,7 +20,9 @@ from ...errors import InputError
 from ...material import BSDF
 from ...owner import public
 from ...pictures import images
-from ...render import run
+from ...render.execute import execute
+from ...render.finish import picture_of
+from ...render.prepare import prepare
 from ...render.request import Request
 from .calibration import NAME, Calibration, Floats, made
 
@@ -121,6 +123,6 @@ def _rendered(calibration: Calibration, light: str, sample: str, material: BSDF,
     with tempfile.TemporaryDirectory(prefix="gonio-") as folder:
         (Path(folder) / "scene.json").write_text(json.dumps(scene))
         overrides = {} if sample == "reference" else {"shapes.0.material": material}
-        prepared = run.prepare(Request(Path(folder), output=Path(folder) / "p.npz", overrides=overrides, seed=seed))
-        run.work(prepared)
-        return np.asarray(run.finished(prepared.render, False), np.float64)
+        prepared = prepare(Request(Path(folder), output=Path(folder) / "p.npz", overrides=overrides, seed=seed))
+        execute(prepared)
+        return np.asarray(picture_of(prepared.render, False), np.float64)

@@ -1,19 +1,13 @@
-"""One render from a scene's file to a picture on disk."""
+"""From a request to a render that is ready to advance: the scene is read, Mitsuba started, the integrator chosen."""
 
 from __future__ import annotations
 
 import inspect
-import math
-import time
-from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
 
 from .._version import __version__
 from ..bridge import engine
@@ -22,18 +16,15 @@ from ..pictures import denoise, images
 from ..scene import mitsuba_scene
 from ..scene.film import check_film
 from ..transport.mitsuba_render import MitsubaRender
-from ..transport.passes import Interrupts, Progress, Renders, run
-from ..work import crew, facts, garbage
-from . import checkpoints
-from .checkpoints import Keeper, Sources
-from .request import UNTIL_MOST, Request, parse_size
+from ..transport.passes import Renders
+from ..work import facts, garbage
+from .identity import Sources
+from .request import UNTIL_MOST, Request
 
 if TYPE_CHECKING:
     from ..bridge.types import Scene
     from ..transport import integrators, until
     from ..transport.integrators import Settings
-
-__all__ = ["Prepared", "Request", "Result", "finished", "parse_size", "prepare", "render", "run"]
 
 
 @dataclass(frozen=True)
@@ -48,33 +39,6 @@ class Prepared:
     settings: dict[str, images.Value]
     sources: Sources
     warnings: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Result:
-    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's.
-
-    error       relMSE of the picture as it is estimated, where it was rendered until an error
-    signal      the number of the signal that interrupted it, 0 where none did
-    checkpoint  file from which it goes on, None where there is none
-    """
-
-    output: Path
-    spp: int
-    wanted_spp: int
-    size: tuple[int, int]
-    seconds: float
-    stopped: str
-    settings: dict[str, images.Value]
-    warnings: tuple[str, ...]
-    exposure: float | None = None
-    signal: int = 0
-    checkpoint: Path | None = None
-    error: float | None = None
-
-    def as_dict(self) -> dict[str, object]:
-        checkpoint = None if self.checkpoint is None else str(self.checkpoint)
-        return {**asdict(self), "output": str(self.output), "checkpoint": checkpoint}
 
 
 def prepare(request: Request) -> Prepared:
@@ -164,20 +128,6 @@ def _drawing(built: Scene, settings: Settings, request: Request) -> integrators.
 def _most(request: Request, spp: int) -> int:
     """Samples per pixel: those asked for, those of the scene, or a bound where the error says how many."""
     return request.spp or (spp if request.until_error is None else UNTIL_MOST)
-
-
-def estimated(prepared: Prepared) -> tuple[float | None, str]:
-    """The relMSE of the picture so far, where it is rendered until an error, and what is to be known of it."""
-    wanted = prepared.request.until_error
-    if wanted is None:
-        return None, ""
-    error = prepared.render.estimate()  # type: ignore[attr-defined]  # of an Until
-    if error <= wanted:
-        return error, ""
-    if not math.isfinite(error):
-        return None, "too few samples to tell the relMSE"
-    done = f"{prepared.render.done} samples per pixel"
-    return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was asked for"
 
 
 def _advice(render: Renders) -> list[str]:
@@ -300,153 +250,3 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
     sources = Sources.of(mi, *files, all_)
     about = _metadata(request, mi, **how)
     return Prepared(request, render, spp, (width, height), output, about, sources, tuple(_advice(render)))
-
-
-def work(
-    prepared: Prepared,
-    *,
-    temporary: Path | None = None,
-    long: float | None = None,
-    report: Callable[[Progress], None] = lambda progress: None,
-    interrupted: Callable[[], object] = lambda: False,
-    tell: Callable[[str], None] = lambda text: None,
-) -> tuple[str, Keeper]:
-    """Advance a render to its samples, from where an earlier run left it: why it ended, as `run` has it, and the keeper
-    of its checkpoints, which is told when the picture is written.
-
-    temporary  the checkpoint of a long job whose request names none
-    long       seconds that such a job must take; a minute where None
-    tell       called at the start with what was found
-    """
-    from ..transport import integrators, until
-    from . import tiles
-
-    request, (width, height) = prepared.request, prepared.size
-    path = request.checkpoint or temporary
-    unasked = request.checkpoint is None
-    if path is not None:
-        found, unasked = checkpoints.earlier(path, prepared, unasked)
-        if found:
-            tell(found)
-    gathered = None
-    goal: int | Callable[[], int] = prepared.spp
-    if isinstance(prepared.render, until.Until):
-        drawing = prepared.render
-        goal = lambda: drawing.goal  # noqa: E731
-        if crew.current().size > 1:
-            what = "workers render parts of a picture, and its error is that of the whole"
-            raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
-    elif crew.current().size > 1 and prepared.render.done < prepared.spp:
-        tiles.travelling(prepared)  # what cannot travel is said before anything is written
-        assert isinstance(prepared.render, integrators.Render)
-        gathered = tiles.Gathered(prepared.render, prepared.spp)
-    keeper = Keeper(path, prepared if gathered is None else replace(prepared, render=gathered), unasked, long)
-
-    def after(progress: Progress) -> None:
-        keeper.after_pass(progress)
-        report(progress)
-
-    try:
-        if gathered is not None:
-            stopped = tiles.advance(
-                [(prepared, gathered)], report=after, interrupted=interrupted, timeout=request.timeout
-            )
-            gathered.give()
-        else:
-            stopped = run(
-                prepared.render,
-                goal,
-                width * height,
-                timeout=request.timeout,
-                report=after,
-                interrupted=interrupted,
-            )
-        keeper.end(bool(stopped))
-    finally:
-        keeper.close()
-    return stopped, keeper
-
-
-def by_crew(
-    prepared: Sequence[Prepared],
-    *,
-    interrupted: Callable[[], object] = lambda: False,
-    finished: Callable[[int], None] = lambda index: None,
-) -> str:
-    """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
-    from ..transport import integrators
-    from . import tiles
-
-    jobs = []
-    for one in prepared:
-        tiles.travelling(one)
-        assert isinstance(one.render, integrators.Render)
-        jobs.append((one, tiles.Gathered(one.render, one.spp)))
-
-    def give(number: int) -> None:
-        jobs[number][1].give()
-        finished(number)
-
-    return tiles.advance(jobs, report=lambda progress: None, interrupted=interrupted, finished=give)
-
-
-def render(
-    request: Request,
-    report: Callable[[Progress], None] = lambda progress: None,
-    notice: Callable[[], None] = lambda: None,
-    tell: Callable[[str], None] = lambda text: None,
-) -> Result:
-    """Render a scene to a file; on Ctrl-C, SIGTERM and SIGHUP or at the time limit, the picture so far.
-
-    report  called after each pass
-    notice  called at the first of these signals, from another thread
-    tell    called at the start with what an earlier run has left
-    """
-    started = time.perf_counter()
-    with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
-        prepared = prepare(request)
-        interrupts.check()
-        beside = checkpoints.beside(prepared.output)
-        stopped, keeper = work(
-            prepared, temporary=beside, report=report, interrupted=lambda: interrupts.asked, tell=tell
-        )
-        picture = finished(prepared.render, request.denoise)
-        settings = prepared.settings | {"spp": prepared.render.done}
-        error, unmet = estimated(prepared)
-        if error is not None:
-            settings |= {"estimated_error": round(error, 12)}
-        if stopped:
-            settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
-        seconds = time.perf_counter() - started
-        shown = images.show(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
-        if not stopped:
-            keeper.remove()
-    failed = f"no checkpoint was written: {keeper.error.what}" if keeper.error else ""
-    return Result(
-        prepared.output,
-        prepared.render.done,
-        prepared.spp,
-        prepared.size,
-        seconds,
-        stopped,
-        settings,
-        (*prepared.warnings, *filter(None, [unmet, shown.notice, failed])),
-        shown.exposure,
-        interrupts.asked if stopped == "interrupt" else 0,
-        keeper.path if keeper.written else None,
-        error,
-    )
-
-
-def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The picture, and its derivatives below it: (1 + paths, height, width, 3)."""
-    return np.stack([picture, *prepared.render.slopes()])  # type: ignore[attr-defined]  # of Gradients
-
-
-def finished(render: Renders, denoised: bool) -> NDArray[np.float32]:
-    """The picture, denoised where asked."""
-    picture = render.image()
-    if not denoised:
-        return picture
-    guides = render.aov()
-    return denoise.denoise(picture, guides.get("albedo"), guides.get("normal"))

@@ -1,0 +1,102 @@
+"""A prepared render advanced to its samples, by this process or by workers, with checkpoints on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ..errors import InputError
+from ..transport.passes import Progress, run
+from ..work import crew
+from . import checkpoints
+from .checkpoints import Keeper
+from .prepare import Prepared
+
+
+def execute(
+    prepared: Prepared,
+    *,
+    temporary: Path | None = None,
+    long: float | None = None,
+    report: Callable[[Progress], None] = lambda progress: None,
+    interrupted: Callable[[], object] = lambda: False,
+    tell: Callable[[str], None] = lambda text: None,
+) -> tuple[str, Keeper]:
+    """Advance a render to its samples, from where an earlier run left it: why it ended, as `run` has it, and the keeper
+    of its checkpoints, which is told when the picture is written.
+
+    temporary  the checkpoint of a long job whose request names none
+    long       seconds that such a job must take; a minute where None
+    tell       called at the start with what was found
+    """
+    from ..transport import integrators, until
+    from . import tiles
+
+    request, (width, height) = prepared.request, prepared.size
+    path = request.checkpoint or temporary
+    unasked = request.checkpoint is None
+    if path is not None:
+        found, unasked = checkpoints.earlier(path, prepared, unasked)
+        if found:
+            tell(found)
+    gathered = None
+    goal: int | Callable[[], int] = prepared.spp
+    if isinstance(prepared.render, until.Until):
+        drawing = prepared.render
+        goal = lambda: drawing.goal  # noqa: E731
+        if crew.current().size > 1:
+            what = "workers render parts of a picture, and its error is that of the whole"
+            raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
+    elif crew.current().size > 1 and prepared.render.done < prepared.spp:
+        tiles.travelling(prepared)  # what cannot travel is said before anything is written
+        assert isinstance(prepared.render, integrators.Render)
+        gathered = tiles.Gathered(prepared.render, prepared.spp)
+    keeper = Keeper(path, prepared if gathered is None else replace(prepared, render=gathered), unasked, long)
+
+    def after(progress: Progress) -> None:
+        keeper.after_pass(progress)
+        report(progress)
+
+    try:
+        if gathered is not None:
+            stopped = tiles.advance(
+                [(prepared, gathered)], report=after, interrupted=interrupted, timeout=request.timeout
+            )
+            gathered.give()
+        else:
+            stopped = run(
+                prepared.render,
+                goal,
+                width * height,
+                timeout=request.timeout,
+                report=after,
+                interrupted=interrupted,
+            )
+        keeper.end(bool(stopped))
+    finally:
+        keeper.close()
+    return stopped, keeper
+
+
+def by_crew(
+    prepared: Sequence[Prepared],
+    *,
+    interrupted: Callable[[], object] = lambda: False,
+    finished: Callable[[int], None] = lambda index: None,
+) -> str:
+    """Have the crew do several renders at once; `finished` is called with the number of each that is done."""
+    from ..transport import integrators
+    from . import tiles
+
+    jobs = []
+    for one in prepared:
+        tiles.travelling(one)
+        assert isinstance(one.render, integrators.Render)
+        jobs.append((one, tiles.Gathered(one.render, one.spp)))
+
+    def give(number: int) -> None:
+        jobs[number][1].give()
+        finished(number)
+
+    return tiles.advance(jobs, report=lambda progress: None, interrupted=interrupted, finished=give)

@@ -1,0 +1,122 @@
+"""What becomes of a render: the picture, denoised where asked, and the file that it is written to."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..pictures import denoise, images
+from ..transport.passes import Interrupts, Progress, Renders
+from . import checkpoints
+from .execute import execute
+from .prepare import Prepared, prepare
+from .request import Request
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a render; `stopped` is "", "interrupt" or "timeout", `spp` what was done, `exposure` a .png's.
+
+    error       relMSE of the picture as it is estimated, where it was rendered until an error
+    signal      the number of the signal that interrupted it, 0 where none did
+    checkpoint  file from which it goes on, None where there is none
+    """
+
+    output: Path
+    spp: int
+    wanted_spp: int
+    size: tuple[int, int]
+    seconds: float
+    stopped: str
+    settings: dict[str, images.Value]
+    warnings: tuple[str, ...]
+    exposure: float | None = None
+    signal: int = 0
+    checkpoint: Path | None = None
+    error: float | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        checkpoint = None if self.checkpoint is None else str(self.checkpoint)
+        return {**asdict(self), "output": str(self.output), "checkpoint": checkpoint}
+
+
+def estimated(prepared: Prepared) -> tuple[float | None, str]:
+    """The relMSE of the picture so far, where it is rendered until an error, and what is to be known of it."""
+    wanted = prepared.request.until_error
+    if wanted is None:
+        return None, ""
+    error = prepared.render.estimate()  # type: ignore[attr-defined]  # of an Until
+    if error <= wanted:
+        return error, ""
+    if not math.isfinite(error):
+        return None, "too few samples to tell the relMSE"
+    done = f"{prepared.render.done} samples per pixel"
+    return error, f"relMSE is estimated to be {error:.3g} after {done}, {wanted:g} was asked for"
+
+
+def render_to_file(
+    request: Request,
+    report: Callable[[Progress], None] = lambda progress: None,
+    notice: Callable[[], None] = lambda: None,
+    tell: Callable[[str], None] = lambda text: None,
+) -> Result:
+    """Render a scene to a file; on Ctrl-C, SIGTERM and SIGHUP or at the time limit, the picture so far.
+
+    report  called after each pass
+    notice  called at the first of these signals, from another thread
+    tell    called at the start with what an earlier run has left
+    """
+    started = time.perf_counter()
+    with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
+        prepared = prepare(request)
+        interrupts.check()
+        beside = checkpoints.beside(prepared.output)
+        stopped, keeper = execute(
+            prepared, temporary=beside, report=report, interrupted=lambda: interrupts.asked, tell=tell
+        )
+        picture = picture_of(prepared.render, request.denoise)
+        settings = prepared.settings | {"spp": prepared.render.done}
+        error, unmet = estimated(prepared)
+        if error is not None:
+            settings |= {"estimated_error": round(error, 12)}
+        if stopped:
+            settings |= {"stopped": stopped, "wanted_spp": prepared.spp}
+        seconds = time.perf_counter() - started
+        shown = images.show(prepared.output, picture, settings | {"seconds": round(seconds, 2)}, request.exposure)
+        if not stopped:
+            keeper.remove()
+    failed = f"no checkpoint was written: {keeper.error.what}" if keeper.error else ""
+    return Result(
+        prepared.output,
+        prepared.render.done,
+        prepared.spp,
+        prepared.size,
+        seconds,
+        stopped,
+        settings,
+        (*prepared.warnings, *filter(None, [unmet, shown.notice, failed])),
+        shown.exposure,
+        interrupts.asked if stopped == "interrupt" else 0,
+        keeper.path if keeper.written else None,
+        error,
+    )
+
+
+def with_slopes(prepared: Prepared, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The picture, and its derivatives below it: (1 + paths, height, width, 3)."""
+    return np.stack([picture, *prepared.render.slopes()])  # type: ignore[attr-defined]  # of Gradients
+
+
+def picture_of(render: Renders, denoised: bool) -> NDArray[np.float32]:
+    """The picture, denoised where asked."""
+    picture = render.image()
+    if not denoised:
+        return picture
+    guides = render.aov()
+    return denoise.denoise(picture, guides.get("albedo"), guides.get("normal"))
