@@ -111,5 +111,5 @@ class Sheen(BSDF):
 @lru_cache(maxsize=1)
 def _table() -> ops.Table:
     """A, B and R by roughness and mu."""
-    text = (Path(__file__).parent / "published" / "zeltner2022.json").read_text()
+    text = Path(__file__).with_name("zeltner2022.json").read_text()
     return ops.Table("sheen", np.array(json.loads(text)["coefficients"]))
