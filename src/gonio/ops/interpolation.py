@@ -72,7 +72,8 @@ def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
     UInt = kind.module.UInt32
     index: Array = UInt(0)
     for x, count in zip(places, table.shape, strict=True):
-        index = index * count + UInt(dr.clip(kind.float(x), 0.0, count - 1.0))
+        # clipped again as a whole number: what NaN becomes differs by processor, and may lie far outside the table
+        index = index * count + dr.minimum(UInt(dr.clip(kind.float(x), 0.0, count - 1.0)), count - 1)
     array = table.array(kind)
     width = 4 if table.channels % 4 == 0 else 1
     fetched = kind.vec4 if width == 4 else kind.float
