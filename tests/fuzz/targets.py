@@ -169,7 +169,8 @@ def _load_xml(path: Path) -> object:
     mi.set_log_level(mi.LogLevel.Error)
     adapter.register(mi)
     lights.register(mi)
-    return mitsuba_scene.load(Request(path), mi)
+    request = Request(path)
+    return mitsuba_scene.load(request, mitsuba_scene.read(request), mi)
 
 
 @target("scene-xml", lambda: [XML % shape for shape in SHAPES], [b"<!--", b"<bsdf>", b'"$spp"', b"&amp;", b"<include"])

@@ -9,7 +9,8 @@ Numbers and albedos among a plugin's properties are the material's parameters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import ClassVar
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..models import number, outside, spectrum
-from . import adapter, engine, mitsuba_scene
+from . import adapter, engine, mitsuba_scene, mitsuba_xml, plugin_search
 from .native import Native
 from .types import MitsubaBSDF, OfVariant, PluginDict
 
@@ -108,6 +109,7 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     """The plugin itself."""
     mi = _mitsuba()
     kind = str(description.get("type", ""))
+    _check_plugins(description, f"mitsuba:{kind}")
     try:
         with engine.file_threads():
             bsdf = mi.load_dict(description, parallel=False)
@@ -116,6 +118,18 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     if not isinstance(bsdf, mi.BSDF):
         raise InputError(f"'{kind}' is a {type(bsdf).__name__}, a BSDF expected", f"mitsuba:{kind}")
     return bsdf
+
+
+def _check_plugins(description: Mapping[str, object], location: str) -> None:
+    """Raise InputError where a description, or one inside it, names a plugin that must not be loaded."""
+    kind = description.get("type")
+    if kind == "resources":
+        raise InputError("'resources' given, and a BSDF searches no folders", location, "give files by their paths")
+    if isinstance(kind, str) and kind not in ("rgb", "ref"):
+        plugin_search.check(kind, location)
+    for value in description.values():
+        if isinstance(value, Mapping):
+            _check_plugins(value, location)
 
 
 def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
@@ -143,12 +157,12 @@ def _is_bsdf(value: object) -> bool:
 
 
 def load_file(path: Path) -> Native:
-    """The BSDF of a Mitsuba XML file: its root, or the first in a scene."""
+    """The BSDF of a Mitsuba XML file: its root, or the first in a scene. It may read what lies in the file's folder."""
     mi = _mitsuba()
-    mitsuba_scene.check_files(path, {}, allow_outside=True)
+    with _without_options():
+        text = mitsuba_xml.read(path, {})
     try:
-        with engine.file_threads():
-            found = mi.load_file(str(path), parallel=False)
+        found = mitsuba_scene.instantiated(text, path.parent, mi)
     except Exception as error:
         raise _refused(error, path.name) from None
     if isinstance(found, mi.BSDF):
@@ -158,6 +172,32 @@ def load_file(path: Path) -> Native:
             if shape.bsdf() is not None:
                 return Native(shape.bsdf())
     raise InputError("no BSDF in this file", str(path), "give a file whose root is <bsdf>, or a scene with one")
+
+
+def within(description: PluginDict, file: Path) -> PluginDict:
+    """The description that a file holds, with absolute paths of the files that it names, which lie in its folder."""
+
+    def locate(name: str) -> str:
+        return mitsuba_xml.readable(name, file.parent / name, file.parent, str(file))
+
+    placed: PluginDict = {}
+    for name, value in description.items():
+        if isinstance(value, dict):
+            value = within(value, file)
+        elif isinstance(value, str):
+            with _without_options():
+                value = mitsuba_xml.property_value(str(description.get("type")), name, value, str(file), locate)
+        placed[name] = value
+    return placed
+
+
+@contextlib.contextmanager
+def _without_options() -> Iterator[None]:
+    """In here an error does not point to an option that scenes have."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(error.what, error.where, error.hint.replace(", or use --allow-outside", "")) from None
 
 
 def plugins() -> list[str]:

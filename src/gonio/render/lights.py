@@ -18,6 +18,7 @@ import drjit as dr
 import numpy as np
 
 from ..errors import InputError
+from . import plugin_search
 from .lamps import Lamps, balls, direction_sample, has_known_sides, rectangle_of, toward
 from .nearby import Nearby
 from .sky import Sky
@@ -120,7 +121,7 @@ def register(mi: ModuleType) -> None:
         def to_string(self) -> str:
             return f"TwoSidedAreaLight[radiance = {self.radiance}]"
 
-    mi.register_emitter("gonio_area", TwoSidedAreaLight)
+    plugin_search.register(mi.register_emitter, "gonio_area", TwoSidedAreaLight)
 
 
 _registered: set[str] = set()

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..work import garbage
-from . import engine, formats
+from . import engine, mitsuba_xml, plugin_search
+from .mitsuba_xml import SceneText
 from .passes import power_of_two
 from .request import Request
 from .types import Plugin, Scene
@@ -89,16 +89,17 @@ class MitsubaRender:
         return {"albedo": channels[..., :3], "normal": channels[..., 3:]}
 
 
-def load(request: Request, mi: ModuleType) -> Scene:
-    """The scene of a Mitsuba XML file; the request's overrides are its `$parameters`."""
+def read(request: Request) -> SceneText:
+    """The text of a Mitsuba XML file; the request's overrides are its `$parameters`."""
+    values = {key: _as_xml(value) for key, value in request.overrides.items()}
+    return mitsuba_xml.read(request.scene, values, request.allow_outside, request.allow_code)
+
+
+def load(request: Request, text: SceneText, mi: ModuleType) -> Scene:
+    """The scene of a Mitsuba XML file that was `read`."""
     where = str(request.scene)
-    check_files(request.scene, request.overrides, request.allow_outside)
     try:
-        # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance
-        with engine.file_threads():
-            # In parallel a file that cannot be read ends the process: the error has a thread of its own.
-            values = {key: _as_xml(value) for key, value in request.overrides.items()}
-            scene = mi.load_file(where, parallel=False, optimize=False, **values)
+        scene = instantiated(text, request.scene.parent, mi)
         if not isinstance(scene, mi.Scene):
             raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():
@@ -112,15 +113,24 @@ def load(request: Request, mi: ModuleType) -> Scene:
     except InputError:
         raise
     except (RuntimeError, ValueError, TypeError, KeyError) as error:
-        raise InputError(_mitsuba_text(error), where, "mend it there; the texts are Mitsuba's") from error
+        raise InputError(_mitsuba_text(error, text), where, "mend it there; the texts are Mitsuba's") from error
     return scene
+
+
+def instantiated(text: SceneText, folder: Path, mi: ModuleType) -> Plugin:
+    """What Mitsuba makes of a scene's text; its errors are raised as they come."""
+    allowed = [folder.resolve()] if text.runs_code else []
+    # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance;
+    # and in parallel a file that cannot be read ends the process: the error has a thread of its own
+    with engine.file_threads(), plugin_search.searching(mi, *allowed):
+        return mi.load_string(text.text, parallel=False, optimize=False)
 
 
 def _as_xml(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _mitsuba_text(error: Exception) -> str:
+def _mitsuba_text(error: Exception, scene: SceneText) -> str:
     """Mitsuba's message without places in its C++ source and without a Python traceback of ours."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
@@ -130,67 +140,10 @@ def _mitsuba_text(error: Exception) -> str:
         text += ours[-1].split(": ", 1)[1] if text != lines[0] else ""
     elif len(lines) > 1:
         text += " " + "; ".join(lines[1:4])
-    return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
+    return scene.located(re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text))
 
 
-def sources(file: Path, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
+def sources(text: SceneText, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
     """What tells the text of a scene and all that it includes; and the files that it names, by their names in it."""
-    texts, named = [repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))], {}
-    texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
-    for _, name, target, included in _named(file, parameters):
-        named[name] = target
-        if included:
-            texts.append(target.read_text(encoding="utf-8", errors="surrogateescape"))
-    return lambda: "\n".join(texts), named
-
-
-def check_files(file: Path, parameters: Mapping[str, object], allow_outside: bool = False) -> None:
-    """Raise InputError where a Mitsuba scene, or a file it includes, names a file that must not be opened: one outside
-    the scene's folder, or a picture that contradicts itself, by which a library in C++ could be corrupted."""
-    folder = file.parent.resolve()
-    from .scene import meshes
-
-    for current, name, target, _ in _named(file, parameters):
-        if not allow_outside and not target.is_relative_to(folder):
-            what = f"'{name}' lies outside the scene's folder {folder}"
-            raise InputError(what, str(current), "copy it there, or use --allow-outside")
-        try:
-            formats.check_file(target)
-            if target.suffix.lower() == ".ply" or meshes.is_ply(target):  # Mitsuba's reader believes counts and indices
-                meshes.read_mesh(target, str(current), ".ply")
-        except formats.Unreadable as error:
-            raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
-        except OSError as error:
-            raise InputError(f"'{name}' cannot be read: {error.strerror}", str(current), "check the file") from None
-
-
-def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path, str, Path, bool]]:
-    """Each file that exists and is named by a Mitsuba scene, or by a file that it includes: (where, its name there,
-    the file, whether it is included)."""
-    folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
-    while waiting:
-        current = waiting.pop()
-        if current in seen:
-            continue
-        seen.add(current)
-        try:
-            root = ElementTree.parse(current).getroot()
-        except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
-            raise InputError(f"not well-formed XML: {error}", str(current), "mend it there") from error
-        values = {x.get("name", ""): x.get("value", "") for x in root.iter("default")}
-        values |= {name: _as_xml(value) for name, value in parameters.items()}
-        for element in root.iter():
-            name = element.get("filename") or (element.get("value") if element.tag in ("string", "path") else None)
-            if not name:
-                continue
-            for key in sorted(values, key=len, reverse=True):
-                name = name.replace("$" + key, values[key])
-            try:
-                target = (folder / name).resolve()
-                exists = target.is_file()
-            except (OSError, ValueError, RuntimeError):  # no file's name, such as a long or odd string, or a loop
-                continue
-            if exists:
-                yield current, name, target, element.tag == "include"
-                if element.tag == "include":
-                    waiting.append(target)
+    given = repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))
+    return lambda: "\n".join([given, *text.sources]), text.files

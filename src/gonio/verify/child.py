@@ -136,7 +136,7 @@ class _Worker:
         handle = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.verify import worker; worker.main(sys.argv[1])"
         self.process = subprocess.Popen(
-            [sys.executable, "-c", code, str(self.folder)],
+            [sys.executable, "-P", "-c", code, str(self.folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=handle,

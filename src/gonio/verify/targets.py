@@ -106,8 +106,9 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     from ..render import foreign
 
     values = {key: _property(value) for key, value in given.items()}
-    path = Path(target)
-    if not target.lstrip().startswith("{"):
+    path = None if target.lstrip().startswith("{") else Path(target)
+    text = target
+    if path is not None:
         if not path.is_file():
             raise InputError(f"no file '{target}'", "TARGET")
         if path.suffix.lower() == ".xml":
@@ -115,14 +116,14 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
                 raise InputError("parameters of an XML file cannot be set", "--param", "change the file")
             return Subject(foreign.load_file(path), target)
         text = path.read_text(encoding="utf-8")
-    else:
-        text = target
     try:
         description = json.loads(text)
     except ValueError as error:
         raise InputError(f"no JSON: {error}", target) from None
     if not isinstance(description, dict) or "type" not in description:
         raise InputError('an object with a "type" expected', target, 'such as {"type": "roughplastic", "alpha": 0.2}')
+    if path is not None:
+        description = foreign.within(description, path)
     return Subject(foreign.load({**description, **values}), target, values)
 
 
