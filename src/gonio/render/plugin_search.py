@@ -78,9 +78,9 @@ def check(name: str, location: str, folder: Path | None = None, allow_code: bool
     folder      the document's, whose `plugins` may be loaded where `allow_code` is set
     Returns the file in that folder that will be loaded, None where it is another or none.
     """
-    if not re.fullmatch(r"[\w-]+", name):
-        raise InputError(f"'{name}' is no type of a plugin", location, "a type has letters, digits, - and _ only")
-    if name in _UNSAFE:
+    if not re.fullmatch(r"[^/\\.:\0]+", name):  # Mitsuba makes a path of it, and drops what a dot begins
+        raise InputError(f"'{name}' is no type of a plugin", location, "a type is a name such as sphere, and no path")
+    if name.lower() in _UNSAFE:  # a file system may not tell capitals apart
         what = f"'{name}' reads from addresses of memory, which no file can know"
         raise InputError(what, location, "export the mesh as .ply or .obj")
     if _is_trusted(name):

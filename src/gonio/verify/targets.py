@@ -3,7 +3,7 @@
 conductor                a model's name; a material in it is a name again: --param a=lambert
 glass.py:Glass           a class in a Python file, which runs because the user named it
 glass.py:my_glass        a plugin of Mitsuba's that the file registers, by that name or by its class
-mitsuba:roughplastic     a plugin, Mitsuba's or the user's, with its properties as parameters
+mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS, with its properties as parameters
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
 chest.gltf:Wood          a material of a glTF file
