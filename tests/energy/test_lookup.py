@@ -67,7 +67,7 @@ def test_one_texel_is_fetched_alike_by_drjit_numpy_and_the_graph():
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_nan_reads_inside_the_table(precision: str) -> None:
-    """Rays that are dead carry NaN; converted to a whole number it differs by processor, -1 on those without AVX-512."""
+    """Dead rays carry NaN; converted to a whole number it differs by processor: -1 without AVX-512."""
     kind = backend.types(precision)  # type: ignore[arg-type]
     table = ops.Table("t", np.ones((33, 12, 16, 1)))
     nan = kind.float([float("nan")] * 64)

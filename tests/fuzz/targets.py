@@ -171,7 +171,7 @@ def _load_xml(path: Path) -> object:
     mi.set_log_level(mi.LogLevel.Error)
     adapter.register(mi)
     lights.register(mi)
-    return mitsuba_scene.load(mi, path, {})
+    return mitsuba_scene.load(mi, path, mitsuba_scene.read(path, {}))
 
 
 @target("scene-xml", lambda: [XML % shape for shape in SHAPES], [b"<!--", b"<bsdf>", b'"$spp"', b"&amp;", b"<include"])

@@ -17,6 +17,7 @@ from .. import llvm
 from ..errors import InputError, MachineError
 from ..ops import backend
 from ..owner import COMPUTING, alone
+from . import plugin_search
 from .types import OfVariant
 
 DEVICES = ("auto", "cpu", "cuda")
@@ -88,7 +89,9 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
 
 @functools.lru_cache
 def _own(mi: ModuleType) -> None:
-    """Let nobody change the variant, which is one for all threads, while another thread computes."""
+    """Let nobody change the variant, which is one for all threads, while another thread computes; and let no plugin be
+    loaded from the current folder."""
+    plugin_search.confine(mi)
     change = mi.set_variant
 
     @functools.wraps(change)

@@ -19,7 +19,7 @@ import numpy as np
 from ..catalog import outside
 from ..errors import InputError, did_you_mean
 from ..material import number, spectrum
-from . import adapter, engine
+from . import adapter, engine, plugin_search
 from .native import Native
 from .types import MitsubaBSDF, OfVariant, PluginDict
 
@@ -109,14 +109,27 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     """The plugin itself."""
     mi = mitsuba()
     kind = str(description.get("type", ""))
+    _check_plugins(description, f"mitsuba:{kind}")
     try:
         with engine.file_threads():
             bsdf = mi.load_dict(description, parallel=False)
     except Exception as error:
-        raise _refused(error, kind) from None
+        raise refused(error, kind) from None
     if not isinstance(bsdf, mi.BSDF):
         raise InputError(f"'{kind}' is a {type(bsdf).__name__}, a BSDF expected", f"mitsuba:{kind}")
     return bsdf
+
+
+def _check_plugins(description: Mapping[str, object], location: str) -> None:
+    """Raise InputError where a description, or one inside it, names a plugin that must not be loaded."""
+    kind = description.get("type")
+    if kind == "resources":
+        raise InputError("'resources' given, and a BSDF searches no folders", location, "give files by their paths")
+    if isinstance(kind, str) and kind not in ("rgb", "ref"):
+        plugin_search.check(kind, location)
+    for value in description.values():
+        if isinstance(value, Mapping):
+            _check_plugins(value, location)
 
 
 def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
@@ -238,7 +251,7 @@ def mitsuba() -> ModuleType:
     return mi
 
 
-def _refused(error: Exception, name: str) -> InputError:
+def refused(error: Exception, name: str) -> InputError:
     text = " ".join(str(error).split())
     if "not found" in text and ("Plugin" in text or "plugin" in text):
         return InputError(f"Mitsuba has no plugin '{name}'", f"mitsuba:{name}", did_you_mean(name, plugins()))

@@ -26,7 +26,7 @@ SceneFile = Annotated[
 ]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
-Code = Annotated[bool, Option("--allow-code", help="Let the scene run Python files that it names as materials.")]
+Code = Annotated[bool, Option("--allow-code", help="Let the scene run code that it names: Python files, plugins.")]
 Device = Annotated[str, Option(metavar="cpu|cuda|auto", help="Where to compute.")]
 Checkpoint = Annotated[
     Path | None, Option(metavar="FILE", help="Keep the sums so far there, and go on from them where it exists.")

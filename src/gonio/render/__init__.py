@@ -59,7 +59,8 @@ def render(
     denoise        run Open Image Denoise over the result
     exposure       of a .png: stops, or "auto" for one chosen by the picture's luminance
     allow_outside  let the scene read files outside its folder
-    allow_code     let the scene name materials in Python files, "ward.py:Ward", which then run
+    allow_code     let the scene name materials in Python files, "ward.py:Ward", and native plugins of Mitsuba in its
+                   folder `plugins`, which then run
     overrides      values by their path in the scene, as `gonio study` varies them; materials too
     checkpoint     file for the sums so far, written every few seconds; where it is there, the render goes on from it,
                    to the same bits. None: beside the output, where the render takes over a minute

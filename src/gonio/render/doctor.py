@@ -120,8 +120,11 @@ def _libraries() -> list[Finding]:
 
 
 def _try(device: str) -> tuple[str, str]:
-    """Run the trial on a device in a process of its own: what went wrong ("" if nothing), and what it printed."""
-    command = [sys.executable, "-c", _TRIAL.format(device=device)]
+    """Run the trial on a device in a process of its own: what went wrong ("" if nothing), and what it printed.
+
+    -P: without it, a numpy.py in the current folder would be run.
+    """
+    command = [sys.executable, "-P", "-c", _TRIAL.format(device=device)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_TRIAL_SECONDS)
     except subprocess.TimeoutExpired:

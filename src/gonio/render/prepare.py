@@ -218,18 +218,12 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
         raise InputError(what, "gradient", "give a folder or a .json")
     adapter.register(mi)
     lights.register(mi)
-    scene = mitsuba_scene.load(
-        mi,
-        request.scene,
-        request.overrides,
-        allow_outside=request.allow_outside,
-        size=request.size,
-        own_integrator=request.integrator is None,
-    )
+    text = mitsuba_scene.read(request.scene, request.overrides, request.allow_outside, request.allow_code)
+    scene = mitsuba_scene.load(mi, request.scene, text, size=request.size, own_integrator=request.integrator is None)
     output = request.output or Path(request.scene.stem + ".exr")
     images.check_writable(output)
     sensor = scene.sensors()[0]
-    files = mitsuba_scene.sources(request.scene, request.overrides)
+    files = mitsuba_scene.sources(text, request.overrides)
     spp = _most(request, int(sensor.sampler().sample_count()))
     width, height = (int(n) for n in sensor.film().crop_size())
     check_film((width, height), str(request.scene))

@@ -16,7 +16,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge import engine
+from ..bridge import engine, plugin_search
 from ..bridge.types import Colour, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
@@ -116,7 +116,7 @@ def _register(mi: ModuleType) -> None:
     if mi.variant() not in _known:
         _known[mi.variant()] = _texture_class(mi)
     made = _known[mi.variant()]
-    mi.register_texture(PLUGIN, lambda props: made(props))
+    plugin_search.register(mi.register_texture, PLUGIN, lambda props: made(props))
 
 
 _known: dict[str, OfVariant] = {}  # variant -> class

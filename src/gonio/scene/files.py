@@ -12,25 +12,33 @@ from ..errors import InputError, did_you_mean
 def located(file: str, beside: Path, where: str, allow_outside: bool = False) -> Path:
     """The path of a file that something in a folder names. InputError where it is missing or outside the folder."""
     file = documents.inside(file)[0]
+    return checked(Path(beside, file), file, beside, where, allow_outside)
+
+
+def checked(file: Path, name: str, folder: Path, where: str, allow_outside: bool = False) -> Path:
+    """The path of a file without links. InputError where it is missing or empty, or lies outside the folder.
+
+    name  as errors call it
+    """
     try:
-        folder = beside.resolve()
-        path = (folder / file).resolve()  # follows symbolic links, so that they cannot lead outside
+        folder = folder.resolve()
+        path = file.resolve()  # follows symbolic links, so that they cannot lead outside
         exists, regular = path.exists(), path.is_file()
         empty = regular and path.stat().st_size == 0
     except (OSError, ValueError, RuntimeError) as error:  # too long, a NUL byte, a loop of links
         raise InputError(f"no usable file name: {error}", where, "give a file beside the scene") from None
     if not allow_outside and not path.is_relative_to(folder):
         raise InputError(
-            f"'{file}' lies outside the scene's folder {folder}", where, "copy it there, or use --allow-outside"
+            f"'{name}' lies outside the scene's folder {folder}", where, "copy it there, or use --allow-outside"
         )
     if not exists:
         near = [str(p.relative_to(folder)) for p in _siblings(path)] if path.is_relative_to(folder) else []
-        hint = did_you_mean(file, near) if near else "file names are relative to the scene's folder"
-        raise InputError(f"'{file}' does not exist", where, hint)
+        hint = did_you_mean(name, near) if near else "file names are relative to the scene's folder"
+        raise InputError(f"'{name}' does not exist", where, hint)
     if not regular:
-        raise InputError(f"'{file}' is not a file", where, "give a file beside the scene")
+        raise InputError(f"'{name}' is not a file", where, "give a file beside the scene")
     if empty:
-        raise InputError(f"'{file}' is empty (0 bytes)", where, "is it still being written or downloaded?")
+        raise InputError(f"'{name}' is empty (0 bytes)", where, "is it still being written or downloaded?")
     return path
 
 

@@ -1,52 +1,55 @@
-"""A Mitsuba scene's file, read with the same care as the lab's."""
+"""A Mitsuba scene's file, read with the same care as the lab's, and the BSDFs that such files hold."""
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
-from xml.etree import ElementTree
 
-from ..bridge import engine, foreign
+from ..bridge import engine, foreign, plugin_search
 from ..bridge.native import Native
-from ..bridge.types import Scene
+from ..bridge.types import Plugin, PluginDict, Scene
 from ..errors import InputError
-from ..pictures import formats
-from . import meshes
+from . import mitsuba_xml
+from .mitsuba_xml import SceneText
+
+
+def read(
+    file: Path, parameters: Mapping[str, object], allow_outside: bool = False, allow_code: bool = False
+) -> SceneText:
+    """The text of a Mitsuba XML file; see `mitsuba_xml.read`.
+
+    parameters  values of its `$parameters`: texts, numbers or lists of numbers
+    """
+    values = {key: _as_xml(value) for key, value in parameters.items()}
+    return mitsuba_xml.read(file, values, allow_outside, allow_code)
 
 
 def load(
     mi: ModuleType,
     file: Path,
-    parameters: Mapping[str, object],
+    text: SceneText,
     *,
-    allow_outside: bool = False,
     size: tuple[int, int] | None = None,
     own_integrator: bool = True,
 ) -> Scene:
-    """The scene of a Mitsuba XML file.
+    """The scene of a Mitsuba XML file that was `read`.
 
-    parameters      values of its `$parameters`
-    allow_outside   let it read files outside its folder
     size            of the film in pixels; None: the scene's own
     own_integrator  whether the scene must name an integrator
     Raises InputError.
     """
-    where = str(file)
-    check_files(file, parameters, allow_outside)
+    location = str(file)
     try:
-        # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance
-        with engine.file_threads():
-            # In parallel a file that cannot be read ends the process: the error has a thread of its own.
-            values = {key: _as_xml(value) for key, value in parameters.items()}
-            scene = mi.load_file(where, parallel=False, optimize=False, **values)
+        scene = instantiated(text, file.parent, mi)
         if not isinstance(scene, mi.Scene):
-            raise InputError("this file holds no <scene>", where, "give a Mitsuba scene, a folder or a .json")
+            raise InputError("this file holds no <scene>", location, "give a Mitsuba scene, a folder or a .json")
         if not scene.sensors():
-            raise InputError("the scene has no <sensor>", where, "add one: it holds the camera and the film")
+            raise InputError("the scene has no <sensor>", location, "add one: it holds the camera and the film")
         if scene.integrator() is None and own_integrator:
-            raise InputError("the scene has no <integrator>", where, "add one, or give --integrator path")
+            raise InputError("the scene has no <integrator>", location, "add one, or give --integrator path")
         if size is not None:
             film = mi.traverse(scene.sensors()[0])
             film["film.size"] = list(size)
@@ -54,19 +57,23 @@ def load(
     except InputError:
         raise
     except (RuntimeError, ValueError, TypeError, KeyError) as error:
-        raise InputError(_mitsuba_text(error), where, "mend it there; the texts are Mitsuba's") from error
+        what = _mitsuba_text(error, text)
+        raise InputError(what, location, "correct it there; the texts are Mitsuba's") from error
     return scene
 
 
 def load_bsdf(path: Path) -> Native:
-    """The BSDF of a Mitsuba XML file: its root, or the first in a scene. Raises InputError where there is none."""
+    """The BSDF of a Mitsuba XML file: its root, or the first in a scene. It may read what lies in the file's folder.
+
+    Raises InputError where there is none.
+    """
     mi = foreign.mitsuba()
-    check_files(path, {}, allow_outside=True)
+    with _without_options():
+        text = mitsuba_xml.read(path, {})
     try:
-        with engine.file_threads():
-            loaded = mi.load_file(str(path), parallel=False)
+        loaded = instantiated(text, path.parent, mi)
     except Exception as error:
-        raise InputError(f"Mitsuba refuses it: {_mitsuba_text(error)}", str(path)) from None
+        raise foreign.refused(error, path.name) from None
     if isinstance(loaded, mi.BSDF):
         return Native(loaded)
     if isinstance(loaded, mi.Scene):
@@ -76,11 +83,46 @@ def load_bsdf(path: Path) -> Native:
     raise InputError("no BSDF in this file", str(path), "give a file whose root is <bsdf>, or a scene with one")
 
 
+def within(description: PluginDict, file: Path) -> PluginDict:
+    """The description that a file holds, with absolute paths of the files that it names, which lie in its folder."""
+
+    def locate(name: str) -> str:
+        return mitsuba_xml.readable(name, file.parent / name, file.parent, str(file))
+
+    placed: PluginDict = {}
+    for name, value in description.items():
+        if isinstance(value, dict):
+            value = within(value, file)
+        elif isinstance(value, str):
+            with _without_options():
+                value = mitsuba_xml.property_value(str(description.get("type")), name, value, str(file), locate)
+        placed[name] = value
+    return placed
+
+
+@contextlib.contextmanager
+def _without_options() -> Iterator[None]:
+    """In here an error does not point to an option that only scenes have."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(error.what, error.where, error.hint.replace(", or use --allow-outside", "")) from None
+
+
+def instantiated(text: SceneText, folder: Path, mi: ModuleType) -> Plugin:
+    """What Mitsuba makes of a scene's text; its errors are raised as they come."""
+    allowed = [folder.resolve()] if text.runs_code else []
+    # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance;
+    # and in parallel a file that cannot be read ends the process: the error has a thread of its own
+    with engine.file_threads(), plugin_search.searching(mi, *allowed):
+        return mi.load_string(text.text, parallel=False, optimize=False)
+
+
 def _as_xml(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _mitsuba_text(error: Exception) -> str:
+def _mitsuba_text(error: Exception, scene: SceneText) -> str:
     """Mitsuba's message without places in its C++ source and without a Python traceback of ours."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     ours = [line for line in lines if re.match(r"\w*(Error|Exception): ", line)]
@@ -90,65 +132,10 @@ def _mitsuba_text(error: Exception) -> str:
         text += ours[-1].split(": ", 1)[1] if text != lines[0] else ""
     elif len(lines) > 1:
         text += " " + "; ".join(lines[1:4])
-    return re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text)
+    return scene.located(re.sub(r"\[\w+\.(cpp|h):\d+\] ", "", text))
 
 
-def sources(file: Path, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
+def sources(text: SceneText, parameters: Mapping[str, object]) -> tuple[Callable[[], str], dict[str, Path]]:
     """What tells the text of a scene and all that it includes; and the files that it names, by their names in it."""
-    texts, named = [repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))], {}
-    texts.append(file.read_text(encoding="utf-8", errors="surrogateescape"))
-    for _, name, target, included in _named(file, parameters):
-        named[name] = target
-        if included:
-            texts.append(target.read_text(encoding="utf-8", errors="surrogateescape"))
-    return lambda: "\n".join(texts), named
-
-
-def check_files(file: Path, parameters: Mapping[str, object], allow_outside: bool = False) -> None:
-    """Raise InputError where a Mitsuba scene, or a file it includes, names a file that must not be opened: one outside
-    the scene's folder, or a picture that contradicts itself, by which a library in C++ could be corrupted."""
-    folder = file.parent.resolve()
-    for current, name, target, _ in _named(file, parameters):
-        if not allow_outside and not target.is_relative_to(folder):
-            what = f"'{name}' lies outside the scene's folder {folder}"
-            raise InputError(what, str(current), "copy it there, or use --allow-outside")
-        try:
-            formats.check_file(target)
-            if target.suffix.lower() == ".ply" or meshes.is_ply(target):  # Mitsuba's reader believes counts and indices
-                meshes.read_mesh(target, str(current), ".ply")
-        except formats.Unreadable as error:
-            raise InputError(f"'{name}' cannot be used: {error}", str(current), "save it again") from None
-        except OSError as error:
-            raise InputError(f"'{name}' cannot be read: {error.strerror}", str(current), "check the file") from None
-
-
-def _named(file: Path, parameters: Mapping[str, object]) -> Iterator[tuple[Path, str, Path, bool]]:
-    """Each file that exists and is named by a Mitsuba scene, or by a file that it includes: (where, its name there,
-    the file, whether it is included)."""
-    folder, seen, waiting = file.parent.resolve(), set(), [file.resolve()]
-    while waiting:
-        current = waiting.pop()
-        if current in seen:
-            continue
-        seen.add(current)
-        try:
-            root = ElementTree.parse(current).getroot()
-        except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
-            raise InputError(f"not well-formed XML: {error}", str(current), "mend it there") from error
-        values = {x.get("name", ""): x.get("value", "") for x in root.iter("default")}
-        values |= {name: _as_xml(value) for name, value in parameters.items()}
-        for element in root.iter():
-            name = element.get("filename") or (element.get("value") if element.tag in ("string", "path") else None)
-            if not name:
-                continue
-            for key in sorted(values, key=len, reverse=True):
-                name = name.replace("$" + key, values[key])
-            try:
-                target = (folder / name).resolve()
-                exists = target.is_file()
-            except (OSError, ValueError, RuntimeError):  # no file's name, such as a long or odd string, or a loop
-                continue
-            if exists:
-                yield current, name, target, element.tag == "include"
-                if element.tag == "include":
-                    waiting.append(target)
+    given = repr(sorted((key, _as_xml(value)) for key, value in parameters.items()))
+    return lambda: "\n".join([given, *text.sources]), text.files

@@ -3,7 +3,7 @@
 conductor                a model's name; a material in it is a name again: --param a=lambert
 glass.py:Glass           a class in a Python file, which runs because the user named it
 glass.py:my_glass        a plugin of Mitsuba's that the file registers, by that name or by its class
-mitsuba:roughplastic     a plugin, Mitsuba's or the user's, with its properties as parameters
+mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS, with its properties as parameters
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
 chest.gltf:Wood          a material of a glTF file
@@ -107,8 +107,9 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     from ..scene import mitsuba_scene
 
     values = {key: _property(value) for key, value in given.items()}
-    path = Path(target)
-    if not target.lstrip().startswith("{"):
+    path = None if target.lstrip().startswith("{") else Path(target)
+    text = target
+    if path is not None:
         if not path.is_file():
             raise InputError(f"no file '{target}'", "TARGET")
         if path.suffix.lower() == ".xml":
@@ -116,14 +117,14 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
                 raise InputError("parameters of an XML file cannot be set", "--param", "change the file")
             return Subject(mitsuba_scene.load_bsdf(path), target)
         text = path.read_text(encoding="utf-8")
-    else:
-        text = target
     try:
         description = json.loads(text)
     except ValueError as error:
         raise InputError(f"no JSON: {error}", target) from None
     if not isinstance(description, dict) or "type" not in description:
         raise InputError('an object with a "type" expected', target, 'such as {"type": "roughplastic", "alpha": 0.2}')
+    if path is not None:
+        description = mitsuba_scene.within(description, path)
     return Subject(foreign.load({**description, **values}), target, values)
 
 

@@ -136,7 +136,7 @@ class Cluster:
         """A worker of this machine."""
         assert self._wanted is not None and self._security is not None
         code = f"import sys; sys.path[:] = {sys.path!r}; from gonio.work import worker; worker.serve()"
-        process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, start_new_session=True)
+        process = subprocess.Popen([sys.executable, "-P", "-c", code], stdin=subprocess.PIPE, start_new_session=True)
         order: dict[str, object] = {
             "address": self._address,
             "security": self._security.get_tls_config_for_role("worker"),

@@ -13,6 +13,7 @@ from types import ModuleType
 
 from ...errors import InputError
 from ...material import BSDF, models
+from .. import plugin_search
 from ..types import OfVariant, Plugin, Properties
 from .material import plugin_name
 from .plugin import plugin_class
@@ -50,11 +51,11 @@ def _register(mi: ModuleType, name: str, model: type[BSDF]) -> None:
     variant = mi.variant()
     _models[name] = model
     if variant.startswith("scalar"):
-        mi.register_bsdf(name, _refused)
+        plugin_search.register(mi.register_bsdf, name, _refused)
         return
     if variant not in _classes:
         _classes[variant] = plugin_class(mi)
-    mi.register_bsdf(name, lambda props: _classes[variant](props, _models[name]))
+    plugin_search.register(mi.register_bsdf, name, lambda props: _classes[variant](props, _models[name]))
 
 
 def _refused(props: Properties) -> Plugin:

@@ -17,6 +17,7 @@ from typing import TypeVar
 import drjit as dr
 import numpy as np
 
+from ...bridge import plugin_search
 from ...bridge.types import (
     DirectionSample,
     Emitter,
@@ -120,7 +121,7 @@ def register(mi: ModuleType) -> None:
         def to_string(self) -> str:
             return f"TwoSidedAreaLight[radiance = {self.radiance}]"
 
-    mi.register_emitter("gonio_area", TwoSidedAreaLight)
+    plugin_search.register(mi.register_emitter, "gonio_area", TwoSidedAreaLight)
 
 
 _registered: set[str] = set()

@@ -138,7 +138,7 @@ class _Worker:
         start = "from gonio.verify.isolation import worker; worker.main(sys.argv[1])"
         code = f"import sys; sys.path[:] = {sys.path!r}; {start}"
         self.process = subprocess.Popen(
-            [sys.executable, "-c", code, str(self.folder)],
+            [sys.executable, "-P", "-c", code, str(self.folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=handle,

@@ -1,0 +1,350 @@
+"""A Mitsuba scene's XML, written anew as one text in which no name is left that Mitsuba would have to look up.
+
+Includes, search paths and parameters are Mitsuba's own language, and mean here what they mean there:
+
+    <default name="spp" value="16"/>       a parameter's value where none is given; "$spp" stands for it
+    <include filename="materials.xml"/>    another file, in this place
+    <path value="textures"/>               a folder in which the files of plugins are searched for first
+
+They are carried out here, because Mitsuba would search the current folder as well. In the text that it is given, each
+file is an absolute path to a file that may be read, and each plugin one that may be loaded.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+from xml.parsers import expat
+
+from ..bridge import plugin_search
+from ..catalog import outside
+from ..errors import InputError, did_you_mean
+from ..measure import SAMPLE, parted
+from ..pictures import formats
+from . import files, meshes
+
+MAX_BYTES = 64 << 20  # of all files together, and of what parameters add to them
+MAX_ELEMENTS = 1_000_000
+MAX_DEPTH = 64
+MAX_INCLUDES = 15  # inside each other, as Mitsuba has it
+MAX_VALUE = 1 << 20  # characters of a value in which parameters are replaced
+
+# elements that stand for an object, which a plugin makes
+OBJECTS = {"scene", "sensor", "film", "emitter", "sampler", "shape", "texture", "volume", "medium", "bsdf"}
+OBJECTS |= {"integrator", "phase", "rfilter"}
+
+# What an attribute may not hold as it is. Mitsuba takes "$" for a parameter where no backslash stands before it.
+_ESCAPES = str.maketrans({"$": "\\$"} | {character: f"&#{ord(character)};" for character in '&<>"\t\n\r'})
+
+
+class SceneText(NamedTuple):
+    """A scene as Mitsuba is given it.
+
+    text     XML of one element a line
+    origins  file and line from which each line of it came
+    files    the files that are read, by their names in the scene; included ones too
+    sources  the texts of its XML files
+    runs_code  whether it loads native plugins of its folder
+    """
+
+    text: str
+    origins: list[tuple[Path, int]]
+    files: dict[str, Path]
+    sources: list[str]
+    runs_code: bool
+
+    def located(self, message: str) -> str:
+        """An error's message of Mitsuba's, with the user's files and lines in place of those of the text."""
+
+        def origin(match: re.Match[str]) -> str:
+            file, line = self.origins[min(int(match[1]), len(self.origins)) - 1]
+            return f"{file.name}, line {line}"
+
+        return re.sub(r"string \(line (\d+), col \d+\)", origin, message)
+
+
+def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False, allow_code: bool = False) -> SceneText:
+    """The text of a scene, or of an object alone.
+
+    parameters     values of its `$parameters`
+    allow_outside  let it name files outside its folder
+    allow_code     let it load native plugins from the folder `plugins` beside it
+    Raises InputError, with file and line, for XML that is not well-formed, for a file that must not be read or is
+    missing, for a plugin that must not be loaded, and for parameters that the scene does not have.
+    """
+    reader = _Reader(file, parameters, allow_outside, allow_code)
+    reader.parse(file, [reader.folder, plugin_search.package()])
+    reader.place_files()
+    unused = [name for name in parameters if name not in reader.used]
+    if unused:
+        known = [name for name in reader.values if name not in unused]
+        hint = did_you_mean(unused[0], known) if known else "parameters stand as $name in its values"
+        raise InputError(f"the scene has no parameter '{unused[0]}'", str(file), hint)
+    return SceneText("\n".join(reader.lines) + "\n", reader.origins, reader.files, reader.sources, reader.runs_code)
+
+
+def readable(name: str, path: Path, folder: Path, location: str, allow_outside: bool = False) -> str:
+    """The path of a file of a scene, as Mitsuba takes it.
+
+    name  as errors call it
+    Raises InputError for a file that must not be opened: one outside the scene's folder, or one that contradicts
+    itself, by which a library in C++ could be corrupted.
+    """
+    files.checked(path, name, folder, location, allow_outside)
+    try:
+        formats.check_file(path)
+        if path.suffix.lower() == ".ply" or meshes.is_ply(path):  # Mitsuba's reader believes counts and indices
+            meshes.read_mesh(path, location, ".ply")
+    except formats.Unreadable as error:
+        raise InputError(f"'{name}' cannot be used: {error}", location, "save it again") from None
+    except OSError as error:
+        raise InputError(f"'{name}' cannot be read: {error.strerror}", location, "check the file") from None
+    return str(path.absolute())
+
+
+def property_value(
+    kind: str, name: str, value: str, location: str, locate: Callable[[str], str], allow_code: bool = False
+) -> str:
+    """A plugin's property that is a text; of one that names a file, with the file's path.
+
+    kind    type of the plugin
+    locate  the path of a file that may be read, by its name
+    Raises InputError for code, and where Mitsuba would look for a file of that name in other folders.
+    """
+    if outside.names_code(value) and not allow_code:
+        what = f"'{value}' is code, which a scene alone does not run"
+        raise InputError(what, location, "read the file first; then --allow-code lets the scene run it")
+    if name == "filename":
+        return locate(value)
+    if name == "file":
+        path, item = parted(value)
+        path = path if path == SAMPLE else locate(path)
+        return f"{path}:{item}" if item else path
+    if name == "material" and kind in ("conductor", "roughconductor") and value != "none":
+        known = [path.name.removesuffix(".eta.spd") for path in plugin_search.package().glob("data/ior/*.eta.spd")]
+        if value not in known:
+            raise InputError(f"Mitsuba has no material '{value}'", location, did_you_mean(value, known))
+    return value
+
+
+class _Reader:
+    """What is common to all files of a scene.
+
+    values   of parameters, by name
+    folders  in which plugins' files are searched for: those of the scene's own <path>, then its folder, then Mitsuba's
+    """
+
+    def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
+        self.folder = file.parent.resolve()
+        self.values, self.used = dict(parameters), set[str]()
+        self.allow_outside, self.allow_code = allow_outside, allow_code
+        self.lines: list[str] = []
+        self.origins: list[tuple[Path, int]] = []
+        self.files: dict[str, Path] = {}
+        self.sources: list[str] = []
+        self.folders: list[Path] = []
+        self.texts: list[tuple[int, str, dict[str, str], str]] = []  # those of plugins: line, plugin, element, place
+        self.runs_code = False
+        self.version = ""  # of the scene's own file
+        self.bytes = self.elements = self.grown = 0  # what was read, and what parameters have added to it
+
+    # ------------------------------------------------------------------ files
+
+    def parse(self, file: Path, folders: list[Path], included: Mapping[str, str] | None = None, level: int = 0) -> None:
+        """Write down what a file holds. `folders` are those in which it searches; `included` is the element that
+        includes it."""
+        try:
+            data = file.read_bytes()
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror or error}", str(file), "check the file") from None
+        self.bytes += len(data)
+        if self.bytes > MAX_BYTES:
+            raise InputError(f"more than {MAX_BYTES >> 20} MiB of XML", str(file), "keep large data in other files")
+        self.sources.append(data.decode(errors="surrogateescape"))
+        document = _File(self, file, folders, included, level)
+        try:
+            document.parser.Parse(data, True)
+        except (expat.ExpatError, ValueError, LookupError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"not well-formed XML: {error}", str(file), "mend it there") from None
+        if included is None:
+            self.folders = folders
+
+    def place_files(self) -> None:
+        """Put the paths of plugins' files into their lines: which folders are searched is known at the end only."""
+        for line, kind, attributes, location in self.texts:
+            locate = functools.partial(self.located, folders=self.folders, location=location)
+            name, value = attributes.get("name", ""), attributes["value"]
+            value = property_value(kind, name, value, location, locate, self.allow_code)
+            self.lines[line] = _tag("string", {**attributes, "value": value})
+
+    def located(self, name: str, folders: list[Path], location: str) -> str:
+        """The absolute path of a file that the scene names, once it is sure that it may be read."""
+        try:
+            choices = [folder / name for folder in folders]
+            path = next((choice for choice in choices if choice.exists()), self.folder / name)
+            own = path.resolve().is_relative_to(plugin_search.package().resolve())
+        except (OSError, ValueError, RuntimeError) as error:
+            raise InputError(f"no usable file name: {error}", location, "give a file beside the scene") from None
+        if not own:
+            self.files[os.path.relpath(path, self.folder)] = path
+        return readable(name, path, self.folder, location, self.allow_outside or own)
+
+    # ------------------------------------------------------------------ parameters
+
+    def replaced(self, value: str, location: str) -> str:
+        """A value with the values of parameters in place of their names, the longest name first."""
+        if "$" not in value:
+            return value
+        for name in sorted(self.values, key=len, reverse=True):
+            parts = re.split(rf"(?<!\\){re.escape('$' + name)}", value)
+            if len(parts) == 1:
+                continue
+            self.used.add(name)
+            more = (len(parts) - 1) * len(self.values[name])
+            self.grown += more
+            if len(value) + more > MAX_VALUE or self.grown > MAX_BYTES:
+                raise InputError(f"parameters such as ${name} make too long a text", location, "write values out")
+            value = self.values[name].join(parts)
+        unknown = re.search(r"(?<!\\)\$(\w*)", value)
+        if unknown:
+            hint = did_you_mean(unknown[1], list(self.values)) if self.values else "give it a <default>"
+            raise InputError(f"the parameter ${unknown[1]} has no value", location, hint)
+        return value.replace("\\$", "$")
+
+
+class _File:
+    """What reads one file of a scene, as the parser goes through it."""
+
+    def __init__(
+        self, scene: _Reader, file: Path, folders: list[Path], included: Mapping[str, str] | None, level: int
+    ) -> None:
+        self.scene, self.file, self.folders, self.included, self.level = scene, file, folders, included, level
+        self.open: list[str] = []  # elements around, "" for those that are carried out here and not written
+        self.kinds: list[str] = []  # of plugins, of the same elements
+        self.parser = expat.ParserCreate()
+        self.parser.StartDoctypeDeclHandler = self.parser.EntityDeclHandler = self._refused
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
+
+    @property
+    def location(self) -> str:
+        return f"{self.file}:{self.parser.CurrentLineNumber}"
+
+    def _refused(self, *_: object) -> NoReturn:
+        raise InputError("it declares a document type or entities, which may grow without bounds", self.location)
+
+    def _start(self, tag: str, given: dict[str, str]) -> None:
+        scene = self.scene
+        scene.elements += 1
+        if scene.elements > MAX_ELEMENTS:
+            raise InputError(f"more than {MAX_ELEMENTS} elements", self.location, "keep large data in other files")
+        if len(self.open) >= MAX_DEPTH:
+            raise InputError(f"more than {MAX_DEPTH} elements inside each other", self.location)
+        if len(self.open) > 1 and not self.open[-1]:
+            raise InputError(f"<{tag}> stands inside an element that holds none", self.location, "mend it there")
+        attributes = {name: scene.replaced(value, self.location) for name, value in given.items()}
+        written = tag
+        if not self.open:
+            written = self._root(tag, attributes)
+        elif tag in ("default", "include", "path"):
+            getattr(self, f"_{tag}")(attributes)
+            written = ""
+        self.open.append(written)
+        self.kinds.append(attributes.get("type", ""))
+        if written:
+            self._write(tag, attributes)
+
+    def _end(self, tag: str) -> None:
+        self.kinds.pop()
+        if self.open.pop():
+            self._line(f"</{tag}>")
+
+    def _line(self, text: str) -> None:
+        self.scene.lines.append(text)
+        self.scene.origins.append((self.file, self.parser.CurrentLineNumber))
+
+    # ------------------------------------------------------------------ elements
+
+    def _write(self, tag: str, attributes: dict[str, str]) -> None:
+        """Write an element down, its plugin and its files checked."""
+        scene = self.scene
+        if "type" in attributes and (tag in OBJECTS or tag == "spectrum"):
+            kind = attributes["type"]
+            file = plugin_search.check(kind, self.location, scene.folder, scene.allow_code)
+            if file is not None:
+                scene.files[f"plugins/{file.name}"], scene.runs_code = file, True
+        elif tag == "spectrum" and attributes.get("filename"):
+            attributes = {**attributes, "filename": scene.located(attributes["filename"], self.folders, self.location)}
+        elif tag == "string" and "value" in attributes and len(self.kinds) > 1:
+            scene.texts.append((len(scene.lines), self.kinds[-2], attributes, self.location))
+        self._line(_tag(tag, attributes))
+
+    def _default(self, attributes: Mapping[str, str]) -> None:
+        name, value = self._required("default", attributes, "name", "value")
+        self.scene.values.setdefault(name, value)
+
+    def _path(self, attributes: Mapping[str, str]) -> None:
+        (value,) = self._required("path", attributes, "value")
+        if len(self.open) != 1:
+            raise InputError("<path> stands inside another element", self.location, "put it into <scene> itself")
+        try:
+            choices = [folder / value for folder in (self.file.parent.resolve(), *self.folders)]
+            path = next((choice for choice in choices if choice.is_dir()), None)
+            outside = path is not None and not path.resolve().is_relative_to(self.scene.folder)
+        except (OSError, ValueError, RuntimeError) as error:
+            raise InputError(f"no usable folder name: {error}", self.location) from None
+        if path is None:
+            raise InputError(f"no folder '{value}'", self.location, "folders are relative to the scene's")
+        if outside and not self.scene.allow_outside:
+            what = f"'{value}' lies outside the scene's folder {self.scene.folder}"
+            raise InputError(what, self.location, "copy it there, or use --allow-outside")
+        self.folders.insert(0, path)
+
+    def _include(self, attributes: Mapping[str, str]) -> None:
+        (name,) = self._required("include", attributes, "filename")
+        if self.level + 1 >= MAX_INCLUDES:
+            raise InputError(f"more than {MAX_INCLUDES} includes inside each other", self.location)
+        folders = [self.file.parent.resolve(), *self.folders]
+        path = Path(self.scene.located(name, folders, self.location))
+        self.scene.parse(path, folders, attributes, self.level + 1)
+
+    def _root(self, tag: str, attributes: dict[str, str]) -> str:
+        """The first element of a file as it is written. Of an included scene only the contents are, "" then; another
+        included object has the name that the <include> gives it."""
+        if tag not in OBJECTS:
+            raise InputError(f"the file begins with <{tag}>", self.location, "a <scene> or another object is expected")
+        (version,) = self._required(tag, attributes, "version")
+        if self.included is None:
+            self.scene.version = version
+            return tag
+        if _is_old(version) != _is_old(self.scene.version):
+            what = f"a file of version {version} is included in a scene of version {self.scene.version}"
+            raise InputError(what, self.location, "names of properties changed in version 2: write both in the same")
+        del attributes["version"]
+        attributes.pop("name", None)
+        if "name" in self.included:
+            attributes["name"] = self.included["name"]
+        return "" if attributes.get("type", tag) == "scene" else tag
+
+    def _required(self, tag: str, attributes: Mapping[str, str], *names: str) -> list[str]:
+        """The values of attributes that an element must have."""
+        for name in names:
+            if name not in attributes:
+                raise InputError(f"<{tag}> has no {name}", self.location, f'<{tag} {name}="..."/>')
+        return [attributes[name] for name in names]
+
+
+def _is_old(version: str) -> bool:
+    """Whether Mitsuba takes the names of a file's properties for those that it had before version 2."""
+    return version.strip().split(".")[0] in ("0", "1")
+
+
+def _tag(tag: str, attributes: Mapping[str, str]) -> str:
+    """An element's beginning, with values as Mitsuba reads them back."""
+    written = [f' {name}="{value.translate(_ESCAPES)}"' for name, value in attributes.items()]
+    return f"<{tag}{''.join(written)}>"
