@@ -28,6 +28,7 @@ demo: .venv/rendering
 	$(BIN)/gonio render examples/shading-balls --spp 64 $(DENOISE) -o out/shading-balls.png
 	$(BIN)/gonio render examples/white-furnace --spp 128 $(DENOISE) -o out/white-furnace.png
 	$(BIN)/gonio view --export out/shading-balls.html
+	@printf '%s\n' '' 'The pictures and the page are in out. Next, in this shell:' '    . .venv/bin/activate' '    gonio view'
 
 lint: .venv/installed
 	$(BIN)/ruff check .

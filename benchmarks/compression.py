@@ -1,6 +1,6 @@
 """The bars of compression: bytes and errors of each method, networks against the published ones, time in a render.
 
-python benchmarks/compression.py [curve|network|other|render ...]  --data FOLDER (../shared/data)  --figure FILE.png
+python benchmarks/compression.py [curve|network|other|render ...]  --data FOLDER ($GONIO_SHARED/data)  --figure FILE.png
 
 Errors are those of a sphere under a lamp and a sky (`measure/compression/sphere.py`): the mean over pixels and channels
 of |new - old| / (|old| + 1 % of the mean). "Rebuilt" tables are those of Bagher's fits of the same materials.
@@ -8,6 +8,7 @@ of |new - old| / (|old| + 1 % of the mean). "Rebuilt" tables are those of Bagher
 
 from __future__ import annotations
 
+import os
 import statistics
 import sys
 import tempfile
@@ -27,7 +28,7 @@ from gonio.measure.tables.base import Measurement
 from gonio.measure.tables.half_difference import sampled
 from gonio.measure.tables.network import SHAPES, Network
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
+DATA = Path(os.environ.get("GONIO_SHARED", ".")) / "data"
 FIGURE: Path | None = None
 SIZES = (16384, 4096, 65536)  # the bar's first
 GIVEN = (16384, 0.01)  # bytes a material and the error that the median is to keep below
@@ -190,6 +191,8 @@ def main() -> None:
             else:
                 FIGURE = Path(words[at + 1])
             del words[at : at + 2]
+    if not DATA.is_dir():
+        sys.exit(f"no folder {DATA}: --data FOLDER, or GONIO_SHARED, names the one with rgl/ and nbrdf/")
     known = {"curve": curve, "network": network, "other": other, "render": render}
     for name in words or known:
         known[name]()

@@ -1,6 +1,6 @@
 """The bars of measured materials: against Mitsuba, round trips, conversions, time in a render, sampling.
 
-python benchmarks/measured.py [rgl|merl|convert|render|sampling ...]      --data FOLDER (../shared/data)
+python benchmarks/measured.py [rgl|merl|convert|render|sampling ...]      --data FOLDER ($GONIO_SHARED/data)
 
 `rgl`: Mitsuba's plugin computes in float32 throughout, and no variant of it in float64. Where it and Gonio's float64
 are further apart than 1e-4, they are compared with what float32 does there: with how far values go when the directions
@@ -11,6 +11,7 @@ the next, values go to 0 with the distance from it.
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
@@ -27,7 +28,7 @@ from gonio.measure.tables import adaptive, half_difference
 from gonio.measure.tables.base import Measurement
 from gonio.ops import Direction, Spectrum, backend, vec3
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
+DATA = Path(os.environ.get("GONIO_SHARED", ".")) / "data"
 COUNT = 100_000
 ROUNDING = 2.0**-24
 PLACES = 8.0  # roundings of 1 that a place may be off by, after two sums and their quotient
@@ -252,6 +253,8 @@ def main() -> None:
         at = words.index("--data")
         DATA = Path(words[at + 1])
         del words[at : at + 2]
+    if not DATA.is_dir() and words != ["merl"]:
+        sys.exit(f"no folder {DATA}: --data FOLDER, or GONIO_SHARED, names the one with rgl/, nbrdf/ and cornell/")
     known = {"rgl": rgl, "merl": merl, "convert": convert, "render": render, "sampling": sampling}
     for name in words or known:
         known[name]()

@@ -6,8 +6,10 @@ import math
 import struct
 from pathlib import Path
 
+import gonio as go
 import numpy as np
 from gonio.bridge import engine
+from gonio.instruments.capture import rehearsal
 from gonio.pictures import images
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
@@ -208,6 +210,27 @@ def waves(size: int, cells: int, height: float) -> tuple[np.ndarray, ...]:
     return np.stack([x, level, z], 1), normals, np.zeros((x.size, 2)), faces
 
 
+def photographs() -> None:
+    """A ball of brown paint under one lamp after the other, as a camera takes it; lengths in millimetres."""
+    center, distance = np.array([0.0, 0.0, 500.0]), 400.0
+    lamps = {}
+    for name, angles in (("right", (20, 0)), ("below", (50, 100)), ("left", (80, 220)), ("above", (35, 300))):
+        theta, phi = np.radians(angles)  # from the camera as seen from the ball, and about that axis
+        toward = np.array([math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), -math.cos(theta)])
+        lamps[name] = {"position": (center + distance * toward).round(2).tolist(), "intensity": distance**2}
+    calibration = {
+        "camera": {"size": [96, 96], "focal": 25.0, "pixel": 0.07},
+        "response": "srgb",
+        "ball": {"radius": 50.0, "center": center.tolist()},
+        "lights": lamps,
+        "photographs": [{"file": f"{name}.png", "seconds": 1.5, "light": name} for name in lamps],
+        "uncertainty": {"light": 1.0, "scale": 0.005},
+    }
+    coat = go.Conductor(eta=1.5, k=0.0, alpha=0.15, fresnel="schlick")
+    paint = go.Sum(go.Lambert((0.3, 0.2, 0.1)), coat)
+    rehearsal.take(calibration, paint, HERE / "photographs", noise=0.01, bits=8)
+
+
 def main() -> None:
     mi = engine.load()
     grey, white = (0.25, 0.25, 0.25), (0.75, 0.75, 0.75)
@@ -225,6 +248,7 @@ def main() -> None:
     ply("pool-caustic/water.ply", *waves(2, 70, 0.05))
     ply("shader-ball/shell.ply", *shell(1.0, 0.93))
     mi.Bitmap(sky(128)).write(str(HERE / "shader-ball" / "studio.hdr"))
+    photographs()
 
 
 if __name__ == "__main__":

@@ -50,6 +50,25 @@ SCENE = {
 }
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark `shared` every test that asks for the folder of data: `-m shared` selects these and only these."""
+    for item in items:
+        if "shared" in getattr(item, "fixturenames", ()):
+            item.add_marker("shared")
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of data that GONIO_SHARED names; where it names none, tests that ask for it are skipped."""
+    if not os.environ.get("GONIO_SHARED"):
+        pytest.skip("GONIO_SHARED names no folder of data")
+    folder = Path(os.environ["GONIO_SHARED"]).resolve()
+    if not folder.is_dir():
+        pytest.fail(f"GONIO_SHARED names {str(folder)!r}, which is no folder")
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """One folder of tables for a run and all its workers, apart from the user's."""

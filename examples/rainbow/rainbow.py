@@ -1,4 +1,4 @@
-"""The rainbow of a cloud of drops, ray by ray: python examples/rainbow/rainbow.py [rays]
+"""The rainbow of a cloud of drops, ray by ray: python examples/rainbow/rainbow.py [rays] writes sky.jpg.
 
 Sunlight meets drops anywhere on their discs. Every ray goes its way through one of them by `go.Dielectric.sample`, a
 wavelength each, and leaves for the eye that stands where it goes. The cloud is thin and everywhere, so that the sky's
@@ -8,7 +8,6 @@ brightness in a direction is the light that drops send back at that angle from t
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import gonio as go
 import matplotlib.image
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-HERE = Path(__file__).parent
+PICTURE = "sky.jpg"  # in the current folder
 SUN = np.radians(0.2665)  # radius of its disc
 STEP = 0.01  # degrees, of the profile
 ORDERS = 6  # times that a ray meets the drop's surface, beyond which 0.3 % of it is left
@@ -130,7 +129,8 @@ def main() -> None:
     rays = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000_000
     angles()
     shown = np.clip(1.055 * np.clip(picture(*profile(rays)), 1e-6, 1.0) ** (1.0 / 2.4) - 0.055, 0.0, 1.0)
-    matplotlib.image.imsave(HERE / "rainbow.jpg", shown, pil_kwargs={"quality": 90})
+    matplotlib.image.imsave(PICTURE, shown, pil_kwargs={"quality": 90})
+    print(PICTURE)
 
 
 if __name__ == "__main__":

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import gonio as go
 import numpy as np
 import pytest
+from gonio import cli
 from gonio.energy.albedo import quadrature
 from gonio.energy.tables import bake as baking
 from gonio.energy.tables import baked as baked_files
 from gonio.energy.tables.axes import Axes
 from gonio.render import tables
 
-REFERENCE = Path(__file__).resolve().parents[3] / "shared" / "reference" / "kulla-conty"
+ROOT = Path(__file__).parents[2]
 
 
 def read_png(path):
@@ -62,6 +64,16 @@ def test_homework_pictures_read_back_pixel_by_pixel(tmp_path, store, flip):
     np.testing.assert_array_equal(picture[..., 0], expected)
     average = read_png(tmp_path / "t" / "E_avg.png")
     assert np.all(average == average[:, :1])
+
+
+@pytest.mark.parametrize("flip", [True, False])
+def test_the_homeworks_split_sum_is_a_picture_too(tmp_path, flip):
+    baked = tables.bake("ggx", tmp_path / "t", layout="homework", lut=["dfg"], size=8, flip=flip, store="1-E")
+    assert {file.name for file in (tmp_path / "t").iterdir()} >= {"dfg.png", "tables.npz"}
+    expected = np.round(baked.arrays["dfg"][:: -1 if flip else 1] * 255)
+    picture = read_png(tmp_path / "t" / "dfg.png")
+    np.testing.assert_array_equal(picture[..., :2], expected)
+    assert not picture[..., 2].any()
 
 
 def test_a_folder_reads_back_what_was_written(tmp_path):
@@ -233,6 +245,7 @@ def test_an_altered_file_is_refused(tmp_path, change):
         ({"layout": "polar"}, "unknown layout"),
         ({"layout": "homework", "store": "E/2"}, "unknown 'E/2'"),
         ({"layout": "homework", "aspect": 0.5}, "homework's layout"),
+        ({"layout": "homework", "lut": ["E", "glass"]}, "'glass' in the homework's layout"),
         ({"aspect": 0.0}, "alpha_y / alpha_x = 0"),
         ({"aspect": 0.5, "azimuths": 0}, "0 azimuths"),
         ({"aspect": 0.5, "lut": ["glass"]}, "two widths"),
@@ -279,15 +292,44 @@ def test_a_folder_that_cannot_be_written_is_one_clear_error():
         tables.bake("ggx", "/proc/tables", size=4)
 
 
-@pytest.mark.shared
-@pytest.mark.skipif(not REFERENCE.is_dir(), reason="no shared references beside the checkout")
-def test_a_public_solutions_pictures_agree_with_the_exact_table():
+def test_a_public_solutions_pictures_agree_with_the_exact_table(shared):
+    reference = shared / "reference" / "kulla-conty"
     centres = (np.arange(128) + 0.5) / 128
     mu, roughness = np.meshgrid(centres, centres)
     exact = quadrature.moments("ggx", "schlick-ibl", mu, roughness**2).whole[::-1]
-    picture = read_png(REFERENCE / "homework_E_importance_sampled.png")[..., 0] / 255.0
+    picture = read_png(reference / "homework_E_importance_sampled.png")[..., 0] / 255.0
     rough = roughness[::-1] >= 0.3
     assert np.sqrt(np.mean((picture - exact)[rough] ** 2)) < 0.004
-    average = read_png(REFERENCE / "homework_Eavg.png")[:, 0, 0] / 255.0
+    average = read_png(reference / "homework_Eavg.png")[:, 0, 0] / 255.0
     ours = quadrature.average("ggx", "schlick-ibl", centres**2)[::-1]
     assert np.abs(average - ours)[centres[::-1] >= 0.3].max() < 0.007
+
+
+def test_the_homeworks_pictures_follow_half_of_alpha_and_not_its_text(shared):
+    """The table of docs/energy.md, in grey levels of 255; values are rounded down, as theirs are."""
+    reference, centres = shared / "reference" / "kulla-conty", (np.arange(128) + 0.5) / 128
+    mu, roughness = np.meshgrid(centres, centres)
+    picture = read_png(reference / "homework_E_importance_sampled.png")[..., 0].astype(float)
+    average = read_png(reference / "homework_Eavg.png")[:, 0, 0].astype(float)
+    table = (ROOT / "docs/energy.md").read_text(encoding="utf-8")
+    for masking in ("schlick-ibl", "schlick-direct", "smith-correlated"):
+        error = picture - np.floor(255 * quadrature.moments("ggx", masking, mu, roughness**2).whole[::-1])
+        error_avg = average - np.floor(255 * quadrature.average("ggx", masking, centres**2)[::-1])
+        rms, rms_avg = (np.sqrt(np.mean(part**2)) for part in (error, error_avg))
+        row = [text.strip() for text in table.partition(f"\n| `{masking}`")[2].partition("\n")[0].split("|")[1:4]]
+        assert row == [f"{rms:.2g}", f"{np.abs(error).max():.0f}", f"{rms_avg:.2g}"]
+
+
+@pytest.mark.parametrize("page", ["docs/energy.md", "src/gonio/cli/verbs/bake.py"])
+def test_the_command_for_the_homeworks_pictures_gives_them(page, shared, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    commands = re.findall(
+        r"^ +gonio (bake ggx --layout homework .*?)(?: *#.*)?$", (ROOT / page).read_text(), re.MULTILINE
+    )
+    assert [command.split()[5] for command in commands] == ["schlick-ibl", "schlick-direct"]
+    with pytest.raises(SystemExit) as ended:
+        cli.main(commands[0].split())
+    assert not ended.value.code
+    picture = read_png(shared / "reference" / "kulla-conty" / "homework_E_importance_sampled.png")[..., 0].astype(float)
+    found = read_png(tmp_path / commands[0].split()[-1] / "E.png")[..., 0]
+    assert np.sqrt(np.mean((picture - found) ** 2)) < 1.0  # 0.8: Gonio rounds to the nearest

@@ -19,8 +19,6 @@ from gonio.measure.tables.network import Network
 from gonio.shaders import bundle
 from gonio.verify import verify
 
-SHARED = Path(__file__).parents[3] / "shared" / "data"
-
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_pictures() -> Iterator[None]:
@@ -105,12 +103,9 @@ def test_an_adaptive_table_stays_one_in_few_bytes(folder: Path) -> None:
     assert row.kind == "adaptive-log" and row.size <= 16384 and row.sphere < 0.02
 
 
-@pytest.mark.shared
 @pytest.mark.parametrize("name", ["cc_ibiza_sunset", "chm_mint", "irid_flake_paint1"])
-def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: Path) -> None:
-    file = SHARED / "rgl" / f"{name}_rgb.bsdf"
-    if not file.is_file():
-        pytest.skip("the shared folder with measured materials is not beside this checkout")
+def test_rgl_files_lose_nothing_with_their_visible_normals(name: str, tmp_path: Path, shared: Path) -> None:
+    file = shared / "data" / "rgl" / f"{name}_rgb.bsdf"
     row = go.compress(file, tmp_path / "a.gonio", method="rgl")[0]
     assert row.size < 0.21 * 658_952 and row.error < (1e-3 if name.startswith("irid") else 1e-5)
 
@@ -145,15 +140,12 @@ def test_a_shader_carries_the_weights(language: str, network: Network, folder: P
     assert f"{float(np.float32(network.weights['bias0'][0])):.5g}"[:6] in made.text
 
 
-@pytest.mark.shared
-def test_a_published_network_says_what_its_table_does() -> None:
+def test_a_published_network_says_what_its_table_does(shared: Path) -> None:
     from gonio.measure.formats.npz import arrays
     from gonio.measure.tables.half_difference import centres
     from gonio.measure.tables.network import SHAPES
 
-    path = SHARED / "nbrdf" / "merl.npz"
-    if not path.is_file():
-        pytest.skip("the shared folder with measured materials is not beside this checkout")
+    path = shared / "data" / "nbrdf" / "merl.npz"
     parts = arrays(path.read_bytes(), str(path))
     network, table = Network({part: parts[f"nickel/{part}"] for part in SHAPES}), read(f"{path}:nickel")
     wo, wi = (w[::997] for w in centres((90, 90, 180)))

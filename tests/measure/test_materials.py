@@ -15,8 +15,6 @@ from gonio.measure.warp import Warp
 from gonio.ops import backend
 from gonio.verify import verify
 
-SHARED = Path(__file__).parents[3] / "shared" / "data"
-
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
@@ -99,11 +97,8 @@ def test_a_warp_and_its_inverse_agree_and_integrate_to_one() -> None:
     assert np.array(warp.pdf([(0.0 * x, 1.0 + 0.0 * x)], x, y)).mean() == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.shared
-def test_rgl_tables_are_read_as_mitsuba_reads_them() -> None:
-    file = SHARED / "rgl" / "satin_rosaline_rgb.bsdf"
-    if not file.is_file():
-        pytest.skip("the shared folder with measured materials is not beside this checkout")
+def test_rgl_tables_are_read_as_mitsuba_reads_them(shared: Path) -> None:
+    file = shared / "data" / "rgl" / "satin_rosaline_rgb.bsdf"
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")

@@ -21,8 +21,6 @@ from gonio.measure.tables import angles, half_difference
 from gonio.measure.tables.base import Measurement
 from gonio.ops import Direction, Spectrum
 
-SHARED = Path(__file__).parents[3] / "shared" / "data"
-
 
 class Stand(Measurement):
     """A material in the place of a measurement, to be tabulated."""
@@ -237,16 +235,14 @@ def test_a_wrong_count_in_a_text_is_said() -> None:
 # --------------------------------------------------------------------------- real files
 
 
-@pytest.mark.shared
-def test_the_shared_files_are_read_with_their_faults() -> None:
-    if not SHARED.is_dir():
-        pytest.skip("the shared folder with measured materials is not beside this checkout")
-    sunflower = read(SHARED / "rgl" / "cg_sunflower_rgb.bsdf")
+def test_the_shared_files_are_read_with_their_faults(shared: Path) -> None:
+    data = shared / "data"
+    sunflower = read(data / "rgl" / "cg_sunflower_rgb.bsdf")
     assert sunflower.flaws["negative"] == pytest.approx(0.264, abs=1e-3)
-    satin = report.describe(SHARED / "rgl" / "satin_rosaline_rgb.bsdf")
+    satin = report.describe(data / "rgl" / "satin_rosaline_rgb.bsdf")
     assert satin["albedo"]["rgb"][7][0] == pytest.approx(1.11, abs=0.01)
-    cayman = read(SHARED / "cornell" / "cayman.brdf")
+    cayman = read(data / "cornell" / "cayman.brdf")
     assert cayman.shape == {"sample": 1439, "channel": 31}
-    assert len(report.describe(SHARED / "nbrdf" / "merl.npz")["items"]) == 13
+    assert len(report.describe(data / "nbrdf" / "merl.npz")["items"]) == 13
     with pytest.raises(InputError, match="did you mean 'chrome'"):
-        read(f"{SHARED / 'nbrdf' / 'merl.npz'}:crome")
+        read(f"{data / 'nbrdf' / 'merl.npz'}:crome")

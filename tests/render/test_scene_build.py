@@ -216,6 +216,35 @@ def test_spot_light_is_a_point_of_that_intensity(mi, build):
     assert np.allclose(vector(ds.p), [0, 3, 0])
 
 
+@pytest.mark.parametrize("length", [1e-25, 1.0, 1e17])
+def test_directional_light_arrives_from_everywhere_with_that_irradiance(mi, build, length):
+    ground = {"type": "parallelogram", "base": [-9, 0, 9], "edge0": [18, 0, 0], "edge1": [0, 0, -18]}
+    light = {"type": "directionalLight", "direction": [0.6 * length, -0.8 * length, 0], "energy": [1, 2, 3]}
+    built = build([{**ground, "material": {"type": "matte", "albedo": 0.5}}], [light])
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.p = mi.Point3f(0, 1, 0)
+    ds, weight = built.sample_emitter_direction(si, mi.Point2f(0.5))
+    assert np.allclose(vector(weight), [1, 2, 3])
+    assert np.allclose(vector(ds.d), [-0.6, 0.8, 0], atol=1e-6)
+
+
+def test_directional_light_lights_a_matte_floor_by_its_cosine(scene):
+    description = json.loads((scene / "scene.json").read_text())
+    description["camera"]["transform"] = {"position": [0, 5, 0], "lookAt": [0, 0, 0], "up": [0, 0, -1]}
+    floor = {"type": "parallelogram", "base": [-9, 0, 9], "edge0": [18, 0, 0], "edge1": [0, 0, -18]}
+    light = {"type": "directionalLight", "direction": [0.6, -0.8, 0], "energy": [1, 2, 3]}
+    description["scene"] = {"shapes": [{**floor, "material": {"type": "matte", "albedo": 0.5}}], "lights": [light]}
+    expected = 0.5 / math.pi * 0.8 * np.array([1, 2, 3])
+    for integrator in ("directSampleLight", "path", "caustics", "light"):
+        depth = {} if integrator.startswith("direct") else {"maxDepth": 3}
+        (scene / "scene.json").write_text(json.dumps({**description, "integrator": {"type": integrator, **depth}}))
+        picture = np.asarray(go.render(scene, spp=16 if integrator != "light" else 256))
+        error = np.abs(picture.mean((0, 1)) / expected - 1.0).max()
+        assert error < (1e-5 if integrator != "light" else 0.02), integrator
+
+
 @pytest.mark.parametrize("height, width", [(8, 16), (5, 7)])
 def test_environment_looks_up_texel_centres_by_the_format_s_angles(mi, build, height, width):
     pixels = np.random.default_rng(1).random((height, width, 3)).astype(np.float32)
@@ -392,12 +421,7 @@ def test_rendering_the_same_scene_twice_compiles_nothing_new(mi, build):
     assert kernels and all(kernel["cache_hit"] for kernel in kernels)
 
 
-@pytest.mark.shared
-def test_picture_agrees_with_the_course_framework_s_and_is_not_mirrored(mi):
-    shared = Path(__file__).parents[3] / "shared"
-    if not (shared / "reference").is_dir():
-        pytest.skip("the shared folder with the course's scenes is not beside this checkout")
-
+def test_picture_agrees_with_the_course_framework_s_and_is_not_mirrored(mi, shared):
     def blocks(picture: np.ndarray) -> np.ndarray:
         return picture[:390].reshape(39, 10, 60, 10, 3).mean(axis=(1, 3))
 

@@ -175,6 +175,13 @@ WRONG = [
     (SHAPE + "/radius", -1, None, "expected a number > 0, got -1", "> 0"),
     (SHAPE + "/radius", 0, None, "expected a number > 0", "> 0"),
     (SHAPE + "/radius", 1e300, None, "too large", "1e"),
+    (
+        "/scene/lights/0",
+        {"type": "directionalLight", "direction": [0, 0, 0], "energy": 1},
+        "/scene/lights/0/direction",
+        "direction has length 0",
+        "0, -1, 0",
+    ),
     (SHAPE + "/type", "spere", None, "unknown type 'spere'", "did you mean 'sphere'"),
     (SHAPE + "/center", [0, 0], None, "expected 3 numbers", "x, y, z"),
     (SHAPE + "/transform/scale", [1, 0, 1], None, "flattens", "other than 0"),
@@ -520,14 +527,10 @@ def test_damaged_text_reads_or_is_refused_but_nothing_else(tmp_path, data):
 # ---------------------------------------------------------------------- the course's own scenes
 
 
-@pytest.mark.shared
-def test_the_course_s_scenes_read_and_build_unmodified():
+def test_the_course_s_scenes_read_and_build_unmodified(shared):
     from gonio.bridge import engine
 
-    folder = REPOSITORY.parent / "shared" / "scenes"
-    if not folder.is_dir():
-        pytest.skip("the shared folder with the course's scenes is not beside this checkout")
-    files = sorted(folder.glob("**/scene.json"))
+    files = sorted((shared / "scenes").glob("**/scene.json"))
     assert len(files) >= 9
     for file in files:
         description = scene.read(file.parent)

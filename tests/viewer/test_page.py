@@ -175,6 +175,12 @@ def test_a_scene_is_turned_so_that_its_camera_looks_along_minus_z(tmp_path: Path
     assert what.framed()["elevation"] == pytest.approx(math.pi / 4, abs=1e-4)
 
 
+def test_parallel_light_stays_as_it_is(tmp_path: Path) -> None:
+    sun = {"type": "directionalLight", "direction": [0, -3, 0], "energy": [2, 1, 0]}
+    (light,) = lab_scene.stage(write_scene(tmp_path, [sun], [ball(type="matte", albedo=0.5)])).lights
+    assert light["direction"] == pytest.approx([0, 1, 0]) and light["irradiance"] == pytest.approx([2, 1, 0])
+
+
 def test_a_lamp_around_everything_is_an_environment(tmp_path: Path) -> None:
     sphere = {"type": "sphere", "center": [0, 0, 0], "radius": 9}
     lights = [{"type": "areaLight", "energy": [0.5, 0.6, 0.7], "shape": sphere},

@@ -4,7 +4,7 @@
     manifest.json   the manifest alone, for people and scripts
     E.exr ...       float32 pictures, row 0 (lowest roughness) on top; .png the same in 8 bits, linear. Of a table with
                     three axes the slices stand one below the other, the first on top
-With layout "homework": E.png and E_avg.png exactly as the homework has them (`baked.homework_pictures`). Of an
+With layout "homework": E.png, E_avg.png and dfg.png exactly as the homework has them (`baked.homework_pictures`). Of an
 environment the levels are level_0.exr, level_1.exr ...
 """
 
@@ -86,6 +86,9 @@ def bake(
         if not isinstance(what, str) or aspect not in (None, 1.0):
             problem = "a material, or two widths, in the homework's layout"
             raise InputError(problem, "--layout", "give a distribution such as ggx, with one width")
+        if "glass" in tables:
+            hint = "give E, Eavg or dfg, or another layout"
+            raise InputError("table 'glass' in the homework's layout, which has no picture of it", "--lut", hint)
     baked = baking.cached(
         what,
         lut=tables,

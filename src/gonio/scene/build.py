@@ -163,6 +163,9 @@ class _Builder:
         if isinstance(light, schema.SpotLight):
             intensity = spectra.emitted(light.energy)
             return {"type": "point", "position": list(light.position), "intensity": intensity}
+        if isinstance(light, schema.DirectionalLight):
+            irradiance = spectra.emitted(light.energy)
+            return {"type": "directional", "direction": light.unit().tolist(), "irradiance": irradiance}
         source = light.texture if light.texture is not None else light.radiance
         assert source is not None, "one of the two is given"
         if isinstance(source, ImageTexture):

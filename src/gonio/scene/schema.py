@@ -364,6 +364,27 @@ class SpotLight(Part):
     """Intensity, W/sr."""
 
 
+class DirectionalLight(Part):
+    """Parallel light from infinitely far away, as of a sun without a size."""
+
+    type: Literal["directionalLight"]
+    direction: Vector
+    """The way that the light travels, of any length: [0, -1, 0] shines down."""
+    energy: Radiance
+    """Irradiance on a surface that faces the light, W/m^2."""
+
+    @model_validator(mode="after")
+    def _has_a_direction(self) -> DirectionalLight:
+        if not any(self.direction):
+            raise invalid("direction has length 0", "give the way that the light travels, e.g. [0, -1, 0]", "direction")
+        return self
+
+    def unit(self) -> np.ndarray:
+        """The direction, of length 1."""
+        scaled = np.divide(self.direction, np.abs(self.direction).max())  # squares of small numbers underflow
+        return scaled / np.linalg.norm(scaled)
+
+
 class EnvironmentLight(Part):
     """Light from everywhere: direction (sin t sin p, cos t, sin t cos p) sees u = p/2pi, v = t/pi."""
 
@@ -381,7 +402,7 @@ class EnvironmentLight(Part):
         return self
 
 
-LightSource = Annotated[AreaLight | SpotLight | EnvironmentLight, Field(discriminator="type")]
+LightSource = Annotated[AreaLight | SpotLight | DirectionalLight | EnvironmentLight, Field(discriminator="type")]
 
 
 class Contents(Part):

@@ -162,6 +162,9 @@ def _lights(description: schema.SceneDescription) -> tuple[tuple[Light, ...], li
         if isinstance(light, schema.SpotLight):
             away = np.array(light.position, float) - target
             irradiance = np.array(spectra.colour(light.energy)) / max(float(away @ away), 1e-12)
+        elif isinstance(light, schema.DirectionalLight):
+            away = -light.unit()
+            irradiance = np.array(spectra.colour(light.energy))
         else:
             away, irradiance = _area(light, target)
         distance = float(np.linalg.norm(away))

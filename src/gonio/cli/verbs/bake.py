@@ -65,7 +65,8 @@ def bake(
       gonio bake ggx -o tables
       gonio bake ggx --aspect 0.25 --layout stretched -o brushed
       gonio bake ggx --lut glass --size 32 -o glass
-      gonio bake ggx --layout homework --masking schlick-direct --method ggx -o homework
+      gonio bake ggx --layout homework --masking schlick-ibl -o pictures
+      gonio bake ggx --layout homework --masking schlick-direct -o text
       gonio bake conductor --preset Au --lut E,Eavg -o gold
       gonio bake sky.hdr --lut prefiltered -o sky
     """

@@ -109,9 +109,10 @@ def load(path: str | Path) -> Baked:
 
 
 def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict[str, np.ndarray]:
-    """E and E_avg as the homework has them: (N, N, 3) of 8 bits, x = n.v, three equal channels, E_avg along the row.
+    """E, E_avg and dfg as the homework has them: (N, N, 3) of 8 bits, x = n.v. E and E_avg have three equal channels,
+    E_avg is constant along a row; dfg has A in red and B in green.
 
-    store  "E" or "1-E"
+    store  "E" or "1-E", of E and E_avg
     flip   True: the bottom row is the lowest roughness; False: the top row is
     """
     if store not in ("E", "1-E"):
@@ -123,7 +124,14 @@ def homework_pictures(baked: Baked, store: str = "E", flip: bool = True) -> dict
             continue
         value = baked.arrays[name]
         value = np.broadcast_to(value[:, None], (size, size)) if value.ndim == 1 else value
-        value = np.clip(1.0 - value if store == "1-E" else value, 0.0, 1.0)
-        value = value[::-1] if flip else value
-        pictures[name] = np.repeat(np.round(value * 255.0).astype(np.uint8)[..., None], 3, axis=-1)
+        value = 1.0 - value if store == "1-E" else value
+        pictures[name] = np.repeat(_bytes(value[::-1] if flip else value)[..., None], 3, axis=-1)
+    if "dfg" in baked.arrays:
+        value = baked.arrays["dfg"][::-1] if flip else baked.arrays["dfg"]
+        pictures["dfg"] = _bytes(np.dstack([value, np.zeros((size, size))]))
     return pictures
+
+
+def _bytes(value: np.ndarray) -> np.ndarray:
+    """Values of 0 to 1 in 8 bits."""
+    return np.round(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)
