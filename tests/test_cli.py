@@ -267,6 +267,48 @@ def test_render_writes_beside_where_it_is_run_and_prints_the_path(
     assert images.read("ball.png").metadata["spp"] == 4
 
 
+def test_a_scenes_own_name_for_the_picture_counts_where_it_is_used(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (scene / "scene.json").read_text().replace("ball.png", "ball")
+    (scene / "scene.json").write_text(text)
+    told = failure(capsys, "render", scene)
+    assert "'ball' is no known kind of picture" in told and "scene.json#/output/filename" in told and "-o FILE" in told
+    assert gonio("render", scene, "-o", "picture.exr", "--spp", 1) == 0
+    assert gonio("study", scene, "--vary", "shapes.0.material.p=4", "--spp", 1) == 0
+
+
+def test_a_file_in_a_folder_is_a_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`plot sub/mine.py:Own` said "no tables.npz here"."""
+    (tmp_path / "sub").mkdir()
+    body = "    def eval(self, wo, wi, mode='radiance'):\n        return self.tint * go.ops.maximum(wi.z, 0.0)\n"
+    head = "import gonio as go\n\n\nclass Own(go.BSDF):\n    tint: go.Colour = go.spectrum(0.2, 'share')\n\n"
+    (tmp_path / "sub" / "mine.py").write_text(head + body)
+    monkeypatch.chdir(tmp_path)
+    assert gonio("plot", "sub/mine.py:Own", "-o", "a.png") == 0
+    assert gonio("plot", tmp_path / "sub" / "mine.py:Own", "--kind", "albedo") == 0
+    assert Path("mine-own-albedo.png").is_file()
+
+
+def test_a_text_longer_than_a_files_name_may_be_is_a_material(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It ended in "File name too long", as a fault of Gonio's."""
+    monkeypatch.chdir(tmp_path)
+    text = "lambert"
+    while len(text) < 300:
+        text = f"mix(a={text},b=conductor(preset=Au,alpha=.1))"
+    assert gonio("plot", text, "-o", "a.png") == 0
+    assert gonio("emit", text, "--functions", "eval", "-o", "a.glsl") == 0
+    assert "no such scene" in failure(capsys, "render", "y" * 300)
+
+
+def test_parameters_go_to_a_material_alone(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = failure(capsys, "study", scene, "-p", "p=3", "--vary", "shapes.0.material.p=4")
+    assert "parameters of a material given" in told
+    assert gonio("study", "phong", "-p", "kd=.2", "--vary", "p=4,16", "--spp", 1, "--size", "8x8") == 0
+
+
 def test_render_reports_json(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("render", scene, "-o", "a.exr", "--spp", "2", "--size", "8x4", "--json") == 0
     result = json.loads(capsys.readouterr().out)

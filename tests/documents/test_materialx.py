@@ -113,7 +113,11 @@ if importlib.util.find_spec("MaterialX"):
         assert documents.convert(str(tmp_path / "paint.json"), tmp_path / "paint.mtlx") == ()
         documents.convert(str(tmp_path / "paint.mtlx:paint"), tmp_path / "again.json")
         again = json.loads((tmp_path / "again.json").read_text())
-        assert again == {"type": "openpbr", **values, "base_color": [pytest.approx(c) for c in values["base_color"]]}
+        assert again == {
+            "type": "gonio-openpbr",
+            **values,
+            "base_color": [pytest.approx(c) for c in values["base_color"]],
+        }
 
     def test_a_material_that_the_format_does_not_hold_is_not_written(tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text('{"type": "conductor", "alpha": 0.3}')

@@ -104,3 +104,60 @@ def test_what_cannot_be_read_is_one_clear_error(text: str, given: list[str], wor
 def test_what_a_class_needs_is_named() -> None:
     with pytest.raises(InputError, match="needs tint, power"):
         notation.made(Strict, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "given"),
+    [
+        ("kulla-conty", ["base=conductor", "base.alpha=.35", "base.preset=Au"]),
+        ("kulla-conty", ["base.alpha=.35", "base.preset=Au", "base=conductor"]),
+        ("kulla-conty(base.preset=Au,base=conductor(alpha=.1))", ["base.alpha=.35"]),
+        ("kulla-conty(base.alpha=.35,base=conductor(preset=Au))", []),
+        ("kulla-conty", ['base={"type": "conductor", "preset": "Au"}', "base.alpha=.35"]),
+    ],
+)
+def test_a_path_leads_into_a_material_whatever_the_order(text: str, given: list[str]) -> None:
+    assert notation.named(text, given)[0] == go.KullaConty(go.Conductor.preset("Au", alpha=0.35))
+
+
+def test_a_path_leads_through_several_materials() -> None:
+    found = notation.named("mix", ["b.base.alpha=.2,.4", "b=kulla-conty", "a.albedo=.25"])[0]
+    assert found == go.mix(go.Lambert(0.25), go.KullaConty(go.Conductor(alpha=(0.2, 0.4))))
+    assert notation.named("kulla-conty", ["base.alpha=.2"])[0].base.alpha == 0.2  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["bse.alpha=.2"], "did you mean 'base'?"),
+        (["base.alhpa=.2"], "did you mean 'alpha'?"),
+        (["base.alpha.x=.2"], "'alpha' of conductor is no material"),
+        (["base=lambert", "base.alpha=.2"], "lambert has no parameter 'alpha'"),
+        (["base.alpha=-1"], "-1 given"),
+    ],
+)
+def test_a_path_that_leads_nowhere_is_one_clear_error(given: list[str], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        notation.named("kulla-conty", given)
+    assert words in f"{caught.value} {caught.value.hint}"
+
+
+def test_a_path_is_shared_by_the_materials_that_have_it() -> None:
+    found = notation.several(["kulla-conty", "lambert", "mix"], ["base.alpha=.35", "b.alpha=.2"])
+    assert [given for _, given in found] == [{"base.alpha": ".35"}, {}, {"b.alpha": ".2"}]
+    with pytest.raises(InputError, match=r"unknown parameter 'base\.alhpa'"):
+        notation.several(["kulla-conty", "turquin"], ["base.alhpa=.35"])
+
+
+def test_json_is_a_material_at_the_top_too() -> None:
+    assert notation.named('{"type": "gonio-conductor", "alpha": .3}(alpha=.2)')[0] == go.Conductor(alpha=0.2)
+    with pytest.raises(InputError, match='an object with a "type" expected'):
+        notation.named('{"kind": "lambert"}')
+
+
+def test_values_of_a_material_change_by_path() -> None:
+    gold = go.KullaConty(go.Conductor.preset("Au", alpha=0.35))
+    found = notation.changed(gold, {"base.alpha": [0.1, 0.2], "base.ndf": "beckmann"})
+    assert found == go.KullaConty(go.Conductor.preset("Au", alpha=(0.1, 0.2), ndf="beckmann"))
+    with pytest.raises(InputError, match="no parameter 'alhpa'"):
+        notation.changed(gold, {"base.alhpa": 0.1})

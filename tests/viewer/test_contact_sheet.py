@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
@@ -128,3 +129,61 @@ def test_too_many_pictures_are_refused_before_the_first(tmp_path: Path) -> None:
         contact_sheet.render_sheet(Request(Path("nowhere")), variations, tmp_path / "a.png")
     with pytest.raises(InputError, match="varied twice"):
         contact_sheet.render_sheet(Request(Path("nowhere")), [Variation("a", (1,))] * 2, tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("kd,ks=(.2,.8),(.5,.5)", [{"kd": 0.2, "ks": 0.8}, {"kd": 0.5, "ks": 0.5}]),
+        ("kd, ks=([.1,.2,.3],.5)", [{"kd": [0.1, 0.2, 0.3], "ks": 0.5}]),
+        ("a,b,c=(1,gold,true)", [{"a": 1, "b": "gold", "c": True}]),
+        ("a=(.1,.2)", [{"a": "(.1,.2)"}]),
+    ],
+)
+def test_several_paths_vary_together(text: str, settings: list[dict[str, object]]) -> None:
+    found = contact_sheet.parse_variation(text)
+    assert [found.settings(value) for value in found.values] == settings
+    assert found.name == ", ".join(settings[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("kd,ks=(.2,.8),(.5)", "'(.5)' is 1 value, 2 expected for kd, ks"),
+        ("kd,ks=.2,.8", "'0.2' is one value, 2 expected"),
+        ("kd,ks=(.2,.8,.1)", "is 3 values, 2 expected"),
+        ("kd,=(.2,.8)", "varies no path"),
+        ("kd,kd=(.2,.8)", "one twice"),
+    ],
+)
+def test_paths_and_values_that_do_not_fit_are_refused(text: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        contact_sheet.parse_variation(text)
+    assert words in caught.value.what
+
+
+def test_a_material_is_studied_on_a_ball(tmp_path: Path) -> None:
+    """By text or as an object, with values of its own, of materials inside, tied ones, and of the scene around it."""
+    vary = {"p": [4, 16], ("kd", "ks"): [(0.2, 0.8), (0.5, 0.5)]}
+    sheet = go.study("phong", vary, size=(8, 8), spp=1, output=tmp_path / "a.png")
+    assert sheet.cells[1] == {"p": 4, "kd": 0.5, "ks": 0.5} and len(sheet.cells) == 4
+    other = go.study(go.Phong(p=3.0), {"p": [4], "kd,ks": [(0.2, 0.8)]}, size=(8, 8), spp=1)
+    assert other.cells == ({"p": 4, "kd": 0.2, "ks": 0.8},)
+    inside = go.study(
+        "kulla-conty", {"shapes.0.material.base.alpha": [0.2], "camera.verticalFov": [20]}, size=(8, 8), spp=1
+    )
+    assert len(inside.cells) == 1
+    with pytest.raises(InputError, match="phong has no parameter 'q'") as caught:
+        go.study("phong", {"q": [1]}, size=(8, 8), spp=1)
+    assert caught.value.where == "--vary q"
+
+
+def test_each_picture_of_a_study_has_its_own_values() -> None:
+    from gonio.catalog import notation
+    from gonio.render.request import Request
+
+    named = notation.taken_apart("kulla-conty(base=conductor(preset=Au))")
+    cell = {"base.alpha": 0.4, "integrator.maxDepth": 2}
+    found = contact_sheet.with_cell(Request(Path("kulla-conty")), cell, named)
+    assert found.material == go.KullaConty(go.Conductor.preset("Au", alpha=0.4))
+    assert found.overrides == {"integrator.maxDepth": 2}

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gonio.pictures import metrics
+from gonio.errors import InputError
+from gonio.pictures import images, metrics
 from gonio.pictures.images import Picture
 from gonio.viewer import error_map
 
@@ -44,3 +45,20 @@ def test_the_map_is_bright_where_the_error_is(pictures: tuple[Picture, Picture],
 def test_equal_pictures_have_a_map_too(tmp_path: Path, pictures: tuple[Picture, Picture]) -> None:
     error_map.draw(pictures[1], pictures[1], "relmse").save(tmp_path / "map.png")
     assert (tmp_path / "map.png").is_file()
+
+
+def test_a_png_is_read_as_it_is_said(tmp_path: Path) -> None:
+    """Grey levels 100 and 110 of 255: 0.0392 apart as data, such as a table's, and 0.0285 where sRGB is decoded."""
+    for name, level in (("a.png", 110), ("b.png", 100)):
+        (tmp_path / name).write_bytes(images.png_bytes(np.full((4, 4, 3), level, np.uint8)))
+    shown = error_map.compare(tmp_path / "a.png", tmp_path / "b.png")
+    data = error_map.compare(tmp_path / "a.png", tmp_path / "b.png", encoding="linear")
+    assert data.rmse == pytest.approx(10 / 255, rel=1e-6) and shown.rmse == pytest.approx(0.0285, abs=1e-4)
+    assert "sRGB" in shown.rows()["read as"] and "--encoding linear" in shown.rows()["read as"]
+    assert "as stored" in data.rows()["read as"] and data.as_dict()["encoding"] == "linear"
+    pixels = np.ones((4, 4, 3), np.float32)
+    assert (
+        error_map.compare(pixels, pixels).encoding is None and "read as" not in error_map.compare(pixels, pixels).rows()
+    )
+    with pytest.raises(InputError, match="unknown encoding 'raw'"):
+        error_map.compare(tmp_path / "a.png", tmp_path / "b.png", encoding="raw")

@@ -4,9 +4,11 @@
     ward.py:Ward                                a class in a Python file, which runs because the user named it
     gold.binary                                 a file of measured values
     chest.gltf:Wood                             a material of a glTF file, with its numbers (`documents`)
+    gold.json                                   what `gonio fit` found, or JSON as below
     alum-bronze                                 a material of the library (`gonio models --library`), by its default fit
     alum-bronze:low2012/lowsmooth_E2            the same by another published fit
     conductor(alpha=.3,preset=Au)               all in one; a comma parts them where a name and = follow
+    kulla-conty(base=conductor,base.alpha=.3)   a value of a material inside, by its path; the order does not matter
     {"type": "conductor", "alpha": [.1, .4]}    as in a scene
 
 Values are numbers, "0.9,0.8,0.7" or [.9, .8, .7] for several, names, true or false, and materials again. A material
@@ -16,21 +18,27 @@ inside that is not given is metal of alpha .3, and the first of a mix Lambert's.
 from __future__ import annotations
 
 import inspect
-import json
-import re
+import os
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from ..material import is_model, model, tree
+from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.parameters import IndexParameter, Parameter, Value
 from ..optics.indices import DispersiveIndex
 from . import documents, library, outside
+from .texts import apart, assignment, class_named, split, taken_apart
 
-_CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
-_SETTINGS = re.compile(r"\(\s*\w+\s*=.*\)\s*\Z", re.DOTALL)  # at a text's end
+Settings: TypeAlias = "tuple[type[BSDF], dict[str, object]]"  # a class, and what is set of it: text, or as JSON has it
+
+__all__ = [
+    "Settings", "apart", "as_json", "assignment", "build", "changed", "class_named", "for_files", "from_json", "made",
+    "material", "named", "settings", "several", "shared", "spelled", "split", "taken_apart", "typed",
+    "written",
+]  # fmt: skip
 
 
 def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
@@ -50,60 +58,78 @@ def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
     return cls.preset(preset, **parameters)
 
 
-def assignment(text: str, option: str = "--param") -> tuple[str, str]:
-    """("alpha", ".3") of "alpha=.3"."""
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", option, "such as alpha=0.3")
-    return name.strip(), value.strip()
-
-
-def named(text: str, assignments: Sequence[str] = (), preset: str = "") -> tuple[BSDF, dict[str, object]]:
+def named(
+    text: str, assignments: Sequence[str] = (), preset: str = "", allow_code: bool = False
+) -> tuple[BSDF, dict[str, object]]:
     """A material as the command line names it, and what was set: values by parameter, "preset" among them.
 
     assignments  "name=value" each
+    allow_code   let a file of data name classes in Python files, which then run
     Raises InputError, with the nearest known spelling, for what is unknown or out of range.
     """
-    cls, own = taken_apart(text)
+    cls, own = taken_apart(text, allow_code=allow_code)
     given = {**own, **dict(map(assignment, assignments))}
     material, values = made(cls, {**given, "preset": preset} if preset else given)
     return outside.probe(material), values
 
 
-def several(texts: Sequence[str], assignments: Sequence[str]) -> list[tuple[type[BSDF], dict[str, object]]]:
+def several(texts: Sequence[str], assignments: Sequence[str]) -> list[Settings]:
     """Of each text the class and what is set of it: its own settings, and of the shared ones those that it has.
 
     assignments  "name=value" each, shared by all; InputError for one that no material has
     """
-    shared = dict(map(assignment, assignments))
+    named = [taken_apart(text) for text in texts]
+    return [(cls, {**given, **own}) for (cls, own), given in zip(named, shared(named, assignments), strict=True)]
+
+
+def shared(named: Sequence[Settings], assignments: Sequence[str]) -> list[dict[str, str]]:
+    """Of settings, "name=value" each, those that each material has; InputError for one that none has."""
+    wanted = dict(map(assignment, assignments))
     found, known = [], set()
-    for text in texts:
-        cls, own = taken_apart(text)
-        fits = {*cls.parameters(), *(["preset"] if cls.presets() else [])}
-        found.append((cls, {**{name: value for name, value in shared.items() if name in fits}, **own}))
-        known |= fits
-    for name in shared:
+    for cls, own in named:
+        fits = [name for name in wanted if _has(cls, {**wanted, **own}, name)]
+        found.append({name: wanted[name] for name in fits})
+        known |= {*fits, *cls.parameters(), *(["preset"] if cls.presets() else [])}
+    for name in wanted:
         if name not in known:
             raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, sorted(known)))
     return found
 
 
+def build(named: Settings) -> BSDF:
+    """The material of a class and what is set of it, tried. Raises InputError as `named` does."""
+    return outside.probe(made(*named)[0])
+
+
+def _has(cls: type[BSDF], given: Mapping[str, object], path: str) -> bool:
+    """Whether a material of a class has a parameter, by its path; `given` is what is set of it, as `made` takes it."""
+    name, dot, rest = path.partition(".")
+    parameter = cls.parameters().get(name)
+    if parameter is None or not dot:
+        return parameter is not None or (path == "preset" and bool(cls.presets()))
+    if not parameter.inner:
+        return False
+    below = {key.removeprefix(f"{name}."): value for key, value in given.items() if key.startswith(f"{name}.")}
+    inner, own = apart(given.get(name, _inner_default(parameter)), f"--param {name}")
+    return _has(inner, {**own, **below}, rest)
+
+
 def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, object]]:
-    """As `named`, of a class; a value is text, or what JSON has for it."""
+    """As `named`, of a class; a value is text, or what JSON has for it. "base.alpha" is a value of the material `base`,
+    and prevails over one inside of the text of `base`."""
     known = cls.parameters()
     values: dict[str, object] = {}
     preset = "" if "preset" in known else str(given.get("preset", ""))
     if preset and not cls.presets():
         raise InputError(f"{cls.name} has no presets", "--preset", "give its parameters by --param")
-    for name, value in given.items():
-        if name in known:
+    own, below = _by_level(cls, given)
+    for name, value in own.items():
+        if not known[name].inner:
             values[name] = typed(known[name], value)
-        elif name != "preset":
-            hint = did_you_mean(name, [*known, *(["preset"] if cls.presets() else [])])
-            raise InputError(f"{cls.name} has no parameter '{name}'", f"--param {name}", hint)
     for name, parameter in known.items():
-        if parameter.inner and parameter.required and name not in values:
-            values[name] = model("lambert")() if name == "a" else model("conductor")(alpha=0.3)  # type: ignore[call-arg]
+        if parameter.inner and (parameter.required or name in own or name in below):
+            value = own.get(name, _inner_default(parameter))
+            values[name] = _inner(value, f"--param {name}", below.get(name, {}))
     if preset:
         return cls.preset(preset, **values), {"preset": preset, **values}
     missing = [name for name, parameter in known.items() if parameter.required and name not in values]
@@ -119,11 +145,31 @@ def made(cls: type[BSDF], given: Mapping[str, object]) -> tuple[BSDF, dict[str, 
         raise InputError(f"{cls.__name__} cannot be made: {type(error).__name__}: {error}", "TARGET") from None
 
 
+def _by_level(cls: type[BSDF], given: Mapping[str, object]) -> tuple[dict[str, object], dict[str, dict[str, object]]]:
+    """What is set of a material itself, and of each material inside it, by parameter. InputError for unknown names."""
+    known = cls.parameters()
+    own: dict[str, object] = {}
+    below: dict[str, dict[str, object]] = {}
+    for path, value in given.items():
+        name, dot, rest = path.partition(".")
+        if path in known:
+            own[path] = value
+        elif dot and name in known:
+            if not known[name].inner:
+                what = f"'{name}' of {cls.name} is no material, and has no '{rest}'"
+                raise InputError(what, f"--param {path}", f"give --param {name}=...")
+            below.setdefault(name, {})[rest] = value
+        elif path != "preset":
+            hint = did_you_mean(name, [*known, *(["preset"] if cls.presets() else [])])
+            raise InputError(f"{cls.name} has no parameter '{name}'", f"--param {path}", hint)
+    return own, below
+
+
 def typed(parameter: Parameter, value: Value) -> object:
     """A parameter's value from text, or from what JSON has for it."""
     where = f"--param {parameter.name}"
     if parameter.inner:
-        return _inner(value, where)
+        return _inner(value, where, {})
     if parameter.kind == "file":
         return value
     if parameter.kind == "choice":
@@ -162,6 +208,7 @@ def written(value: Value) -> str:
 
 def as_json(material: BSDF) -> dict[str, object]:
     """The material as JSON has it, to the last digit: {"type": "conductor", "alpha": 0.3}; `made` takes the values.
+    Paths of files are absolute, as whoever reads it may stand in another folder.
 
     Raises InputError for a class that no file holds, and for values that JSON has no word for.
     """
@@ -172,6 +219,8 @@ def as_json(material: BSDF) -> dict[str, object]:
     for name, value in settings(material).items():
         if isinstance(value, BSDF):
             found[name] = as_json(value)
+        elif material.parameters()[name].kind == "file":
+            found[name] = os.path.abspath(os.path.expanduser(value))
         elif isinstance(value, bool | str):
             found[name] = value
         elif isinstance(value, DispersiveIndex):
@@ -182,6 +231,14 @@ def as_json(material: BSDF) -> dict[str, object]:
             except (TypeError, ValueError):
                 raise InputError(f"{name} = {value!r} is no number", "material", "give numbers") from None
     return found
+
+
+def for_files(material: BSDF) -> dict[str, object] | None:
+    """The material as a file of results holds it: with types as scenes have them; None where no file can hold it."""
+    try:
+        return documents.for_scenes(as_json(material))
+    except InputError:
+        return None
 
 
 def from_json(described: Mapping[str, object]) -> BSDF:
@@ -209,36 +266,38 @@ def _same(a: object, b: object) -> bool:
         return False
 
 
-def _inner(value: Value, where: str) -> BSDF:
-    if isinstance(value, str) and not value.lstrip().startswith("{"):
-        return made(*taken_apart(value.strip().strip('"'), where))[0]
-    try:
-        fields = dict(json.loads(re.sub(r"(?<![\w.])\.(?=\d)", "0.", value)) if isinstance(value, str) else value)
-        name = str(fields.pop("type"))
-    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
-        raise _no_material(value, where) from None
-    cls, preset = class_and_preset(name, where)
-    return made(cls, {"preset": preset, **fields} if preset else fields)[0]
+def _inner(value: Value, where: str, below: Mapping[str, object]) -> BSDF:
+    """The material that a text or JSON names, with some more settings."""
+    if isinstance(value, BSDF):
+        return (
+            value
+            if not below
+            else tree.replace(value, {path: _typed_at(value, path, v) for path, v in below.items()}, where)
+        )
+    cls, own = apart(value, where)
+    return made(cls, {**own, **below})[0]
 
 
-def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
-    """The class of a name, or of FILE.py:CLASS."""
-    return class_and_preset(name, where)[0]
+def _inner_default(parameter: Parameter) -> Value:
+    """The material of a parameter that none was given for."""
+    if not parameter.required:
+        return parameter.default
+    return "lambert" if parameter.name == "a" else "conductor(alpha=0.3)"
 
 
-def names_material(name: str) -> bool:
-    """Whether a name, without parameters, is meant for a material: known, code, or nearest to one of the library."""
-    return outside.names_code(name) or is_model(name) or library.resembles(name)
+def _typed_at(material: BSDF, path: str, value: Value) -> object:
+    """A value as the parameter at a path takes it. InputError where there is none."""
+    name, dot, rest = path.partition(".")
+    parameter = material.parameters().get(name)
+    if parameter is None or (dot and not parameter.inner):
+        known = [leaf.path for leaf in tree.leaves(material)]
+        raise InputError(f"{material.name} has no parameter '{path}'", f"--param {path}", did_you_mean(path, known))
+    return _typed_at(getattr(material, name), rest, value) if dot else typed(parameter, value)
 
 
-def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
-    """The class of a name, of FILE.py:CLASS or of a material of the library, of which the preset too; "" for none.
-    InputError, with the nearest known name, where there is nothing of that name."""
-    if outside.names_code(name):
-        return outside.load(name, where=where), ""
-    if not is_model(name) and (":" in name or library.resembles(name)):
-        return library.named(name, where)
-    return model(name), ""
+def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
+    """The material with other values, by path: text, or what JSON has for them. InputError for what cannot be."""
+    return _inner(material, "material", values)
 
 
 def spelled(cls: type[BSDF]) -> str:
@@ -249,46 +308,3 @@ def spelled(cls: type[BSDF]) -> str:
         return f"{inspect.getsourcefile(cls)}:{cls.__qualname__}"
     except (TypeError, OSError):
         return cls.__qualname__
-
-
-def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, object]]:
-    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); of a document's material
-    what JSON has for them."""
-    if text.count("(") + text.count("{") > tree.MOST:
-        raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
-    head = text.strip()
-    while True:  # a file's name may have brackets in it
-        reader = outside.reader_of(head)
-        document = documents.names_document(head) and not _SETTINGS.search(head)
-        if reader is not None or document:
-            given: dict[str, object] = {"file": head} if reader is not None else documents.without_pictures(head)
-            cls = reader if reader is not None else class_named(str(given.pop("type")), where)
-            given.update(assignment(part, where) for part in _parts(text.strip()[len(head) :].strip("() ")))
-            return cls, given
-        head, bracket, _ = head.rpartition("(")
-        if not bracket:
-            break
-    match = _CALL.fullmatch(text)
-    if not match or re.fullmatch(r"[\d.-]+", match[1]):
-        raise _no_material(text, where)
-    own: dict[str, object] = dict(assignment(part, where) for part in _parts(match[2] or ""))
-    cls, preset = class_and_preset(match[1], where)
-    return cls, {"preset": preset, **own} if preset else own
-
-
-def _parts(text: str) -> list[str]:
-    """At commas outside of brackets, where a name and = follow; any other comma is part of a colour."""
-    parts, depth, start = [], 0, 0
-    for at, letter in enumerate(text):
-        depth += (letter in "([{") - (letter in ")]}")
-        if letter == "," and depth == 0 and re.match(r",\s*[A-Za-z_]\w*\s*=", text[at:]):
-            parts.append(text[start:at])
-            start = at + 1
-    return [part for part in [*parts, text[start:]] if part.strip()]
-
-
-def _no_material(value: object, where: str) -> InputError:
-    if str(value).endswith(".py"):
-        return InputError(f"'{value}' names a file, but no class in it", where, f"give {value}:CLASS")
-    hint = 'such as lambert, \'conductor(alpha=.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
-    return InputError(f"'{value}' is no material", where, hint)

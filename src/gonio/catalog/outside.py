@@ -25,7 +25,6 @@ from ..material.bsdf import BSDF
 from ..material.sample import Sample
 from ..ops import RecordingError
 from ..owner import alone
-from . import documents
 
 _CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w+)")
 PREFIX = "gonio_file_"  # of the names under which such modules stand in sys.modules
@@ -42,11 +41,6 @@ def names_code(text: str) -> bool:
 def reader_of(text: str) -> type[BSDF] | None:
     """The material that a file of data is, by the file's name: Measured of "gold.binary"; None where it is none."""
     return next((cls for cls in BSDF.family.all().values() if cls.reads(text)), None)
-
-
-def names_data(text: str) -> bool:
-    """Whether a text names a file of data that is a material: measured values, or another program's description."""
-    return reader_of(text) is not None or documents.names_document(text)
 
 
 def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BSDF]:

@@ -3,7 +3,7 @@ together, whose fields a verb gets as one parameter."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ from typer import Argument, Option
 from . import completion
 
 if TYPE_CHECKING:
+    from ..catalog import notation, operands
     from ..material import BSDF
     from ..render.request import Request
 
@@ -22,7 +23,7 @@ Model = Annotated[
 ]
 Parameters = Annotated[list[str] | None, Option("--param", "-p", metavar="NAME=VALUE", help="A parameter; repeatable.")]
 SceneFile = Annotated[
-    Path, Argument(metavar="SCENE", help="A scene's folder or .json; a Mitsuba .xml; or a material, shown on a ball.")
+    str, Argument(metavar="SCENE", help="A scene's folder or .json; a Mitsuba .xml; or a material, shown on a ball.")
 ]
 Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
 Outside = Annotated[bool, Option("--allow-outside", help="Let the scene read files outside its folder.")]
@@ -43,42 +44,54 @@ class Material:
         str, Option(metavar="NAME", help="A named preset, such as Au for conductor.", autocompletion=completion.presets)
     ] = ""
 
-    def texts(self, models: Sequence[str]) -> list[str]:
-        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share what they have."""
-        from ..catalog import notation
+    def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
+        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share what they have.
 
-        shared = [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
-        if not shared:
+        accepted  the kinds that may stand there; materials alone if not given
+        Raises InputError for what is none of these, and for a parameter that none has.
+        """
+        from ..catalog import notation, operands, texts
+
+        for one in models:
+            operands.kind_of(one, accepted or operands.MATERIALS, "MODEL")
+        wanted = self._wanted()
+        if not wanted:
             return list(models)
-        if len(models) > 1:
-            found = notation.several(models, shared)
-            texts = [{key: value for key, value in named.items() if isinstance(value, str)} for _, named in found]
-            return [_text(name, given) for name, given in zip(models, texts, strict=True)]
-        own = models[0].partition("(")[2].removesuffix(")")
-        return [_text(models[0], dict(map(notation.assignment, shared)), own)]
+        apart = [notation.split(one) for one in models]
+        if len(models) == 1:
+            return [_text(apart[0][0], dict(map(notation.assignment, wanted)), apart[0][1])]
+        given = notation.shared([notation.taken_apart(one) for one in models], wanted)
+        return [_text(head, {**of, **texts.assignments(own)}) for (head, own), of in zip(apart, given, strict=True)]
 
-    def text(self, model: str) -> str:
-        return self.texts([model])[0]
+    def text(self, model: str, accepted: Collection[operands.Kind] = ()) -> str:
+        return self.texts([model], accepted)[0]
 
-    def instead_of(self, scene: Path) -> BSDF | None:
-        """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
-        is no material's name. Raises InputError for parameters without a material."""
-        from ..catalog import notation, outside
+    def _wanted(self) -> list[str]:
+        return [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
+
+    def refuse(self, target: str) -> None:
+        """Raise InputError for parameters of a material where there is none."""
         from ..errors import InputError
 
-        text = str(scene)
-        head = text.partition("(")[0]
-        if outside.names_data(head) or (not scene.exists() and notation.names_material(head)):
-            return notation.named(self.text(text))[0]
-        if self.param or self.preset:
-            what = "parameters of a material given, and a scene"
-            raise InputError(what, "--param", "name a material, such as conductor, or change the scene")
+        if self._wanted():
+            what = f"parameters of a material given, and '{target}' is none"
+            raise InputError(what, "--param", "name a material, such as conductor, or leave the parameters out")
+
+    def instead_of(self, scene: str, allow_code: bool = False) -> notation.Settings | None:
+        """The material that is named where a scene may stand, "ward.py:Ward" or "conductor(preset=Au)"; None where it
+        is a scene. Raises InputError for parameters without a material."""
+        from ..catalog import notation, operands
+
+        if operands.kind_of(scene, {operands.Kind.SCENE, *operands.MATERIALS}, "SCENE") in operands.MATERIALS:
+            cls, own = notation.taken_apart(scene, allow_code=allow_code)
+            return cls, {**own, **dict(map(notation.assignment, self._wanted()))}
+        self.refuse(scene)
         return None
 
 
-def _text(model: str, settings: Mapping[str, str], own: str = "") -> str:
+def _text(head: str, settings: Mapping[str, str], own: str = "") -> str:
     given = ",".join(filter(None, [own, *map("=".join, settings.items())]))
-    return model.partition("(")[0] + (f"({given})" if given else "")
+    return head + (f"({given})" if given else "")
 
 
 @dataclass(frozen=True)
@@ -117,7 +130,7 @@ class Rendering:
 
     def request(
         self,
-        scene: Path,
+        scene: str,
         output: Path | None = None,
         timeout: float | None = None,
         material: BSDF | None = None,
@@ -129,7 +142,7 @@ class Rendering:
         from ..render.request import Request, parse_size
 
         return Request(
-            Path(material.name) if material else scene,
+            Path(material.name if material else scene),
             output,
             timeout=timeout,
             **vars(self)

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from .. import files as whole
+from ..catalog import operands
+from ..catalog.operands import Kind
 from ..errors import InputError
 from ..measure import names_table, read
 from ..work import parts
@@ -42,7 +44,7 @@ def files_of(named: Sequence[str]) -> list[str]:
     found: list[str] = []
     for text in named:
         folder = Path(text).expanduser()
-        if folder.is_dir():
+        if operands.kind_of(str(folder), {Kind.TABLE, Kind.FOLDER}, "DATA") is Kind.FOLDER:
             inside = sorted(str(path) for path in folder.iterdir() if names_table(path.name) and path.is_file())
             if not inside:
                 raise InputError("no file of measurements in it", text, "such as .binary, .bsdf or .gonio")

@@ -44,7 +44,8 @@ class Data:
 def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Data:
     """The values of a table up to an angle of both directions, degrees.
 
-    A table over half vector and difference gives its own cells, but invalid ones; any other is read on such a grid.
+    A table over half vector and difference gives its own cells, but invalid ones; any other is read on such a grid,
+    at the angles that were measured.
     Raises InputError where nothing is left.
     """
     if not 0.0 < grazing <= 90.0:
@@ -57,6 +58,9 @@ def data_of(table: Measurement, grazing: float = GRAZING, where: str = "") -> Da
     if isinstance(table, HalfDifference):
         valid = table.valid.ravel()[seen]
         wo, wi, row, kept = wo[valid], wi[valid], row[valid], seen & table.valid.ravel()
+    if not own:
+        known = table.angular_range.holds(wo, wi)
+        wo, wi, row, kept = wo[known], wi[known], row[known], seen
     if not len(wo):
         raise InputError("no valid value up to that angle", where, "raise --grazing, or check the file")
     if isinstance(table, HalfDifference):

@@ -79,9 +79,11 @@ class Fit:
         return notation.written(self.material)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; an error that is not known is null."""
+        """For JSON; an error that is not known is null. `notation` is the material as scenes and other files hold it;
+        null where no file can."""
         return {
             "material": self.text,
+            "notation": notation.for_files(self.material),
             "metric": self.metric,
             "error": self.error,
             "relative": self.relative,

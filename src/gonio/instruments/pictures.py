@@ -80,6 +80,7 @@ class PictureFit:
         """For JSON; an error that is not known is null."""
         return {
             "materials": {path: notation.written(one) for path, one in self.materials.items()},
+            "notations": {path: notation.for_files(one) for path, one in self.materials.items()},
             "parameters": {
                 name: {"value": float(v), "error": float(e) if np.isfinite(e) else None}
                 for name, v, e in zip(self.names, self.values, self.errors, strict=True)
@@ -142,7 +143,9 @@ def fit_picture(
     overrides = dict(fixed or {})
     if model is not None:
         overrides[place_of(free[0], "free")[0]] = moving_of(model)[0]
-    description = scene.read(scene_file, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides)
+    description = scene.read(
+        scene_file, allow_outside=allow_outside, allow_code=allow_code, overrides=overrides, names_output=False
+    )
     width, height = description.camera.film.size
     if wanted.shape[:2] != (height, width):
         what = f"{wanted.shape[1]}x{wanted.shape[0]} pixels, {width}x{height} expected, as the scene's film has"

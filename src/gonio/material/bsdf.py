@@ -32,6 +32,7 @@ from ..members import Family, subclasses_of
 from ..ops import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, backend, graph
 from ..optics import warp
 from . import binding, guide_search, recording, tree
+from .angular_range import EVERYWHERE, AngularRange
 from .calling import V3, Given, method
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
 from .polarization import Polarized
@@ -236,6 +237,14 @@ class BSDF(Material):
     def isotropic(self) -> bool:
         """Whether a turn about the normal changes nothing: no two widths differ, here and in inner materials."""
         return all(_alike(*pair_of(leaf.value)) for leaf in tree.leaves(self.plain) if leaf.parameter.kind == "alpha")
+
+    @property
+    def angular_range(self) -> AngularRange:
+        """The angles at which its values, and those of inner materials, are known; elsewhere they are made up."""
+        found = EVERYWHERE
+        for inner in tree.children(self).values():
+            found = found.within(inner.angular_range)
+        return found
 
     @property
     def leans(self) -> bool:

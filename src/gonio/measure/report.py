@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..material.angular_range import AngularRange
 from . import SAMPLE, format_of, parted, read
 from .compare import asymmetry
 from .formats.base import contents
@@ -15,7 +16,8 @@ from .tables.base import ANGLES, Measurement
 
 
 def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a file holds: format, kind, dimensions, ranges, flaws, albedo over the angle of view, reciprocity.
+    """What a file holds: format, kind, dimensions, range of the values, angles that were measured ("known"), flaws,
+    albedo over the angle of view, reciprocity.
 
     Of a file with several materials, none of which is named, their names alone ("items").
     Raises InputError as `read` does.
@@ -39,6 +41,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
         "isotropic": table.isotropic,
         "wavelengths": None if table.wavelengths is None else [float(nm) for nm in table.wavelengths],
         "range": [low, high],
+        "known": {name: list(ends) for name, ends in table.angular_range._asdict().items()},
         "flaws": table.flaws,
         "error": _typical_error(table),
         "albedo": {
@@ -73,13 +76,16 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
         ("channels", channels),
         ("directions", "isotropic" if about["isotropic"] else "anisotropic"),
         ("values", f"{low:.5g} to {high:.5g}"),
+        ("measured", str(AngularRange(*map(tuple, about["known"].values())))),
     ]
     if about["error"] is not None:
         found.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
     for flaw, share in about["flaws"].items():
         found.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
+    low, high = about["known"]["view"]
     for angle, row in zip(about["albedo"]["angles"], about["albedo"]["rgb"], strict=True):
-        found.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
+        if low <= angle <= high:
+            found.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
     highest = about["albedo"]["highest"]
     found.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
     found.append(

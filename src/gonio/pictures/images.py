@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from .. import archives, files
 from ..bridge import engine
+from ..catalog.operands import PICTURE_SUFFIXES
 from ..errors import InputError, did_you_mean
 from ..owner import alone
 from . import exposures, formats
@@ -30,7 +31,7 @@ RGB = NDArray[np.float32]
 Number = TypeVar("Number", bound=np.generic)
 Metadata = Mapping[str, Value]
 
-SUFFIXES = (".exr", ".hdr", ".png", ".npz")
+SUFFIXES = PICTURE_SUFFIXES
 _PREFIX = "gonio."  # keeps our attributes apart from the format's own, and finds them again
 
 _KINDS = {".exr": "OpenEXR", ".hdr": "RGBE", ".png": "PNG"}
@@ -185,14 +186,20 @@ def _one_line(value: Value) -> str:
 # --- reading -------------------------------------------------------------------------------------------
 
 
+ENCODINGS = ("srgb", "linear")
+
+
 @alone
-def read(path: str | Path) -> Picture:
+def read(path: str | Path, encoding: str = "srgb") -> Picture:
     """A picture as linear RGB, with the settings that Gonio wrote into it.
 
-    PNG is decoded from sRGB; an .npz holds `radiance` (or one array only). Grey becomes three channels.
+    encoding  of a .png: "srgb", as screens show it, or "linear", data such as a table, as they are stored
+    An .npz holds `radiance` (or one array only). Grey becomes three channels.
     Raises InputError for a file that is missing, empty, damaged, of another format, or larger than its bytes
     can hold.
     """
+    if encoding not in ENCODINGS:
+        raise InputError(f"unknown encoding '{encoding}'", "--encoding", did_you_mean(encoding, ENCODINGS))
     source = Path(path).expanduser()
     suffix = source.suffix.lower()
     if suffix not in SUFFIXES:
@@ -207,7 +214,7 @@ def read(path: str | Path) -> Picture:
     if suffix == ".npz":
         pixels, metadata = _read_npz(source)
     else:
-        pixels, metadata = _read_bitmap(source, content, suffix)
+        pixels, metadata = _read_bitmap(source, content, suffix, encoding)
     return Picture(pixels, source, suffix != ".png", metadata)
 
 
@@ -218,7 +225,7 @@ def _nearby(source: Path) -> str:
     return did_you_mean(source.name, near) if near and len(near) <= 20 else "check the name"
 
 
-def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[RGB, dict[str, Value]]:
+def _read_bitmap(source: Path, content: bytes, suffix: str, encoding: str) -> tuple[RGB, dict[str, Value]]:
     kind, where = _KINDS[suffix], str(source)
     if formats.kind_of(content) != kind:
         raise InputError(f"this is no {suffix[1:].upper()} picture", where, "check the file or its suffix")
@@ -227,11 +234,11 @@ def _read_bitmap(source: Path, content: bytes, suffix: str) -> tuple[RGB, dict[s
         metadata = _metadata(content, suffix)
     except formats.Unreadable as error:
         raise InputError(f"this picture is damaged: {error}", where, "render or copy it again") from error
-    if suffix == ".png":  # by our own decoding: a 16-bit PNG would be taken for linear
+    if suffix == ".png" and encoding == "srgb":  # by our own decoding: a 16-bit PNG would be taken for linear
         pixels = from_screen(_three_channels(values, where))
     else:
         pixels = _three_channels(values, where)
-    return np.ascontiguousarray(pixels), metadata
+    return np.ascontiguousarray(pixels, np.float32), metadata
 
 
 def _three_channels(values: NDArray[Number], path: str | Path) -> NDArray[Number]:

@@ -35,6 +35,12 @@ METRICS: dict[str, str] = {
 }
 
 
+READ_AS = {
+    "srgb": "sRGB, decoded to linear values (.png); --encoding linear takes data, such as tables, as they are stored",
+    "linear": "data, as stored (.png)",
+}
+
+
 @dataclass(frozen=True)
 class Tolerance:
     """What a comparison is judged by: the metric, and the most that passes; None passes all."""
@@ -51,7 +57,8 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `gonio compare` reports; `exposures` are the stops that HDR-FLIP spans, None for LDR."""
+    """What `gonio compare` reports; `exposures` are the stops that HDR-FLIP spans, None for LDR; `encoding` is how .png
+    files were read, None where there were none."""
 
     rmse: float
     relmse: float
@@ -59,6 +66,7 @@ class Comparison:
     flip: float
     exposures: tuple[float, float] | None
     tolerance: Tolerance
+    encoding: str | None = None
 
     def value(self, metric: str) -> float:
         return {"rmse": self.rmse, "relmse": self.relmse, "flip": self.flip}[metric]
@@ -80,6 +88,8 @@ class Comparison:
             "mean ratio": f"{self.mean_ratio:.6f}",
             "FLIP": f"{self.flip:.6f}  ({kind})",
         }
+        if self.encoding is not None:
+            rows["read as"] = READ_AS[self.encoding]
         metric, most = self.tolerance.metric, self.tolerance.most
         if most is not None:
             relation = "<=" if self.passed else ">"

@@ -41,10 +41,11 @@ def render(
     """Render a scene, or a material on a ball: the picture, (height, width, 3) float32, linear radiance, row 0 on top.
 
         picture = go.render("examples/phong", spp=64, overrides={"shapes.1.material.p": 16})
+        picture = go.render("gold.json")        # what a fit found, on a ball
         picture, slope = go.render("examples/conductor-ggx", gradient=["shapes.0.material.alpha"])
 
-    scene          the lab's folder or .json, a Mitsuba .xml, or a material, which is shown on a ball; what is None
-                   below is as the scene says
+    scene          the lab's folder or .json, a Mitsuba .xml, or a material or its text, which is shown on a ball; what
+                   is None below is as the scene says
     output         file to write, .exr, .hdr, .png or .npz; None writes nothing
     spp            samples per pixel
     size           width and height of the film, pixels
@@ -71,9 +72,14 @@ def render(
                    "....albedo.r" along one. Materials that are equal are one, and move together
     Warns (GonioWarning) of odd scenes, of a .png that clips, and where it goes on. Raises InputError, MachineError.
     """
+    from ..catalog import notation, operands
     from ..material import BSDF
     from .request import Request
 
+    if not isinstance(scene, BSDF):
+        accepted = {operands.Kind.SCENE, *operands.MATERIALS}
+        if operands.kind_of(scene, accepted, "render: scene") is not operands.Kind.SCENE:
+            scene = notation.named(str(scene), allow_code=allow_code)[0]
     request = Request(
         Path(scene.name) if isinstance(scene, BSDF) else Path(scene),
         output=None if output is None else Path(output),

@@ -74,7 +74,7 @@ def render_to_file(
     """
     started = time.perf_counter()
     with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
-        prepared = prepare(request)
+        prepared = prepare(request, writes=True)
         interrupts.check()
         beside = checkpoints.beside(prepared.output)
         stopped, keeper = execute(

@@ -41,16 +41,23 @@ class Prepared:
     warnings: tuple[str, ...] = ()
 
 
-def prepare(request: Request) -> Prepared:
-    """Read the scene, start Mitsuba, make the render; raises InputError or MachineError."""
+def prepare(request: Request, writes: bool = False) -> Prepared:
+    """Read the scene, start Mitsuba, make the render; raises InputError or MachineError.
+
+    writes  the picture will be written: under the name that the scene gives it, where the request names no output
+    """
     request.check()
     if request.material is None and not request.scene.exists():
         raise InputError("no such scene", str(request.scene), _nearby(request.scene))
     mi = engine.load(request.device, request.spectral, request.threads)
     with garbage.kept():
         if request.material is None and request.scene.suffix.lower() == ".xml" and request.scene.is_file():
-            return _prepare_mitsuba(request, mi)
-        return _prepare_lab(request, mi)
+            prepared = _prepare_mitsuba(request, mi)
+        else:
+            prepared = _prepare_lab(request, mi, names_output=writes and request.output is None)
+    if writes:
+        images.check_writable(prepared.output)
+    return prepared
 
 
 def _nearby(path: Path) -> str:
@@ -61,7 +68,7 @@ def _nearby(path: Path) -> str:
     return did_you_mean(path.name, near) if near and len(near) <= 20 else "give a folder, a .json or a .xml"
 
 
-def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
+def _prepare_lab(request: Request, mi: ModuleType, names_output: bool) -> Prepared:
     from .. import scene
     from ..transport import integrators, polarizer
 
@@ -72,7 +79,11 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
         description = scene.of_material(request.material, overrides)
     else:
         description = scene.read(
-            request.scene, allow_outside=request.allow_outside, allow_code=request.allow_code, overrides=overrides
+            request.scene,
+            allow_outside=request.allow_outside,
+            allow_code=request.allow_code,
+            overrides=overrides,
+            names_output=names_output,
         )
     of_scene = integrators.Settings(
         integrator=description.integrator.type,
@@ -83,7 +94,6 @@ def _prepare_lab(request: Request, mi: ModuleType) -> Prepared:
     )
     settings = _settings(of_scene, request)
     output = request.output or Path(description.output.filename)
-    images.check_writable(output)
     spp, degrees, how = _most(request, description.spp), description.camera.polarizer, _own(settings)
     if degrees is not None:
         polarizer.check(settings, description.where("/camera/polarizer"))
@@ -221,7 +231,6 @@ def _prepare_mitsuba(request: Request, mi: ModuleType) -> Prepared:
     text = mitsuba_scene.read(request.scene, request.overrides, request.allow_outside, request.allow_code)
     scene = mitsuba_scene.load(mi, request.scene, text, size=request.size, own_integrator=request.integrator is None)
     output = request.output or Path(request.scene.stem + ".exr")
-    images.check_writable(output)
     sensor = scene.sensors()[0]
     files = mitsuba_scene.sources(text, request.overrides)
     spp = _most(request, int(sensor.sampler().sample_count()))

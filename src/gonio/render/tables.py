@@ -19,15 +19,18 @@ from typing import Any
 import numpy as np
 
 from .. import files
-from ..catalog import notation, outside
+from ..catalog import library, notation, operands, outside
+from ..catalog.operands import Kind
 from ..energy.tables import bake as baking
 from ..energy.tables import prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
-from ..material import BSDF, models
+from ..material import BSDF, is_model, models
 from ..optics.ndf import distributions
 from ..owner import public
 from ..pictures import images
+
+BAKED = frozenset({Kind.DISTRIBUTION, Kind.PICTURE, *operands.MATERIALS})
 
 
 @public
@@ -122,7 +125,7 @@ def _check_default(options: dict[str, object], hint: str) -> None:
 
 def _is_picture(target: str | Path | BSDF, lut: Sequence[str] | None) -> bool:
     """Whether an environment is meant: by its suffix, or by what is asked for."""
-    pictured = not isinstance(target, BSDF) and Path(target).suffix.lower() in images.SUFFIXES
+    pictured = not isinstance(target, BSDF) and operands.kind_of(target, BAKED, "TARGET") is Kind.PICTURE
     others = [name for name in lut or () if name != "prefiltered"]
     if pictured and others:
         raise InputError(f"table '{others[0]}' of a picture", "--lut", "of an environment: --lut prefiltered")
@@ -163,18 +166,16 @@ def _target(target: str | Path | BSDF) -> str | BSDF:
     if isinstance(target, BSDF):
         return target
     target = str(target)
-    name, bracket, _ = target.partition("(")
-    if name in distributions():
-        if bracket:
+    kind, (name, settings) = operands.kind_of(target, BAKED, "TARGET"), notation.split(target)
+    if kind is Kind.DISTRIBUTION:
+        if settings:
             hint = "bake a material, such as conductor; alpha is an axis of the table"
             raise InputError(f"'{name}' is a distribution, without parameters", "--param", hint)
         return target
-    if outside.names_code(name):
+    if kind is Kind.CODE:
         return _own(target, name)
-    if outside.names_data(name):
-        return notation.named(target)[0]
-    known = [*distributions(), *models()]
-    if name.replace("_", "-") not in known:
+    if kind is Kind.NAME and not (is_model(name) or library.resembles(name) or name.startswith("{")):
+        known = [*distributions(), *models()]
         raise InputError(f"unknown distribution or material '{name}'", "TARGET", did_you_mean(name, known))
     return notation.named(target)[0]
 

@@ -444,25 +444,19 @@ def _from_document(part: DocumentPart | MaterialPart, info: ValidationInfo) -> M
     except GonioError as error:
         what = f"{error.where}: {error.what}" if error.where else error.what
         raise invalid(what, error.hint, "file") from None
-    fields: Any = _beside(described.notation, Path(part.file).parent)
+    fields: Any = _beside(documents.for_scenes(described.notation), Path(part.file).parent)
     if part.two_sided is not None:
         fields["two_sided"] = part.two_sided
-    made = part_of(fields["type"])
-    if made is None:
-        raise invalid(f"it needs the material {described.notation['type']}", "see `gonio models`", "file")
-    found = made.model_validate(fields, context=context)
+    found = _own(fields, info)
     found._source, found._notices = part.file, described.notices
     return found
 
 
 def _beside(notation: Mapping[str, object], folder: Path) -> dict[str, object]:
-    """As scenes have it: Gonio's types by their full names, since the lab's have the short ones; files from the scene's
-    folder."""
+    """The notation with files that start from the scene's folder."""
     found: dict[str, object] = {}
     for key, value in notation.items():
-        if key == "type" and value != "imageTex":
-            found[key] = f"gonio-{value}"
-        elif key == "file":
+        if key == "file":
             found[key] = (folder / str(value)).as_posix()
         else:
             found[key] = _beside(value, folder) if isinstance(value, dict) else value
@@ -476,7 +470,7 @@ def _tag(value: object) -> str | None:
     return name if name is None or (isinstance(name, str) and name in Document.family.all()) else OWN
 
 
-def _own(value: object, info: ValidationInfo) -> object:
+def _own(value: object, info: ValidationInfo) -> MaterialPart:
     """A material by its type: Gonio's, named, registered, or of a file, which runs where the user allowed it."""
     if isinstance(value, MaterialPart):
         return value

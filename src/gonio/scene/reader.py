@@ -29,12 +29,14 @@ def read(
     allow_outside: bool = False,
     allow_code: bool = False,
     overrides: Mapping[str, object] | None = None,
+    names_output: bool = True,
 ) -> SceneDescription:
     """A scene from a folder with a scene.json, or from a .json file.
 
     allow_outside  let textures and meshes lie outside the scene's folder
     allow_code     let materials be classes in Python files, "ward.py:Ward", which then run
     overrides      values to set before validation, by path: {"shapes.1.material.p": 16}; see `overrides`
+    names_output   whether the picture is written under the name that the scene gives it, which is checked then
     Raises InputError for everything that is wrong with the file or with what it names.
 
         description = read("scenes/phong", overrides={"shapes.*.material.roughness": 0.3})
@@ -44,6 +46,7 @@ def read(
     if overrides:
         override.apply(raw, overrides)
     context = {"folder": file.parent, "allow_code": allow_code, "allow_outside": allow_outside}
+    context["names_output"] = names_output
     try:
         description = SceneDescription.model_validate(raw, context=context)
     except ValidationError as error:
@@ -51,7 +54,8 @@ def read(
     description._path = file
     description._allow_outside = allow_outside
     description._raw = raw
-    _check_output(description)
+    if names_output:
+        _check_output(description)
     seen: dict[MaterialPart, list[tuple[str, str]]] = {}
     for where, part in parts(description):
         if (name := part.__dict__.get("file")) is not None:
@@ -153,7 +157,9 @@ def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str,
             named[code.name] = code
 
     def text() -> str:
-        return json.dumps(description.raw, sort_keys=True, default=lambda part: part.model_dump_json(by_alias=True))
+        return json.dumps(
+            description.raw, sort_keys=True, default=lambda part: part.model_dump_json(by_alias=True, warnings=False)
+        )
 
     return text, named
 

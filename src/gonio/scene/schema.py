@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, PrivateAttr, ValidationInfo, model_validator
 from pydantic.json_schema import models_json_schema
 
 from ..bridge.types import Json
@@ -33,13 +33,14 @@ class Output(Part):
     """Where the picture goes."""
 
     filename: str = Field(min_length=1)
-    """.hdr, .png or .exr; the top row comes first."""
+    """.hdr, .png, .exr or .npz; the top row comes first. With another output, `-o FILE`, any name will do."""
 
     @model_validator(mode="after")
-    def _known_format(self) -> Output:
-        if Path(self.filename).suffix.lower() not in SUFFIXES:
-            known = ", ".join(SUFFIXES)
-            raise invalid(f"'{self.filename}' is no known kind of picture", f"end it in {known}", "filename")
+    def _known_format(self, info: ValidationInfo) -> Output:
+        named = (info.context or {}).get("names_output", True)
+        if named and Path(self.filename).suffix.lower() not in SUFFIXES:
+            hint = f"end it in {', '.join(SUFFIXES)}, or give -o FILE"
+            raise invalid(f"'{self.filename}' is no known kind of picture", hint, "filename")
         return self
 
 

@@ -7,6 +7,7 @@ mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
 chest.gltf:Wood          a material of a glTF file
+gold.json                what a fit found, or a material in Gonio's notation
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from ..catalog import library, notation, outside
+from ..catalog import notation, operands, texts
+from ..catalog.operands import Kind
 from ..errors import InputError
 from .subject import Subject
 
 STEPS = 5  # of a sweep
+JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
 def resolve(target: str, settings: Sequence[str] = (), sweep: str = "") -> list[Subject]:
@@ -56,36 +59,28 @@ def _sweep(text: str) -> tuple[str, list[str]]:
 
 
 def _build(target: str, given: dict[str, str]) -> Subject:
-    if target.startswith("mitsuba:"):
+    kind, (head, _) = operands.kind_of(target, JUDGED, "TARGET"), notation.split(target)
+    if kind is Kind.PLUGIN and head.startswith("mitsuba:"):
         from ..bridge import foreign
 
         values = {key: _property(value) for key, value in given.items()}
         return Subject(foreign.plugin(target.removeprefix("mitsuba:"), values), target, values)
-    if outside.names_code(target):
+    if kind is Kind.PLUGIN:
+        return _from_file(target, given)
+    if kind is Kind.CODE:
         from ..bridge import foreign
 
         properties = {key: _property(value) for key, value in given.items()}
-        plugin = foreign.plugin_in(target, properties)
+        plugin = foreign.plugin_in(head, properties)
         if plugin is not None:
-            return Subject(plugin, target, properties)
-        bsdf, values = notation.made(outside.load(target, where="TARGET"), given)
-        return Subject(bsdf, target, values)
-    if target.endswith(".py"):
-        raise InputError(f"'{target}' names a file, but no class in it", "TARGET", f"give {target}:CLASS")
-    if outside.names_data(target):
-        bsdf, values = notation.named(target, [f"{name}={value}" for name, value in given.items()])
-        return Subject(bsdf, target, {name: values[name] for name in given})
-    if target.lstrip().startswith("{") or target.lower().endswith((".json", ".xml")):
-        return _from_file(target, given)
-    if Path(target).suffix in (".merl", ".csv", ".txt") or Path(target).is_file():
-        hint = "gonio convert reads measurements: .binary, .bsdf, .brdf, .astm, .npz, .gonio"
-        raise InputError(f"'{target}' is in no format that can be verified", "TARGET", hint)
-    name = target.partition("(")[0]
-    if ":" in name and ".py:" not in name and not library.resembles(name):
-        raise InputError(f"'{target}' is no target", "TARGET", "give MODEL, FILE.py:CLASS or mitsuba:PLUGIN")
-    cls, own = notation.taken_apart(target)
+            return Subject(plugin, head, properties)
+    cls, own = notation.taken_apart(target, "TARGET")
     bsdf, values = notation.made(cls, {**own, **given})
-    return Subject(bsdf, cls.name, values)
+    if kind is Kind.NAME:
+        return Subject(bsdf, cls.name, values)
+    # what a file describes stands there; what is set beside it is told
+    beside = {*(name.partition(".")[0] for name in given), *texts.assignments(notation.split(target)[1])}
+    return Subject(bsdf, head, {name: value for name, value in values.items() if name in beside})
 
 
 # --------------------------------------------------------------------------- Mitsuba's

@@ -11,6 +11,7 @@ import functools
 import itertools
 import math
 import time
+import uuid
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,8 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge import engine
-from ..catalog import notation
+from ..catalog import notation, operands
+from ..catalog.operands import Kind
 from ..errors import GonioWarning, InputError
+from ..material import BSDF
 from ..owner import public
 from ..pictures import exposures, images
 from ..render.execute import by_crew, execute
@@ -30,6 +33,7 @@ from ..render.finish import picture_of
 from ..render.prepare import Prepared, prepare
 from ..render.request import Request
 from ..render.request_json import described
+from ..scene.schema import SceneDescription
 from ..transport import passes
 from ..work import crew, parts
 from . import figures
@@ -47,19 +51,35 @@ _DPI = 100
 
 @dataclass(frozen=True)
 class Variation:
-    """One --vary: a path into the scene, or a $parameter of a Mitsuba XML, and its values."""
+    """One --vary: a path into the scene or of a material, or a $parameter of a Mitsuba XML, and its values.
+
+    path    one, or several that vary together with commas between: "kd,ks"
+    values  one for each picture along it: of several paths a tuple with a value for each
+    """
 
     path: str
     values: tuple[object, ...]
 
     @property
+    def paths(self) -> tuple[str, ...]:
+        return tuple(path.strip() for path in self.path.split(","))
+
+    @property
     def name(self) -> str:
-        """The last step of the path that is a word: "p" of "scene.shapes.0.material.p", "eta[0]" of "...eta.0"."""
-        steps = [step for step in self.path.replace("/", ".").split(".") if step]
-        for back, step in enumerate(reversed(steps)):
-            if not step.isdigit() and step != "*":
-                return step + "".join(f"[{index}]" for index in steps[len(steps) - back :])
-        return self.path
+        """The last step of each path that is a word: "p" of "scene.shapes.0.material.p", "eta[0]" of "...eta.0"."""
+        return ", ".join(map(_last_word, self.paths))
+
+    def settings(self, value: Any) -> dict[str, object]:
+        """What one of the values sets, by path."""
+        return dict(zip(self.paths, value if len(self.paths) > 1 else (value,), strict=True))
+
+
+def _last_word(path: str) -> str:
+    steps = [step for step in path.replace("/", ".").split(".") if step]
+    for back, step in enumerate(reversed(steps)):
+        if not step.isdigit() and step != "*":
+            return step + "".join(f"[{index}]" for index in steps[len(steps) - back :])
+    return path
 
 
 @dataclass(frozen=True)
@@ -92,15 +112,44 @@ class Sheet:
 
 
 def parse_variation(text: str) -> Variation:
-    """A `Variation` of "shapes.0.material.p=4,16,64"; values are JSON, commas in brackets do not separate."""
-    path, values = notation.assignment(text, "--vary")
-    return Variation(path, tuple(figures.split_values(values)))
+    """A `Variation` of "shapes.0.material.p=4,16,64", or of several paths together, "kd,ks=(.2,.8),(.5,.5)".
+
+    Values are JSON; commas in brackets do not separate.
+    """
+    paths, values = notation.assignment(text, "--vary")
+    return variation(paths, figures.split_values(values))
+
+
+def variation(paths: str | Sequence[str], values: Sequence[object]) -> Variation:
+    """A `Variation` of one path, or of several that vary together, "kd,ks" or ("kd", "ks"): each value has then one for
+    each of them, (.2, .8) or "(.2,.8)". InputError where it has more or fewer."""
+    names = tuple(path.strip() for path in (paths.split(",") if isinstance(paths, str) else paths))
+    if not all(names) or len(set(names)) < len(names):
+        raise InputError(f"'{','.join(names)}' varies no path, or one twice", "--vary", "such as kd,ks=(.2,.8),(.5,.5)")
+    if len(names) == 1:
+        return Variation(names[0], tuple(values))
+    return Variation(",".join(names), tuple(_together(value, names) for value in values))
+
+
+def _together(value: object, names: Sequence[str]) -> tuple[object, ...]:
+    """The values that several paths have together."""
+    parts: Sequence[object] | None = None
+    if isinstance(value, str) and value.startswith("(") and value.endswith(")"):
+        parts = figures.split_values(value[1:-1])
+    elif isinstance(value, list | tuple):
+        parts = value
+    if parts is None or len(parts) != len(names):
+        count = "one value" if parts is None else f"{len(parts)} value{'s' if len(parts) != 1 else ''}"
+        what = f"'{value}' is {count}, {len(names)} expected"
+        hint = f"in round brackets, one for each: {','.join(names)}=({','.join('.5' for _ in names)}),..."
+        raise InputError(f"{what} for {', '.join(names)}", "--vary", hint)
+    return tuple(parts)
 
 
 @public
 def study(
-    scene: str | Path,
-    vary: Mapping[str, Sequence[object]],
+    scene: str | Path | BSDF,
+    vary: Mapping[str | tuple[str, ...], Sequence[object]],
     *,
     output: str | Path | None = None,
     spp: int | None = None,
@@ -121,16 +170,21 @@ def study(
     """Render a scene with every combination of values, and lay the pictures on one labelled sheet.
 
         go.study("examples/phong", {"shapes.1.material.p": [4, 16, 64]}, output="p.png")
+        go.study("phong", {"p": [4, 16], ("kd", "ks"): [(0.2, 0.8), (0.5, 0.5)]})
 
-    vary      values by their path in the scene, or by the parameter's name of a Mitsuba XML. One gives a row, two a
-              grid (the first goes down, the second across), more a grid each
+    scene     as in `go.render`; a material, or its text, is shown on a ball
+    vary      values by their path in the scene, by that of a material's parameter ("base.alpha"), or by the parameter's
+              name of a Mitsuba XML. One gives a row, two a grid (the first goes down, the second across), more a grid
+              each. Several paths vary together, such as values whose sum stays: {("kd", "ks"): [(0.2, 0.8), ...]}, or
+              "kd,ks"
     output    file to write, .png, .pdf or .svg; None writes nothing
     exposure  stops, the same for all pictures, or "auto"
     title     heading of the sheet; the scene's name if not given
     Other options as in `go.render`. Returns a Sheet, which a notebook shows. Raises InputError, MachineError.
     """
+    named = _named(scene)
     request = Request(
-        Path(scene),
+        Path(named[0].name if named else str(scene)),
         spp=spp,
         size=size,
         integrator=integrator,
@@ -145,10 +199,18 @@ def study(
         allow_outside=allow_outside,
         allow_code=allow_code,
     )
-    variations = [Variation(path, tuple(values)) for path, values in vary.items()]
+    variations = [variation(path, values) for path, values in vary.items()]
     tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)
     with engine.put_back():
-        return render_sheet(request, variations, None if output is None else Path(output), title, tell=tell)
+        return render_sheet(request, variations, None if output is None else Path(output), title, named, tell=tell)
+
+
+def _named(scene: str | Path | BSDF) -> notation.Settings | None:
+    """The material that is studied, None of a scene."""
+    if isinstance(scene, BSDF):
+        return type(scene), {name: getattr(scene, name) for name in scene.parameters()}
+    kind = operands.kind_of(scene, {Kind.SCENE, *operands.MATERIALS}, "study: scene")
+    return None if kind is Kind.SCENE else notation.taken_apart(str(scene), "study: scene")
 
 
 def render_sheet(
@@ -156,30 +218,33 @@ def render_sheet(
     variations: Sequence[Variation],
     output: Path | None,
     title: str = "",
+    named: notation.Settings | None = None,
     report: Callable[[int, int, str], None] = lambda done, total, state: None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Sheet:
     """Render every combination and draw the sheet; raises InputError before rendering where it can.
 
+    named   the material that is varied, in place of a scene
     report  called before each picture with pictures done, all pictures, and what is next
     tell    called at the start with what an earlier run of the same study has left
     """
     started = time.perf_counter()
     if output is not None:
         figures.check_output(output)
-    names = [variation.path for variation in variations]
+    names = [path for variation in variations for path in variation.paths]
     if len(set(names)) < len(names):
         raise InputError("the same path is varied twice", "--vary", "give all its values in one --vary")
     if not variations or not all(variation.values for variation in variations):
         raise InputError("nothing is varied", "--vary", "such as shapes.1.material.p=4,16,64")
-    combinations = list(itertools.product(*(variation.values for variation in variations)))
-    if len(combinations) > MOST_CELLS:
-        what = f"{len(combinations)} pictures are more than a sheet holds ({MOST_CELLS})"
+    count = math.prod(len(variation.values) for variation in variations)
+    if count > MOST_CELLS:
+        what = f"{count} pictures are more than a sheet holds ({MOST_CELLS})"
         raise InputError(what, "--vary", "give fewer values")
-    cells = tuple(dict(zip(names, combination, strict=True)) for combination in combinations)
+    settings = [[variation.settings(value) for value in variation.values] for variation in variations]
+    cells = tuple({p: v for one in combination for p, v in one.items()} for combination in itertools.product(*settings))
     pictures: list[exposures.RGB] = []
     notices: dict[str, None] = {}
-    whole = sorted(described(request).items()), [(one.path, repr(one.values)) for one in variations]
+    whole = _identity(with_cell(request, cells[0], named)), [(one.path, repr(one.values)) for one in variations]
     with passes.Interrupts() as interrupts, parts.job("study", *whole) as job:
         if job.found:
             tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
@@ -189,7 +254,7 @@ def render_sheet(
             state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
             report(start, len(cells), state)
             # Each picture has the same seed, so that what differs is the parameter, not the noise.
-            prepared = [prepare(replace(request, overrides={**request.overrides, **cell})) for cell in some]
+            prepared = [prepare(with_cell(request, cell, named)) for cell in some]
             notices |= dict.fromkeys(text for one in prepared for text in one.warnings)
             pictures += _pictures(prepared, job, interrupts)
         last = prepared[-1]
@@ -205,6 +270,42 @@ def render_sheet(
         drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
+
+
+def with_cell(request: Request, cell: Mapping[str, object], named: notation.Settings | None) -> Request:
+    """The request with one cell's values: of the scene, or of a material and of the scene that it is shown in."""
+    if named is None:
+        return replace(request, overrides={**request.overrides, **cell})
+    cls, given = named
+    own: dict[str, object] = {}
+    around: dict[str, object] = {}
+    for path, value in cell.items():
+        inside = path.removeprefix("scene.").removeprefix("shapes.0.material.")
+        first = path.lstrip("/").replace("/", ".").partition(".")[0]
+        if inside == path and first in _OF_A_SCENE and first not in cls.parameters():
+            around[path] = value
+        else:
+            own[inside] = value
+    try:
+        material = notation.build((cls, {**given, **own}))
+    except InputError as error:
+        option, _, path = error.where.partition(" ")
+        raise InputError(
+            error.what, f"--vary {path}" if option == "--param" and path in own else error.where, error.hint
+        ) from None
+    return replace(request, material=material, overrides={**request.overrides, **around})
+
+
+# what a path into the scene around a material begins with
+_OF_A_SCENE = {field.alias or name for name, field in SceneDescription.model_fields.items()} | {"shapes", "lights"}
+
+
+def _identity(request: Request) -> Sequence[object]:
+    """What tells a study from others; of a class that this program alone knows nothing does: no part is used again."""
+    try:
+        return sorted(described(request).items())
+    except InputError:
+        return [uuid.uuid4().hex]
 
 
 def _pictures(prepared: Sequence[Prepared], job: parts.Parts, interrupts: passes.Interrupts) -> list[exposures.RGB]:

@@ -22,7 +22,8 @@ SAMPLES = 64  # per axis and point of an albedo curve: 4096 stratified samples, 
 
 @dataclass(frozen=True)
 class Curve:
-    """One view: values and density over the angle of wi (degrees), and what delta lobes reflect where."""
+    """One view: values and density over the angle of wi (degrees), and what delta lobes reflect where. Both are nan
+    where the material's values are not known."""
 
     view: float
     angles: Floats
@@ -36,8 +37,13 @@ class Curve:
 
     @property
     def grey(self) -> bool:
-        spread = np.ptp(self.values, axis=1).max()
-        return bool(spread <= 1e-4 * self.values.max())
+        values = np.nan_to_num(self.values)
+        return bool(np.ptp(values, axis=1).max() <= 1e-4 * values.max())
+
+    @property
+    def peak(self) -> float:
+        """The highest value or density that is known."""
+        return max(float(np.nan_to_num(self.mean).max()), float(np.nan_to_num(self.pdf).max()))
 
     @property
     def full(self) -> bool:
@@ -58,6 +64,8 @@ def curve(bsdf: BSDF, view: float) -> Curve:
     wi = np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1)
     wo = np.broadcast_to(_toward(view), wi.shape)
     values, pdf = np.asarray(bsdf.eval(wo, wi)), np.asarray(bsdf.pdf(wo, wi))
+    known = bsdf.angular_range.holds(wo, wi)
+    values, pdf = np.where(known[:, None], values, np.nan), np.where(known, pdf, np.nan)
     return Curve(view, angles, values, pdf, _deltas(bsdf, view))
 
 

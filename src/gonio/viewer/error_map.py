@@ -1,16 +1,21 @@
-"""`gonio compare` and `go.compare`: how far one picture is from another, and where, as a map beside a bar."""
+"""`gonio compare` and `go.compare`: how far one picture, or one material, is from another, and where."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..catalog import notation
+from ..energy.difference import Difference, difference
 from ..errors import InputError
+from ..material import BSDF
 from ..owner import public
 from ..pictures import images, metrics
-from . import figures
+from . import difference_map, figures
 
 _DPI = 100
 _TITLES = {
@@ -20,42 +25,88 @@ _TITLES = {
 }
 
 
-@public
+@overload
+def compare(
+    test: BSDF,
+    reference: BSDF | str,
+    *,
+    metric: str | None = ...,
+    tolerance: float | None = ...,
+    output: str | Path | None = ...,
+    encoding: str = ...,
+) -> Difference: ...
+@overload
 def compare(
     test: str | Path | ArrayLike,
     reference: str | Path | ArrayLike,
     *,
-    metric: str = "relmse",
+    metric: str | None = ...,
+    tolerance: float | None = ...,
+    output: str | Path | None = ...,
+    encoding: str = ...,
+) -> metrics.Comparison: ...
+@public
+def compare(
+    test: str | Path | ArrayLike | BSDF,
+    reference: str | Path | ArrayLike | BSDF,
+    *,
+    metric: str | None = None,
     tolerance: float | None = None,
     output: str | Path | None = None,
-) -> metrics.Comparison:
-    """Say how far a picture is from another.
+    encoding: str = "srgb",
+) -> metrics.Comparison | Difference:
+    """Say how far a picture is from another, or a material from another.
 
         go.compare("mine.exr", "reference.exr", metric="flip", tolerance=0.05).passed
+        go.compare(go.OrenNayar(sigma=0.5), "lambert").largest
 
-    test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top
-    metric           what `tolerance` and the map are for: "rmse", "relmse" or "flip"
+    test, reference  files (.exr, .hdr, .png, .npz), or linear RGB of shape (H, W, 3), row 0 on top; or two materials,
+                     of which the second may be text
+    metric           what `tolerance` and the map are for: of pictures "relmse", "rmse" or "flip", of materials "mean",
+                     "largest" or "albedo"; None is the first
     tolerance        the most that passes
     output           file of a map of the error, .png, .pdf or .svg; None writes nothing
-    Returns a Comparison with all metrics and whether it passed. FLIP is that of high dynamic range, unless a picture
-    is a .png. Raises InputError for pictures that cannot be read or differ in size.
+    encoding         of .png files: "srgb", or "linear" for data such as a table
+    Returns a Comparison with all metrics and whether it passed; of materials a Difference: where f and the albedo
+    differ. FLIP is that of high dynamic range, unless a picture is a .png. Raises InputError for pictures that cannot
+    be read or differ in size, and for what is neither a picture nor a material.
     """
-    judged = metrics.Tolerance(metric, tolerance)
     if output is not None:
         figures.check_output(Path(output))
-    a, b = _picture(test, "test"), _picture(reference, "reference")
+    if isinstance(test, BSDF):
+        return compare_materials(test, reference, metric or "mean", tolerance, output)
+    judged = metrics.Tolerance(metric or "relmse", tolerance)
+    a, b = _picture(test, "test", encoding), _picture(reference, "reference", encoding)
     try:
         found = metrics.compare(a.pixels, b.pixels, a.hdr and b.hdr, judged)
     except InputError as error:
         raise InputError(error.what, f"{a.path}, {b.path}", error.hint) from error
     if output is not None:
-        draw(a, b, metric).save(output)
+        draw(a, b, judged.metric).save(output)
+    return found if a.hdr and b.hdr else replace(found, encoding=encoding)
+
+
+def compare_materials(
+    test: object, reference: object, metric: str, tolerance: float | None, output: str | Path | None
+) -> Difference:
+    """As `compare`, of two materials, both of which may be text."""
+    named = []
+    for one in (test, reference):
+        if not isinstance(one, BSDF | str):
+            raise InputError(f"{type(one).__name__} given, a material expected", "compare", "compare two of a kind")
+        named.append((notation.written(one), one) if isinstance(one, BSDF) else (one, notation.named(one)[0]))
+    (name_a, a), (name_b, b) = named
+    found = difference(a, b, metric, tolerance)
+    if output is not None:
+        difference_map.draw(name_a, name_b, a, b, found).save(output)
     return found
 
 
-def _picture(given: str | Path | ArrayLike, name: str) -> images.Picture:
+def _picture(given: str | Path | ArrayLike | BSDF, name: str, encoding: str) -> images.Picture:
+    if isinstance(given, BSDF):
+        raise InputError("a picture and a material", "compare", "compare two of a kind, the material first")
     if isinstance(given, str | Path):
-        return images.read(given)
+        return images.read(given, encoding)
     return images.Picture(np.asarray(given, np.float32), Path(name))
 
 

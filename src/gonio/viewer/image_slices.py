@@ -24,16 +24,20 @@ LONGEST = 32  # letters over a panel
 
 
 def slice_of(bsdf: BSDF, steps: int = STEPS) -> NDArray[np.float64]:
-    """f at theta_d (rows, 90 degrees first) and theta_h (columns), phi_d = 90 degrees, where all pairs are above."""
+    """f at theta_d (rows, 90 degrees first) and theta_h (columns), phi_d = 90 degrees, where all pairs are above; nan
+    where it is not known."""
     middle = (np.arange(steps) + 0.5) / steps * (0.5 * np.pi)
     theta_d, theta_h = (a.ravel() for a in np.meshgrid(middle[::-1], middle, indexing="ij"))
     wo, wi = pair_at(theta_h, theta_d, np.full(theta_h.shape, 0.5 * np.pi))
-    return np.asarray(bsdf.f(wo, wi), float).reshape(steps, steps, 3)
+    values = np.where(bsdf.angular_range.holds(wo, wi)[:, None], np.asarray(bsdf.f(wo, wi), float), np.nan)
+    return values.reshape(steps, steps, 3)
 
 
 def draw(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
     """A panel for each material, on the same scale: colours are sRGB of pi f, cut at 1; below 0 they are magenta."""
     subtitle = "π f at φd = 90°, as sRGB, cut at 1; magenta: below 0"
+    if not all(bsdf.angular_range.everything for bsdf in bsdfs):
+        subtitle += "; grey: not measured"
     columns, rows = min(len(bsdfs), ACROSS), -(-len(bsdfs) // ACROSS)
     width, height = max(0.5 + 3.3 * columns, 5.2), 0.8 + 3.5 * rows
     figure = figures.blank(width, height, title, subtitle)
@@ -45,6 +49,7 @@ def draw(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
         shown = np.clip(np.pi * values, 0.0, 1.0)
         shown = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * np.maximum(shown, 1e-9) ** (1.0 / 2.4) - 0.055)
         shown[values.min(axis=-1) < 0.0] = (0.85, 0.1, 0.75)
+        shown[np.isnan(values).any(axis=-1)] = (0.72, 0.74, 0.76)
         axes.imshow(shown, extent=(0.0, 90.0, 0.0, 90.0), interpolation="nearest")
         axes.set_xticks(range(0, 91, 30), [f"{angle}°" for angle in range(0, 91, 30)])
         axes.set_yticks(range(0, 91, 30), [f"{angle}°" for angle in range(0, 91, 30)])

@@ -38,7 +38,7 @@ def stage(path: Path, allow_outside: bool = False, allow_code: bool = False) -> 
 
     Raises InputError as the reader of scenes does: also where a file lies outside the scene's folder.
     """
-    description = scene.read(path, allow_outside=allow_outside, allow_code=allow_code)
+    description = scene.read(path, allow_outside=allow_outside, allow_code=allow_code, names_output=False)
     parts = _materials(description)
     if not parts:
         raise InputError("the scene has no shapes", str(path), "add one, or name a model")

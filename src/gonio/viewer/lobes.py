@@ -21,8 +21,9 @@ _HALO = {"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none
 _RADIUS = 1.45  # of a panel's disc, inches
 
 
-def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]]) -> Figure:
+def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
     """The figure. `panels` has a list for each view, with the curve of each material in the order of the labels.
+    `known` says at which angles values are known.
 
     Each panel has a scale of its own: peaks differ by orders of magnitude.
     """
@@ -38,7 +39,7 @@ def draw(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]]) -
     mean = " (mean of the channels)" if len(labels) > 1 else ""
     subtitle = f"value f |cos θi|{mean} and sampling density over wi, in 1/sr"
     subtitle += "; reflection and transmission have a scale each" if full else "; each panel has its own scale"
-    figure = figures.blank(width, height, title, subtitle)
+    figure = figures.blank(width, height, title, subtitle + known)
     indent = (width - columns * panel_width) / 2
     for index, curves in enumerate(panels):
         row, column = divmod(index, columns)
@@ -108,7 +109,7 @@ def _panel(axes: Axes, curves: Sequence[Curve], full: bool) -> None:
 
 def _peak(curve: Curve, side: int) -> float:
     inside = curve.side(side)
-    return max(float(values[inside].max(initial=0)) for values in (curve.values, curve.pdf))
+    return max(float(np.nan_to_num(values[inside]).max(initial=0)) for values in (curve.values, curve.pdf))
 
 
 def _lobe(axes: Axes, curve: Curve, side: int, radius: float, colour: str) -> None:
@@ -116,8 +117,8 @@ def _lobe(axes: Axes, curve: Curve, side: int, radius: float, colour: str) -> No
     theta = np.radians(curve.angles)
 
     def place(values: Floats) -> tuple[Floats, Floats]:
-        # The other side is zero, which puts it at the origin: the outline closes there.
-        r = np.where(curve.side(side), values, 0) * radius
+        # The other side is zero, which puts it at the origin: the outline closes there, and where nothing is known.
+        r = np.nan_to_num(np.where(curve.side(side), values, 0)) * radius
         return r * np.sin(theta), r * np.cos(theta)
 
     if colour or curve.grey:

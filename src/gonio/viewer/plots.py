@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..catalog import notation, outside
+from ..catalog import notation, operands
+from ..catalog.operands import Kind
 from ..errors import InputError, did_you_mean
 from ..material import BSDF
 from ..owner import public
@@ -64,15 +64,14 @@ def plot(
     elif len(materials) == 1 and not isinstance(materials[0], BSDF) and is_tables(materials[0]):
         drawing = energy_figures.draw_tables(materials[0])
     else:
-        drawing = _drawn([_named(material) for material in materials], kind, _views(angles))
+        named = [_named(material) for material in materials]
+        drawing = _drawn(named, kind, _views(angles, named))
     return drawing if output is None else drawing.save(output)
 
 
 def is_tables(text: str | Path) -> bool:
-    """Whether this names baked tables, and no material."""
-    if outside.names_data(str(text)):
-        return False
-    return os.sep in str(text) or str(text).endswith(".npz") or Path(text).is_dir()
+    """Whether this names baked tables. InputError where it is no material either."""
+    return operands.kind_of(text, {Kind.TABLES, *operands.MATERIALS}, "MODEL") is Kind.TABLES
 
 
 def _named(material: BSDF | str | Path) -> tuple[str, BSDF]:
@@ -82,12 +81,18 @@ def _named(material: BSDF | str | Path) -> tuple[str, BSDF]:
     return str(material), notation.named(str(material))[0]
 
 
-def _views(angles: Sequence[float] | None) -> tuple[float, ...]:
+def _views(angles: Sequence[float] | None, named: Sequence[tuple[str, BSDF]]) -> tuple[float, ...]:
+    """Directions of view that are drawn, degrees: those that somebody knows values of."""
+    known = [bsdf.angular_range.view for _, bsdf in named]
+    low, high = min((ends[0] for ends in known), default=0.0), max((ends[1] for ends in known), default=90.0)
     if angles is None:
-        return VIEWS
+        return tuple(dict.fromkeys(min(max(view, low), high) for view in VIEWS))
     for angle in angles:
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not 0 <= angle < 90:
             raise InputError(f"'{angle}' is no angle of view", "--angles", "give degrees from 0 to below 90")
+        if not low <= angle <= high:
+            what = f"{angle:g} degrees of view asked for, and {named[0][0]} is known from {low:.3g} to {high:.3g}"
+            raise InputError(what, "--angles", f"such as {low:.3g},{high:.3g}")
     if not 1 <= len(angles) <= 8:
         raise InputError(f"{len(angles)} angles, 1 to 8 can be told apart", "--angles", "such as 0,45")
     return tuple(map(float, angles))
@@ -111,22 +116,32 @@ def _drawn(materials: Sequence[tuple[str, BSDF]], kind: str, views: Sequence[flo
             figure = image_slices.draw(title, labels, bsdfs)
         else:
             panels = [[curves.curve(bsdf, view) for bsdf in bsdfs] for view in views]
-            figure = (lobes.draw if kind == "lobe" else _slice)(title, labels, panels)
+            figure = (lobes.draw if kind == "lobe" else _slice)(title, labels, panels, _known(labels, bsdfs))
     return Drawing(figure, f"{kind}: {', '.join(labels)}")
+
+
+def _known(labels: Sequence[str], bsdfs: Sequence[BSDF]) -> str:
+    """At which angles values are known, to end a subtitle with; "" where they are everywhere."""
+    parts = [
+        f"{label} is known at {bsdf.angular_range}" if len(bsdfs) > 1 else f"known at {bsdf.angular_range}"
+        for label, bsdf in zip(labels, bsdfs, strict=True)
+        if not bsdf.angular_range.everything
+    ]
+    return "".join(f"; {part}" for part in parts)
 
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
-def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]]) -> Figure:
+def _slice(title: str, labels: Sequence[str], panels: Sequence[Sequence[Curve]], known: str = "") -> Figure:
     """One material: all views in one frame. Several: a frame for each view, on the same axes.
 
     Logarithmic where the peaks differ by more than 30.
     """
     from matplotlib.lines import Line2D
 
-    subtitle = "value f |cos θi|, mean of the channels, over wi in the plane of incidence"
+    subtitle = f"value f |cos θi|, mean of the channels, over wi in the plane of incidence{known}"
     views = [panel[0].view for panel in panels]
     if len(labels) == 1:
         colours: list[Colour] = [_colour_of_view(index, len(views)) for index in range(len(views))]
@@ -181,9 +196,8 @@ def _frames(views: Sequence[float], title: str, subtitle: str, handles: Sequence
 
 def _scale(shown: Sequence[Curve]) -> tuple[float, bool]:
     """The highest value, and whether the axis has to be logarithmic."""
-    peaks = [max(float(curve.mean.max()), float(curve.pdf.max())) for curve in shown]
-    positive = [peak for peak in peaks if peak > 0] or [1.0]
-    return max(positive), max(positive) > 30 * min(1.0, min(positive))
+    positive = [curve.peak for curve in shown if curve.peak > 0] or [1.0]
+    return max(positive), max(positive) > 30 * min(1.0, *positive)
 
 
 def _line(axes: Axes, curve: Curve, colour: Colour, index: int) -> None:
@@ -226,18 +240,22 @@ def _colour_of_view(index: int, count: int) -> Colour:
 
 def _albedo(title: str, labels: Sequence[str], bsdfs: Sequence[BSDF]) -> Figure:
     """Directional albedo over the angle of wo, and the line of energy conservation."""
-    subtitle = f"share of the power that leaves, over wo; each point {curves.SAMPLES**2} stratified samples"
+    known = _known(labels, bsdfs)
+    subtitle = "share of the power that leaves, over wo"
+    subtitle += known or f"; each point {curves.SAMPLES**2} stratified samples"
     subtitle += "; mean of the channels" if len(bsdfs) > 1 else ""
     figure = figures.blank(7.4, 4.6 if len(bsdfs) == 1 else 5.0, title, subtitle)
     axes = figure.add_axes((0.1, 0.125, 0.86, 0.7) if len(bsdfs) == 1 else (0.1, 0.215, 0.86, 0.625))
     angles = np.concatenate([np.linspace(0, 80, 33), np.linspace(81, 89.5, 18)])
     highest = 0.0
     for label, bsdf, colour in zip(labels, bsdfs, figures.PALETTE, strict=False):
-        values = curves.albedo(bsdf, angles)
-        highest = max(highest, float(values.max()))
+        low, high = bsdf.angular_range.view
+        outside = (angles < low) | (angles > high)
+        values = np.where(outside[:, None], np.nan, curves.albedo(bsdf, angles))
+        highest = max(highest, float(np.nan_to_num(values).max()))
         if len(bsdfs) > 1:
             axes.plot(angles, values.mean(axis=1), color=colour, linewidth=2, label=label)
-        elif np.ptp(values, axis=1).max() <= 1e-3:
+        elif np.ptp(np.nan_to_num(values), axis=1).max() <= 1e-3:
             axes.plot(angles, values.mean(axis=1), color=figures.CHANNELS[2], linewidth=2)
         else:
             for channel, of_channel, name in zip(values.T, figures.CHANNELS, ("red", "green", "blue"), strict=False):

@@ -17,7 +17,7 @@ from typing import NotRequired, TypeAlias, TypedDict
 
 import numpy as np
 
-from ..catalog import notation, outside
+from ..catalog import notation, operands, outside
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, Parameter, model, tree
 from ..ops import backend
@@ -216,8 +216,7 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
 def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
     for target in targets:
-        head = target.partition("(")[0]
-        if ":" in head and not outside.names_code(head) and not outside.names_data(head):
+        if operands.MATERIALS.isdisjoint(operands.readings(target)):
             hint = "the page's shader code is written from Gonio's models only"
             raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
     found = notation.several(targets, parameters)

@@ -1,7 +1,8 @@
-"""Files in which other programs describe materials, such as glTF's: what a format of them is, and how a text names one.
+"""Files that describe materials, such as glTF's: what a format of them is, and how a text names one.
 
     chest.gltf                  the file's only material
     chest.gltf:Wood             one of several, by its name, or by its number where it has none of its own
+    gold.json                   what `gonio fit` found, or Gonio's own notation
 
 A reader writes a material down in Gonio's notation (`notation`), as a tree of types and values; the formats themselves
 are the modules of this package.
@@ -12,12 +13,13 @@ from __future__ import annotations
 import json
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import ClassVar, NamedTuple, TypeAlias
 
 from ... import files
 from ...errors import GonioWarning, InputError, did_you_mean
+from ...material import is_model
 from ...members import Family, instances_of
 
 # {"type": "conductor", "alpha": 0.3, ...}; a value may be a material again, or a picture: {"type": "imageTex", ...}
@@ -48,9 +50,17 @@ class Document:
     suffixes: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[str] = ""
 
+    def holds(self, path: Path) -> bool:
+        """Whether a file with a suffix of the format describes materials, where other files have that suffix too."""
+        return True
+
     def materials(self, path: Path) -> list[str]:
         """The names by which a file's materials are asked for. InputError for a file that is none of the format."""
         raise NotImplementedError
+
+    def ranked(self, path: Path) -> bool:
+        """Whether a file's first material is meant where none is named: the best of several fits."""
+        return False
 
     def read(self, path: Path, name: str) -> Described:
         """A file's material of that name. InputError where the file is none of the format."""
@@ -75,8 +85,8 @@ def parted(text: str) -> tuple[Document, Path, str] | None:
     for document in Document.family.all().values():
         for suffix in document.suffixes:
             match = re.fullmatch(rf"(.+?{re.escape(suffix)})(?::(.+))?", text, re.IGNORECASE | re.DOTALL)
-            if match:
-                return document, Path(match[1]).expanduser(), match[2] or ""
+            if match and document.holds(path := Path(match[1]).expanduser()):
+                return document, path, match[2] or ""
     return None
 
 
@@ -95,16 +105,25 @@ def read(document: Document, path: Path, name: str = "") -> Described:
     """A material of a file; the only one where no name is given. InputError, with the nearest known name."""
     if not path.is_file():
         raise InputError(f"no file '{path}'", str(path))
-    known = document.materials(path)
+    known = document.materials(path) if document.holds(path) else []
     if not known:
         raise InputError("it holds no material", str(path))
-    if not name and len(known) > 1:
+    if not name and len(known) > 1 and not document.ranked(path):
         what = f"it holds {len(known)} materials"
         shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
         raise InputError(what, str(path), f"say which, such as {path.name}:{known[0]}; there are {shown}")
     if name and name not in known:
         raise InputError(f"no material '{name}' in it", str(path), did_you_mean(name, known[:1000]))
     return document.read(path, name or known[0])
+
+
+def described(text: str) -> dict[str, Notation]:
+    """The notation of every material of FILE, or of FILE:MATERIAL, by its name."""
+    found = parted(text)
+    assert found is not None, "asked before"
+    document, path, name = found
+    names = [name] if name or not path.is_file() else document.materials(path)
+    return {one: read(document, path, one).notation for one in names}
 
 
 def without_pictures(text: str) -> Notation:
@@ -123,36 +142,51 @@ def without_pictures(text: str) -> Notation:
 
 
 def convert(source: str, output: Path) -> tuple[str, ...]:
-    """Write a document's material as JSON in Gonio's notation, or such JSON as a document. What the notation lacks.
+    """Write a document's material as JSON in Gonio's notation, or as another document. What the notation lacks.
 
-    source  FILE or FILE:MATERIAL, or a .json file that holds one material: {"type": ..., ...}
+    source  FILE or FILE:MATERIAL
     output  .json, or a document's suffix
     """
-    found, target = parted(source), parted(str(output))
-    described = read(*found) if found else Described(_from_json(Path(source)), ())
+    found = parted(source)
+    if found is None:
+        raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
+    described = read(*found)
     if output.suffix.lower() == ".json":
-        text = json.dumps(described.notation, indent=2) + "\n"
+        text = json.dumps(for_scenes(described.notation), indent=2) + "\n"
         files.write_whole(output, text.encode())
         return described.notices
+    known = {suffix: one for one in Document.family.all().values() if one.writes for suffix in one.suffixes}
+    target = known.get(output.suffix.lower())
     if target is None:
-        known = sorted({suffix for one in Document.family.all().values() if one.writes for suffix in one.suffixes})
-        raise InputError(f"'{output.suffix}' is no format of materials", str(output), f"{', '.join(known)} or .json")
-    kind = str(described.notation.get("type")).replace("_", "-").removeprefix("gonio-")
-    if target[0].writes and kind != target[0].writes:
-        raise InputError(f"a {kind} given, and {target[0].name} holds {target[0].writes}", str(output))
-    files.write_whole(output, target[0].write(described.notation, output.stem))
+        hint = f"{', '.join(sorted(known))} or .json"
+        raise InputError(f"'{output.suffix}' is no format of materials", str(output), hint)
+    kind = described.notation["type"]
+    if kind != target.writes:
+        raise InputError(f"a {kind} given, and {target.name} holds {target.writes}", str(output))
+    files.write_whole(output, target.write(described.notation, output.stem))
     return described.notices
 
 
-def _from_json(path: Path) -> Notation:
-    try:
-        found = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"no JSON: {str(error)[:200]}", str(path)) from None
-    if not isinstance(found, dict) or not isinstance(found.get("type"), str):
-        raise InputError('an object with a "type" expected', str(path), 'such as {"type": "openpbr", ...}')
+PREFIX = "gonio-"  # of types in scenes, where some names without it are the lab's, with other defaults
+
+
+def for_scenes(notation: Mapping[str, object]) -> Notation:
+    """The notation with its types as scenes have them: "gonio-conductor"."""
+    return _with_types(notation, lambda name: PREFIX + name if is_model(name) else name)
+
+
+def from_scenes(notation: Mapping[str, object]) -> Notation:
+    """The inverse of `for_scenes`."""
+    return _with_types(notation, lambda name: re.sub("^gonio[-_]", "", name))
+
+
+def _with_types(notation: Mapping[str, object], change: Callable[[str], str]) -> Notation:
+    found: Notation = {}
+    for key, value in notation.items():
+        if isinstance(value, Mapping):
+            found[key] = _with_types(value, change)
+        else:
+            found[key] = change(value) if key == "type" and isinstance(value, str) else value
     return found
 
 

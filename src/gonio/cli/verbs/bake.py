@@ -74,5 +74,5 @@ def bake(
 
     options = {**vars(how), "lut": how.lut.split(",") if how.lut else None}
     with crew.working():
-        baked = tables.bake(made.text(target), output, **options)
+        baked = tables.bake(made.text(target, tables.BAKED), output, **options)
     print_tables(baked.manifest, output, as_json)

@@ -9,7 +9,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from .. import completion
-from ..options import Json
+from ..options import Json, Material
 from ..output import listing, print_rich
 from .base import MATERIALS, verb
 
@@ -45,7 +45,7 @@ def compensation(
         from ...viewer import energy_figures
 
         output = files.check_folder(output)
-    found = comparison.compare(walks=walks, own=[notation.named(text)[0] for text in model or ()])
+    found = comparison.compare(walks=walks, own=[notation.named(text)[0] for text in Material().texts(model or ())])
     if output is not None:
         energy_figures.plot_comparison(found, output)
     if as_json:

@@ -34,7 +34,11 @@ def compress(
       gonio compress paint.bsdf --method rgl -o paint.gonio
       gonio compress gold.binary --method network -o gold.gonio
     """
+    from ...catalog import operands
     from ...measure.compression.compress import compress as compressed
+
+    for file in files:
+        operands.kind_of(file, {operands.Kind.TABLE}, "FILE")
 
     rows = compressed(files, output, method, size)
     if as_json:

@@ -34,10 +34,11 @@ def convert(
       gonio convert gold.binary gold.bsdf
       gonio convert paint.mtlx paint.json
     """
-    from ...catalog import documents
-    from ...measure import names_table
+    from ...catalog import documents, operands
+    from ...catalog.operands import Kind
 
-    if documents.names_document(source) or documents.names_document(str(output)):
+    kind = operands.kind_of(source, {Kind.PICTURE, Kind.TABLE, Kind.DOCUMENT}, "IN")
+    if kind is Kind.DOCUMENT:
         notices = documents.convert(source, output)
         if as_json:
             print(json.dumps({"output": str(output), "notices": notices}))
@@ -45,7 +46,7 @@ def convert(
         print_warnings(notices)
         print(output)
         return
-    if names_table(source):
+    if kind is Kind.TABLE:
         from ...measure import compare
 
         made = compare.convert(source, output)

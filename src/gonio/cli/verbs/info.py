@@ -15,10 +15,10 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=7)
 def info(
-    path: Annotated[str, Argument(metavar="FILE", help="Measured values, or a baked folder or tables.npz.")],
+    path: Annotated[str, Argument(metavar="FILE", help="Measured values, materials, or a baked folder.")],
     as_json: Json = False,
 ) -> None:
-    """Say what a file holds: a measured material, or baked tables.
+    """Say what a file holds: a measured material, described ones (.json of a fit, .gltf, .mtlx), or baked tables.
 
     Of measurements: dimensions, ranges, what is invalid or negative, the albedo over the angle, energy and reciprocity.
 
@@ -26,11 +26,27 @@ def info(
     Examples:
       gonio info gold.binary
       gonio info merl.npz:chrome
+      gonio info gold.json
       gonio info tables
     """
-    from ...measure import SAMPLE, names_table
+    from ...catalog import operands
+    from ...catalog.operands import Kind
 
-    if path == SAMPLE or names_table(path) or (path.lower().endswith(".npz") and not _is_baked(path)):
+    kind = operands.kind_of(path, {Kind.TABLE, Kind.DOCUMENT, Kind.TABLES}, "FILE")
+    if kind is Kind.DOCUMENT:
+        from ...catalog import documents, texts
+
+        notations = documents.described(path)
+        if as_json:
+            print(json.dumps({"path": path, "materials": notations}))
+            return
+        print(path)
+        table = listing("material", "")
+        for name, notation in notations.items():
+            table.add_row(name, texts.as_text(notation))
+        print_rich(table)
+        return
+    if kind is Kind.TABLE:
         from ...measure import report
 
         about = report.describe(path)
@@ -46,14 +62,3 @@ def info(
     from ...render import tables
 
     print_tables(tables.describe(path), Path(path), as_json)
-
-
-def _is_baked(path: str) -> bool:
-    """Whether a .npz is what `gonio bake` writes, or nothing that can be opened."""
-    import zipfile
-
-    try:
-        with zipfile.ZipFile(path) as file:
-            return not any("/" in name for name in file.namelist())
-    except (OSError, ValueError, zipfile.BadZipFile):
-        return True

@@ -47,10 +47,12 @@ def plot(
       gonio plot fresnel --eta 1.5
       gonio plot fresnel --metal Au
     """
+    from ...catalog import notation
     from ...viewer import figures, plots
 
     views = None if angles is None else figures.split_values(angles)
     if len(model) == 1 and plots.is_tables(model[0]):
+        made.refuse(model[0])
         output = output or Path(f"{Path(model[0]).resolve().stem}-tables.png")
         print(plots.plot(model[0], output=output).path)
         return
@@ -59,13 +61,16 @@ def plot(
         print(plots.plot("fresnel", eta=eta, k=k, metal=metal, output=output).path)
         return
     texts = made.texts(model)
-    heads = dict.fromkeys(text.partition("(")[0] for text in texts)
+    heads = dict.fromkeys(notation.split(text)[0] for text in texts)
     output = output or Path(f"{'-'.join(map(_file_name, heads))}-{kind}.png")
     print(plots.plot(*texts, kind=kind, angles=views, eta=eta, k=k, metal=metal, output=output).path)
 
 
 def _file_name(head: str) -> str:
-    """A material's name in that of a file: of FILE.py:CLASS the class, behind the file where that differs."""
+    """A material's name in that of a file: of FILE.py:CLASS the class, behind the file where that differs; of JSON,
+    "material"."""
+    if head.startswith("{"):
+        return "material"
     file, _, name = head.lower().rpartition(".py:")
     stem = Path(file).name
-    return name if stem in ("", name) else f"{stem}-{name}"
+    return Path(name).name.replace(":", "-") if stem in ("", name) else f"{stem}-{name}"

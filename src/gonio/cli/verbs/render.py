@@ -54,13 +54,17 @@ def render(
       gonio render examples/phong -o phong.exr --spp 256 --size 640x480
       gonio render examples/phong -o phong.png --exposure auto
       gonio render ward.py:Ward -p alpha=.1,.4 -o ward.png
+      gonio render kulla-conty -p base=conductor -p base.alpha=.35 -o rough.png
+      gonio render gold.json -o fitted.png
       gonio render examples/phong --until-error .001 -o quiet.exr
       gonio render scene.xml --integrator path --max-depth 5 --denoise
     """
+    from ...catalog import notation
 
-    request = how.request(scene, output, timeout, made.instead_of(scene), checkpoint)
+    named = made.instead_of(scene, how.allow_code)
+    request = how.request(scene, output, timeout, named and notation.build(named), checkpoint)
     request = replace(request, until_error=until_error)
-    carry_out(request, scene.name, as_json, crew)
+    carry_out(request, Path(scene).name, as_json, crew)
 
 
 def carry_out(request: Request, title: str, as_json: bool, crew: Crew) -> None:

@@ -49,9 +49,12 @@ def view(
       gonio view examples/shading-balls
       gonio view --export page.html
     """
+    from ...catalog import operands
     from ...viewer import page, stage
 
-    if target and len(target) == 1 and (target[0].lower().endswith(".json") or Path(target[0]).is_dir()):
+    accepted = {*operands.MATERIALS, *([operands.Kind.SCENE] if len(target or ()) == 1 else [])}
+    kinds = [operands.kind_of(one, accepted, "MODEL") for one in target or ()]
+    if target and kinds == [operands.Kind.SCENE]:
         from ...viewer import lab_scene
 
         if param:

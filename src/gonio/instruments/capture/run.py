@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import files
+from ...catalog import operands
 from ...errors import InputError
 from ...fitting.fit import Fit, moving_of
 from ...material import BSDF
@@ -23,6 +24,8 @@ from .calibration import NAME, Calibration, Floats
 from .photographs import Photograph
 from .pixels import GRAZING, Chosen, Gathered, Kind, Scene
 from .planning import Proposal
+
+PHOTOGRAPHS = frozenset({operands.Kind.CALIBRATION, operands.Kind.FOLDER, operands.Kind.PICTURE, operands.Kind.FILE})
 
 
 @dataclass(frozen=True)
@@ -234,7 +237,8 @@ def calibration_of(named: str | Path | Sequence[str], calibration: str | Path | 
     if not several:
         raise InputError("no photographs given", "photographs", "name files, or a folder with a calibration.json")
     first = Path(several[0]).expanduser()
-    if len(several) == 1 and first.suffix.lower() == ".json":
+    kinds = [operands.kind_of(Path(one).expanduser(), PHOTOGRAPHS, "photographs") for one in several]
+    if kinds == [operands.Kind.CALIBRATION] and not first.is_dir():
         return first
     return (first if first.is_dir() else first.parent) / NAME
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from ... import ops
 from ...material import BSDF, Breach, Sample, file, method, never
+from ...material.angular_range import AngularRange
 from ...measure import SAMPLE, names_table, read
 from ...measure.tables.base import Measurement, above
 from ...ops import Direction, Mode, Scalar, Spectrum, where
@@ -60,13 +61,17 @@ class Measured(BSDF):
 
     @classmethod
     def reads(cls, text: str) -> bool:
-        return names_table(text)
+        return text == SAMPLE or names_table(text)
 
     @property
     def table(self) -> Measurement:
         """The table behind it."""
         table: Measurement = vars(self)["_table"]
         return table
+
+    @property
+    def angular_range(self) -> AngularRange:
+        return self.table.angular_range
 
     @property
     def isotropic(self) -> bool:

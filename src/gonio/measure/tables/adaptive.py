@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...errors import InputError
+from ...material.angular_range import AngularRange, of_nodes
 from ...ops import Direction, Scalar, Spectrum, backend, copysign, dot, floor, maximum, sqrt, vec3, where
 from ...optics.frame import reflect
 from ..angles import azimuth, direction
@@ -74,6 +75,10 @@ class Adaptive(Measurement):
             raise InputError("sigma is not positive, or ndf negative, somewhere", where, "the file is damaged")
 
     # ------------------------------------------------------------------ as formulas
+
+    @property
+    def angular_range(self) -> AngularRange:
+        return of_nodes(self.theta, np.zeros(0), np.zeros(0))
 
     @property
     def isotropic(self) -> bool:

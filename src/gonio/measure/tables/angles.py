@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...errors import InputError
+from ...material.angular_range import AngularRange, of_nodes
 from ...ops import Direction, Scalar, Spectrum, Table, maximum, minimum
 from ..angles import between, elevation
 from ..warp import Nodes, named
@@ -67,6 +68,10 @@ class Angles(Guided, Measurement):
         swapped = np.swapaxes(self.values, 0, 1)
         limit = SAME * np.maximum(np.maximum(np.abs(swapped), np.abs(self.values)), np.abs(self.values).max() * 1e-9)
         return bool(np.all(np.abs(swapped - self.values) <= limit))
+
+    @property
+    def angular_range(self) -> AngularRange:
+        return of_nodes(self.theta_r, self.theta_i, self.phi)
 
     @cached_property
     def _table(self) -> Table:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...errors import InputError
+from ...material.angular_range import EVERYWHERE, AngularRange
 from ...members import Family, subclasses_of
 from ...ops import Direction, Mask, Scalar, Spectrum, backend, vec3
 from .. import colours
@@ -75,6 +76,11 @@ class Measurement:
     def albedos(self) -> Floats:
         """The directional albedo at `ANGLES` of view, (N, 3): by 4096 draws each, which err by some thousandths."""
         return self._albedos
+
+    @property
+    def angular_range(self) -> AngularRange:
+        """The angles that were measured; beyond, the nearest values are held."""
+        return EVERYWHERE
 
     def prepare(self) -> None:
         """Find what formulas need and is expensive; while a renderer records its kernels nothing could be computed."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...errors import InputError
+from ...material.angular_range import AngularRange, of_nodes
 from ...ops import Direction, Spectrum
 from .base import Floats, Measurement, finite, in_rgb
 from .guided import Guided
@@ -69,6 +70,12 @@ class Samples(Guided, Measurement):
             return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
 
         return at(theta_r, phi_r), at(theta_i, phi_i)
+
+    @property
+    def angular_range(self) -> AngularRange:
+        """Of both directions together, as a pair stands for its exchange."""
+        ends = np.sort(self.directions[:, [0, 2]], axis=None)
+        return of_nodes(ends, ends, np.zeros(0))
 
     # ------------------------------------------------------------------ as formulas
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ... import ops
 from ...errors import InputError
+from ...material.angular_range import AngularRange, of_nodes
 from ...ops import Direction, Scalar, Spectrum, Table, where
 from ..angles import elevation
 from ..warp import Nodes, named
@@ -52,6 +53,10 @@ class Specular(Guided, Measurement):
         nodes = (len(self.theta_i), len(self.azimuth), len(self.radial))
         if self.values.ndim != 4 or self.values.shape[:3] != nodes:
             raise InputError(f"a table of shape {self.values.shape} for {nodes} nodes", where)
+
+    @property
+    def angular_range(self) -> AngularRange:
+        return of_nodes(np.zeros(0), self.theta_i, np.zeros(0))
 
     @property
     def mirrored(self) -> bool:

@@ -1,0 +1,113 @@
+"""JSON files that hold a material: in Gonio's notation, or as what a fit, a capture or a compression found.
+
+{"type": "gonio-conductor", "alpha": 0.3}             as `gonio convert` writes it
+{"fits": [{"notation": {"type": ...}}, ...]}          `gonio fit`: the best, or gold.json:2 for the second
+[{"file": "gold.binary", "fits": [...]}, ...]         `gonio fit` of several files: all.json:gold.binary
+{"notations": {"shapes.0.material": {"type": ...}}}   `gonio fit --from`
+{"fit": {"notation": {"type": ...}}}                  `gonio capture`
+{"path": "gold.gonio", "kind": "log", ...}            `gonio compress --json`, of several files a list
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import ClassVar, TypeAlias
+
+from ...errors import InputError
+from .. import outside
+from . import Described, Document, Notation, from_scenes
+
+Json: TypeAlias = "dict[str, Json] | list[Json] | str | float | bool | None"
+LARGEST = 64 << 20  # bytes: a fit of a thousand files has less than ten million
+
+_read: dict[Path, tuple[tuple[int, int], dict[str, Json] | None]] = {}
+KEPT = 8  # files, the last that were asked for
+
+
+class JsonFile(Document):
+    """Gonio's own JSON (.json): materials in its notation, and the results of fits, captures and compressions."""
+
+    name: ClassVar[str] = "json"
+    suffixes: ClassVar[tuple[str, ...]] = (".json",)
+
+    def holds(self, path: Path) -> bool:
+        return _entries(path) is not None
+
+    def materials(self, path: Path) -> list[str]:
+        return list(_entries(path) or {})
+
+    def ranked(self, path: Path) -> bool:
+        return list(_entries(path) or {})[:1] == ["1"]
+
+    def read(self, path: Path, name: str) -> Described:
+        entry = (_entries(path) or {})[name]
+        if isinstance(entry, str):  # of an earlier version, or of a class that no file holds
+            hint = f"name the material itself: '{entry}'"
+            raise InputError("it has the material as a text only, which is not read from files", str(path), hint)
+        if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
+            raise InputError('a material is an object with a "type"', str(path), 'such as {"type": "openpbr", ...}')
+        return Described(_located(from_scenes(entry), path.parent, str(path)), ())
+
+
+def _entries(path: Path) -> dict[str, Json] | None:
+    """What describes each material in a file, by name; None where the file is missing, or holds something else."""
+    try:
+        about = path.stat()
+        stamp = (about.st_mtime_ns, about.st_size)
+        if path in _read and _read[path][0] == stamp:
+            return _read[path][1]
+        if not path.is_file() or about.st_size > LARGEST:
+            return None
+        found = dict(_found(json.loads(path.read_bytes())))
+    except (OSError, ValueError, RecursionError):
+        return None
+    while len(_read) >= KEPT:
+        _read.pop(next(iter(_read)))
+    _read[path] = stamp, found or None
+    return found or None
+
+
+def _found(content: Json) -> Iterator[tuple[str, Json]]:
+    """Name and description of each material; nothing where the content is something else, such as a scene."""
+    if isinstance(content, list):
+        rows = [row for row in content if isinstance(row, dict)]
+        names = [str(row.get("file") or row.get("path")) for row in rows]
+        short = [Path(name).name for name in names]
+        for name, row in zip(names if len(set(short)) < len(short) else short, rows, strict=True):
+            for _, entry in [*_found(row)][:1]:
+                yield name, entry
+        return
+    if not isinstance(content, dict):
+        return
+    fits, fit, notations = content.get("fits"), content.get("fit"), content.get("notations")
+    if isinstance(content.get("type"), str):
+        yield "1", content
+    elif isinstance(fits, list):
+        for rank, one in enumerate(fits, 1):
+            if isinstance(one, dict):
+                yield str(rank), one.get("notation") or one.get("material")
+    elif isinstance(fit, dict):
+        yield "1", fit.get("notation") or fit.get("material")
+    elif isinstance(notations, dict) and isinstance(texts := content.get("materials"), dict):
+        yield from ((path, one or texts.get(path)) for path, one in notations.items())
+    elif isinstance(content.get("kind"), str):
+        file = content.get("path") or content.get("output")
+        if isinstance(file, str):
+            yield "1", {"type": "measured", "file": file}
+
+
+def _located(notation: Notation, folder: Path, where: str) -> Notation:
+    """The notation with the paths of its files, which start from a folder. InputError for a document in a document."""
+    found: Notation = {}
+    for key, value in notation.items():
+        if isinstance(value, dict):
+            found[key] = _located(value, folder, where)
+        elif key == "type" and value in Document.family.all():
+            raise InputError(f"a material of type '{value}' in it, which is in another file", where, "name that file")
+        elif isinstance(value, str) and (key == "file" or outside.names_code(value)):
+            found[key] = str(folder / Path(value).expanduser())
+        else:
+            found[key] = value
+    return found

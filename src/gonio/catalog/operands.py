@@ -1,0 +1,227 @@
+"""What a word of the command line names, a material, a scene, a picture, ...: one decision for all verbs.
+
+    kind_of("examples/phong", {Kind.SCENE, *MATERIALS}, "SCENE")     Kind.SCENE
+
+A word may be read in several ways: `phong` is a material, and a folder of that name may hold a scene. The readings have
+an order, what is there before what is a name alone, and the first that the verb accepts is meant. Only names, suffixes
+and the contents of files decide; nothing is run, and no name is too long to be asked about.
+"""
+
+from __future__ import annotations
+
+import difflib
+import enum
+import json
+import os
+import re
+import zipfile
+from collections.abc import Collection
+from pathlib import Path
+
+from ..errors import InputError
+from ..material import BSDF, is_model, models
+from ..optics.ndf import distributions
+from . import documents, library, outside, texts
+
+PICTURE_SUFFIXES = (".exr", ".hdr", ".png", ".npz")
+CALIBRATION = "calibration.json"  # beside photographs
+_LONGEST = 80  # letters of a word in an error
+_LARGEST_CALIBRATION = 1 << 20  # bytes; a large .json is a scene
+_NEAR = 0.75  # likeness from which an unknown word is taken for a name that was misspelt
+
+
+class Kind(enum.Enum):
+    """What a word may name."""
+
+    NAME = "a material's name"
+    CODE = "a class in a Python file"
+    TABLE = "a file of measured values"
+    DOCUMENT = "a file that describes a material"
+    DISTRIBUTION = "a distribution of normals"
+    PLUGIN = "a plugin of Mitsuba's"
+    SCENE = "a scene"
+    TABLES = "baked tables"
+    PICTURE = "a picture"
+    CALIBRATION = "a calibration of photographs"
+    FOLDER = "a folder"
+    FILE = "a file"
+
+
+MATERIALS = frozenset({Kind.NAME, Kind.CODE, Kind.TABLE, Kind.DOCUMENT})
+_TAKEN = {
+    Kind.SCENE: "render, study and view take scenes",
+    Kind.TABLES: "info and plot take baked tables",
+    Kind.PICTURE: "compare and convert take pictures, bake takes an environment",
+    Kind.PLUGIN: "verify takes plugins of Mitsuba's",
+    Kind.DISTRIBUTION: "bake takes distributions",
+    Kind.CALIBRATION: "capture takes a calibration",
+}
+
+
+def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str) -> Kind:
+    """What a word names, of the kinds that are accepted.
+
+    where  what takes it, "SCENE", as errors show it
+    Raises InputError, with what it is and what is expected, where it names nothing of these kinds.
+    """
+    text = os.fspath(word)
+    found = readings(text)
+    kind = next((one for one in found if one in accepted), None)
+    if kind is not None:
+        return kind
+    shown = text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+    what, hint = f"'{shown}' is {found[0].value}, {_expected(accepted)} expected", _TAKEN.get(found[0], "")
+    if Kind.SCENE in found and (reason := _broken(Path(text))):
+        what, where, hint = reason, text, "mend the file"
+    elif not _exists(Path(text)) and found[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
+        what, hint = f"no file or folder '{shown}'; {_expected(accepted)} expected", "check the path"
+    raise InputError(what, where, hint)
+
+
+def _expected(accepted: Collection[Kind]) -> str:
+    """The kinds in words."""
+    whole = set(accepted) >= MATERIALS
+    named = [kind.value for kind in Kind if kind in accepted and not (whole and kind in MATERIALS)]
+    *others, last = ["a material", *named] if whole else named
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def is_material(word: str) -> bool:
+    """Whether a word names a material that there is: a known name, a file, or a class that is one."""
+    found = readings(word)
+    if found[0] is Kind.CODE:
+        cls = outside.thing(texts.split(word)[0], where="MODEL")
+        return issubclass(cls, BSDF) or callable(getattr(cls, "eval", None))
+    return found[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in found)
+
+
+def readings(text: str) -> list[Kind]:
+    """All that a word may name, what is most likely first; at least one. InputError for a Python file without class."""
+    text = text.strip()
+    head, settings = texts.split(text)
+    if head.startswith("{"):
+        return _described(_type_of(head), Kind.NAME)
+    if head.startswith("mitsuba:"):
+        return [Kind.PLUGIN]
+    if outside.names_code(head):
+        return [Kind.CODE]
+    if head.lower().endswith(".py"):
+        raise InputError(f"'{head}' names a file, but no class in it", "MODEL", f"give {head}:CLASS")
+    path = Path(text)
+    if _is_folder(path):
+        return _in_folder(path, _names(head))
+    if documents.names_document(head):
+        return _described(_type_of_file(head), Kind.DOCUMENT)
+    if outside.reader_of(head):
+        return [Kind.TABLE]
+    by_suffix = _of_file(path)
+    if by_suffix:
+        return [*by_suffix, *_names(head)]
+    if _exists(path):
+        return [Kind.FILE]
+    if settings or _names(head) or _resembles(head):
+        return _names(head) or [Kind.NAME]
+    return [Kind.SCENE, *([Kind.NAME] if os.sep not in text else []), Kind.PICTURE, Kind.FOLDER, Kind.FILE]
+
+
+def _described(name: str, kind: Kind) -> list[Kind]:
+    """Of a description by its type: Gonio's, or a plugin of Mitsuba's. Names that both have are Gonio's."""
+    known = is_model(re.sub("^gonio-", "", name)) or library.knows(name) or outside.names_code(name)
+    plugins = [Kind.PLUGIN] if name else []
+    return [kind, *plugins] if known or not plugins else [*plugins, kind]
+
+
+def _type_of(text: str) -> str:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return ""
+    return str(found.get("type", "")) if isinstance(found, dict) else ""
+
+
+def _type_of_file(text: str) -> str:
+    """The type of a description in a .json, "" of other documents."""
+    path = Path(text).expanduser()
+    try:
+        return _type_of(path.read_text(encoding="utf-8")) if path.suffix.lower() == ".json" else ""
+    except (OSError, ValueError):
+        return ""
+
+
+def _names(name: str) -> list[Kind]:
+    """What a name alone may stand for."""
+    found = [Kind.NAME] if is_model(name) or library.knows(name) else []
+    return [Kind.DISTRIBUTION, *found] if name in distributions() else found
+
+
+def _resembles(name: str) -> bool:
+    """Whether a name is nearly one of a material or a distribution."""
+    if os.sep in name or not name:
+        return False
+    known = [*models(), *library.materials(), *distributions()]
+    return bool(difflib.get_close_matches(name.partition(":")[0].lower(), known, n=1, cutoff=_NEAR))
+
+
+def _in_folder(path: Path, names: list[Kind]) -> list[Kind]:
+    """By the files that a folder holds; one that holds none of them is left to what the verb says of it."""
+    marks = {"scene.json": Kind.SCENE, "tables.npz": Kind.TABLES, CALIBRATION: Kind.CALIBRATION}
+    found = [kind for name, kind in marks.items() if _exists(path / name)]
+    return [*found, Kind.FOLDER, *names] if found else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
+
+
+def _of_file(path: Path) -> list[Kind]:
+    """By a file's suffix, whether it is there or not; empty where that says nothing."""
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return _of_archive(path)
+    if suffix in PICTURE_SUFFIXES:
+        return [Kind.PICTURE]
+    if suffix == ".json":
+        return [Kind.CALIBRATION] if _lists_photographs(path) else [Kind.SCENE]
+    return [Kind.SCENE, Kind.PLUGIN] if suffix == ".xml" else []  # a scene of Mitsuba's, or a description of a BSDF
+
+
+def _of_archive(path: Path) -> list[Kind]:
+    """Baked tables, networks of several materials, or a picture: by the names of the arrays."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            names = file.namelist()
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return [Kind.PICTURE, Kind.TABLES]
+    if any("/" in name for name in names):
+        return [Kind.TABLE]
+    return [Kind.TABLES] if "manifest.npy" in names else [Kind.PICTURE, Kind.TABLES]
+
+
+def _lists_photographs(path: Path) -> bool:
+    """Whether a .json is a calibration."""
+    try:
+        found = json.loads(path.read_bytes()) if path.stat().st_size <= _LARGEST_CALIBRATION else None
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and "scene" not in found and ("photographs" in found or "lights" in found)
+
+
+def _broken(path: Path) -> str:
+    """What is wrong with a .json that cannot be read as one; "" where it can, or is another file."""
+    if path.suffix.lower() != ".json" or not _exists(path):
+        return ""
+    try:
+        json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        return f"no JSON: {str(error)[:200]}"
+    return ""
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that is too long, a zero byte
+        return False
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False

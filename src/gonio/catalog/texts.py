@@ -1,0 +1,167 @@
+"""The text of a material taken apart: what names it, and what is set of it.
+
+    taken_apart("conductor(alpha=.3,preset=Au)")     (Conductor, {"alpha": ".3", "preset": "Au"})
+
+What the words mean is a matter of `notation`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+
+from ..errors import InputError
+from ..material import is_model, model, tree
+from ..material.bsdf import BSDF
+from ..material.parameters import Value
+from . import documents, library, outside
+
+_CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
+_SETTINGS = re.compile(r"\(\s*[\w.]+\s*=.*\)\s*\Z", re.DOTALL)  # at a text's end
+
+
+def assignment(text: str, option: str = "--param") -> tuple[str, str]:
+    """("alpha", ".3") of "alpha=.3"."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise InputError(f"'{text}' sets nothing, NAME=VALUE expected", option, "such as alpha=0.3")
+    return name.strip(), value.strip()
+
+
+def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tuple[type[BSDF], dict[str, object]]:
+    """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); of a document's material,
+    and of JSON, what JSON has for them. InputError where it is no material, and for a document that names code which
+    is not allowed."""
+    if text.count("(") + text.count("{") > tree.MOST:
+        raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
+    head, inside = split(text)
+    given: dict[str, object] = {**assignments(inside, where)}
+    if head.startswith("{"):
+        cls, own = apart(_json(head, where), where)
+        return cls, {**own, **given}
+    if documents.names_document(head):  # before a table, as the name of a material in a document may be that of one
+        described = documents.without_pictures(head)
+        _refuse_code(described, head, allow_code)
+        cls = class_named(str(described.pop("type")), where)
+        return cls, {**described, **given}
+    reader = outside.reader_of(head)
+    if reader is not None:
+        return reader, {"file": head, **given}
+    if not _CALL.fullmatch(text) or re.fullmatch(r"[\d.-]+", head):
+        raise _no_material(text, where)
+    cls, preset = class_and_preset(head, where)
+    return cls, {"preset": preset, **given} if preset else given
+
+
+def split(text: str) -> tuple[str, str]:
+    """Name and settings of NAME(parameter=value,...): ("conductor", "alpha=.3"); the settings are "" where it has none.
+    The name of a file may have brackets in it, and so may JSON."""
+    text = text.strip()
+    if text.startswith("{"):
+        try:
+            end = json.JSONDecoder().raw_decode(_with_zeros(text))[1]
+        except (ValueError, RecursionError):
+            return text, ""
+        text = _with_zeros(text)
+        return text[:end], text[end:].strip("() ")
+    head = text
+    while True:
+        if outside.reader_of(head) or (documents.names_document(head) and not _SETTINGS.search(head)):
+            return head, text[len(head) :].strip("() ")
+        head, bracket, _ = head.rpartition("(")
+        if not bracket:
+            break
+    match = _CALL.fullmatch(text)
+    return (match[1].strip(), match[2] or "") if match else (text, "")
+
+
+def assignments(inside: str, where: str = "MODEL") -> dict[str, str]:
+    """The text of each parameter of "alpha=.3,preset=Au"."""
+    return dict(assignment(part, where) for part in _parts(inside))
+
+
+def _with_zeros(text: str) -> str:
+    """JSON, with 0.3 for .3."""
+    return re.sub(r"(?<![\w.])\.(?=\d)", "0.", text)
+
+
+def _json(text: str, where: str) -> Value:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise _no_material(text, where) from None
+
+
+def _refuse_code(described: documents.Notation, file: str, allowed: bool) -> None:
+    """Raise InputError where what a file describes names a class in a Python file."""
+    code = next(_code_in(described), None)
+    if code is not None and not allowed:
+        hint = f"read that file first; then name the material itself: '{as_text(described)}'"
+        raise InputError(f"it names '{code}', code that a file of data alone does not run", file, hint)
+
+
+def _code_in(described: Mapping[str, object]) -> Iterator[str]:
+    for value in described.values():
+        if isinstance(value, Mapping):
+            yield from _code_in(value)
+        elif isinstance(value, str) and outside.names_code(value):
+            yield value
+
+
+def _parts(text: str) -> list[str]:
+    """At commas outside of brackets, where a name and = follow; any other comma is part of a colour."""
+    parts, depth, start = [], 0, 0
+    for at, letter in enumerate(text):
+        depth += (letter in "([{") - (letter in ")]}")
+        if letter == "," and depth == 0 and re.match(r",\s*[A-Za-z_][\w.]*\s*=", text[at:]):
+            parts.append(text[start:at])
+            start = at + 1
+    return [part for part in [*parts, text[start:]] if part.strip()]
+
+
+def _no_material(value: object, where: str) -> InputError:
+    if str(value).endswith(".py"):
+        return InputError(f"'{value}' names a file, but no class in it", where, f"give {value}:CLASS")
+    hint = 'such as lambert, \'conductor(alpha=.3,preset=Au)\' or \'{"type": "conductor", "preset": "Au"}\''
+    expected = ', an object with a "type" expected' if isinstance(value, Mapping) else ""
+    return InputError(f"'{value}' is no material{expected}", where, hint)
+
+
+def class_named(name: str, where: str = "MODEL") -> type[BSDF]:
+    """The class of a name, or of FILE.py:CLASS."""
+    return class_and_preset(name, where)[0]
+
+
+def class_and_preset(name: str, where: str = "MODEL") -> tuple[type[BSDF], str]:
+    """The class of a name, of FILE.py:CLASS or of a material of the library, of which the preset too; "" for none.
+    InputError, with the nearest known name, where there is nothing of that name."""
+    if outside.names_code(name):
+        return outside.load(name, where=where), ""
+    if not is_model(name) and (":" in name or library.resembles(name)):
+        return library.named(name, where)
+    return model(name), ""
+
+
+def apart(value: Value, where: str) -> tuple[type[BSDF], dict[str, object]]:
+    """As `taken_apart`, of a text or what JSON has for a material."""
+    if isinstance(value, BSDF):
+        return type(value), {}
+    if isinstance(value, str):
+        return taken_apart(value.strip().strip('"'), where)
+    if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
+        raise _no_material(value, where)
+    fields = documents.from_scenes(value)
+    name = str(fields.pop("type"))
+    cls, preset = class_and_preset(name, where)
+    return cls, {"preset": preset, **fields} if preset else fields
+
+
+def as_text(value: object) -> str:
+    """What JSON has for a value, as text."""
+    if isinstance(value, Mapping):
+        inner = ",".join(f"{name}={as_text(v)}" for name, v in value.items() if name != "type")
+        return f"{value.get('type')}({inner})" if inner else str(value.get("type"))
+    if isinstance(value, list | tuple):
+        return ",".join(map(as_text, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,195 @@
+"""What `gonio explain` says of members of families that are no materials, and of the families themselves.
+
+Verbs are left out: `gonio VERB --help` says it.
+"""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from ..catalog import outside
+from ..errors import InputError, did_you_mean
+from ..members import Family
+
+WIDTH = 100
+
+
+class Home(NamedTuple):
+    """Where a family's base class stands, and how a member is asked for."""
+
+    module: str
+    base: str
+    use: str
+
+
+HOMES = (
+    Home("gonio.models", "BSDF", "gonio plot {name}"),
+    Home("gonio.optics.ndf", "NDF", "--param ndf={name}, gonio bake {name}"),
+    Home("gonio.optics.masking", "Masking", "--param masking={name}"),
+    Home("gonio.optics.fresnel", "Fresnel", "--param fresnel={name}"),
+    Home("gonio.transport.integrators", "Integrator", "gonio render SCENE --integrator {name}"),
+    Home("gonio.verify.laws", "Law", "gonio verify TARGET --law {name}"),
+    Home("gonio.shaders.languages", "Language", "gonio emit MODEL --lang {name}"),
+    Home("gonio.instruments.surfaces.base", "Surface", "gonio measure --surface {name} -o FILE"),
+    Home("gonio.measure.tables.base", "Measurement", "gonio measure MODEL --kind {name} -o FILE.gonio"),
+    Home("gonio.measure.formats.base", "Format", "a file with its suffix, wherever measured values may stand"),
+    Home("gonio.measure.compression.base", "Method", "gonio compress FILE --method {name} -o OUT.gonio"),
+    Home("gonio.catalog.documents", "Document", 'in a scene {{"type": "{name}", "file": ...}}'),
+    Home("gonio.viewer.panels.base", "Panel", "a panel of gonio view"),
+)
+
+
+@dataclass(frozen=True)
+class MemberPage:
+    """What is known of a member.
+
+    kind      "masking term"
+    doc       its docstring
+    formulas  what it defines of its own: name -> what its docstring says
+    use       how it is asked for
+    source    file
+    """
+
+    name: str
+    kind: str
+    doc: str
+    formulas: dict[str, str]
+    use: str
+    source: str
+
+    def as_dict(self) -> dict[str, object]:
+        return asdict(self)
+
+    def text(self, width: int = WIDTH) -> str:
+        """For a terminal of so many columns."""
+        heading = f"{self.name} ({self.kind})"
+        lines = [heading, "=" * len(heading), self.doc, ""]
+        lines += _listed(self.formulas, width)
+        return "\n".join([*lines, *[""] * bool(self.formulas), f"Use: {self.use}", f"Source: {self.source}"])
+
+
+@dataclass(frozen=True)
+class FamilyPage:
+    """A family: what its members are, by name, with a line each."""
+
+    name: str
+    doc: str
+    members: dict[str, str]
+    use: str
+
+    def as_dict(self) -> dict[str, object]:
+        return asdict(self)
+
+    def text(self, width: int = WIDTH) -> str:
+        """For a terminal of so many columns."""
+        heading = _plural(self.name)
+        lines = [heading, "=" * len(heading), self.doc, "", *_listed(self.members, width), ""]
+        return "\n".join([*lines, f"Use: {self.use}"])
+
+
+def families() -> dict[str, tuple[Family[Any], Home]]:
+    """Every family by the name of its members' kind, "masking term"."""
+    found = ((getattr(import_module(home.module), home.base).family, home) for home in HOMES)
+    return {family.kind: (family, home) for family, home in found}
+
+
+def index() -> FamilyPage:
+    """The families, for who asks for none."""
+    names = {_plural(kind): ", ".join(family.all()) for kind, (family, _) in families().items()}
+    lines = {kind: text for kind, text in names.items() if text}
+    return FamilyPage(
+        "family", "What Gonio has several of, and what a file of yours may add.", lines, "gonio explain NAME"
+    )
+
+
+def pages(name: str) -> list[MemberPage | FamilyPage]:
+    """What is known of a name: a page for each member that has it, or that of a family. InputError where none has."""
+    if outside.names_code(name):
+        return [_of_code(name)]
+    known = families()
+    members = [_page(family.all()[name], home) for family, home in known.values() if name in family.all()]
+    if members:
+        return [*members]
+    for kind, (family, home) in known.items():
+        if _key(name) in _aliases(kind, family):
+            return [FamilyPage(kind, _doc(_base(home)), family.titles(), home.use.format(name="NAME"))]
+    names = [*(one for family, _ in known.values() for one in family.all()), *map(_plural, known)]
+    raise InputError(f"nothing is called '{name}'", "MODEL", _hint(name, names))
+
+
+def _hint(name: str, names: list[str]) -> str:
+    near = did_you_mean(name, names)
+    return near if near.startswith("did") else "gonio explain alone lists what there is"
+
+
+def _of_code(name: str) -> MemberPage:
+    """Of a class in a file that is a member of a family, or could be."""
+    cls = outside.thing(name, where="MODEL")
+    home = next((home for home in HOMES[1:] if issubclass(cls, _base(home))), None)
+    if home is None:
+        raise InputError(f"{name} is no member of a family", "MODEL", "gonio explain alone lists the families")
+    return _page(cls, home)
+
+
+def _base(home: Home) -> type:
+    found: type = getattr(import_module(home.module), home.base)
+    return found
+
+
+def _page(member: Any, home: Home) -> MemberPage:
+    cls = member if isinstance(member, type) else type(member)
+    formulas = {
+        name: (inspect.getdoc(thing) or "").partition("\n")[0]
+        for name, thing in vars(cls).items()
+        if not name.startswith("_") and callable(thing) and inspect.getdoc(thing)
+    }
+    name = str(getattr(member, "name", "") or cls.__name__)
+    source = f"src/{cls.__module__.replace('.', '/')}.py"
+    if not cls.__module__.startswith("gonio."):
+        source = str(inspect.getsourcefile(cls))
+    kind = _base(home).family.kind  # type: ignore[attr-defined]  # of a family's base
+    return MemberPage(
+        name,
+        kind,
+        inspect.cleandoc(cls.__doc__ or ""),
+        formulas,
+        home.use.format(name=name),
+        source,
+    )
+
+
+def _aliases(kind: str, family: Family[Any]) -> set[str]:
+    """What a family may be called: "masking terms", "masking", "maskings"."""
+    return {_key(word) for word in (kind, kind.split()[-1], family.group.partition(".")[2], family.where)}
+
+
+def _key(name: str) -> str:
+    """A name in singular, without what separates its words."""
+    return "".join(letter for letter in name.lower() if letter.isalnum()).removesuffix("s")
+
+
+def _plural(kind: str) -> str:
+    first, _, rest = kind.partition(" of ")
+    many = first.removesuffix("y") + "ies" if first.endswith("y") else first + "s"
+    return f"{many} of {rest}s" if rest else many
+
+
+def _doc(cls: type) -> str:
+    return (inspect.getdoc(cls) or "").split("\n\n")[0]
+
+
+def _listed(rows: dict[str, str], width: int) -> list[str]:
+    indent = min(max((len(name) for name in rows), default=0) + 4, 32)
+    return [
+        textwrap.fill(
+            text, min(width, WIDTH), initial_indent=f"{'  ' + name:<{indent}}", subsequent_indent=" " * indent
+        )
+        for name, text in rows.items()
+    ]
+
+
+__all__ = ["FamilyPage", "MemberPage", "families", "index", "pages"]
