@@ -6,6 +6,7 @@ exits with `code`, Python users catch one class.
 
 from __future__ import annotations
 
+import os
 import re
 
 _ENDLESS = re.compile(r"\d{50,}")  # far beyond the 17 that a double keeps
@@ -63,3 +64,56 @@ def did_you_mean(name: str, known: list[str] | tuple[str, ...]) -> str:
     if near:
         return f"did you mean '{near[0]}'?"
     return "known: " + ", ".join(sorted(known))
+
+
+# --------------------------------------------------------------------------- errors in code of the user's
+
+_OWN = os.path.dirname(__file__)
+_LIBRARIES = (os.path.dirname(os.__file__), f"{os.sep}site-packages{os.sep}", f"{os.sep}dist-packages{os.sep}")
+_IN_LOOP = "encountered an exception (see above)"  # what Dr.Jit makes of any exception while it records a loop
+
+
+def user_line(error: BaseException) -> str:
+    """FILE:LINE of the innermost call in code that Gonio called, of neither its own nor a library's; "" where there is
+    none. The program that calls Gonio is not meant."""
+    cause: BaseException | None = error
+    while cause is not None:
+        within, line = False, ""
+        place = cause.__traceback__
+        while place is not None:
+            file = place.tb_frame.f_code.co_filename
+            if file.startswith(_OWN):
+                within = True
+            elif within and not file.startswith("<") and not any(library in file for library in _LIBRARIES):
+                line = f"{file}:{place.tb_lineno}"
+            place = place.tb_next
+        if line:
+            return line
+        cause = cause.__cause__ or cause.__context__
+    return ""
+
+
+def summary(error: BaseException) -> str:
+    """The type and the first line of the text of an exception."""
+    text = str(error).strip().partition("\n")[0]
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def in_user_code(error: BaseException) -> InputError | None:
+    """An exception that came up in code of the user's, with its line; None where no such code was called."""
+    line = user_line(error)
+    return (
+        InputError(summary(error), line, "mend it there: formulas are written in the words of gonio.ops")
+        if line
+        else None
+    )
+
+
+def out_of_loop(error: BaseException) -> BaseException:
+    """What went wrong, where Dr.Jit only says that something did while it recorded a loop; else the error itself."""
+    cause: BaseException | None = error
+    while isinstance(cause, RuntimeError) and _IN_LOOP in str(cause):
+        cause = cause.__cause__ or cause.__context__
+    if cause is None or cause is error or isinstance(cause, GonioError):
+        return cause or error
+    return in_user_code(cause) or cause

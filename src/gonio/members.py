@@ -52,6 +52,7 @@ class Family(Generic[Member]):
         self._folders, self._member = folders, member
         self._found: dict[str, Member] | None = None
         self._added: dict[str, Member] = {}
+        self._announced_names: set[str] = set()  # of those that installed packages bring
         self._watchers: dict[Callable[[str, Member], None], None] = {}
 
     def all(self) -> dict[str, Member]:
@@ -79,12 +80,21 @@ class Family(Generic[Member]):
         return {name: (member.__doc__ or name).splitlines()[0].rstrip(".") for name, member in self.all().items()}
 
     def add(self, thing: object, where: str = "register") -> str:
-        """Add a member; its name. InputError where it is none, or takes the name of another."""
+        """Add a member; its name. InputError where it is none, cannot serve as one, or takes the name of another.
+
+        One that has `check_formulas` is asked whether it can serve.
+        """
         found = self._member(thing)
         if found is None:
-            raise InputError(f"{thing!r} is no {self.kind}", where)
+            title = getattr(thing, "__qualname__", "") or shown(thing)
+            raise InputError(f"{title} is no {self.kind} with a name", where, "derive it from the family's base class")
         name, member = found
         standing = self.all().get(name)
+        if standing is not None and _same(standing, member):
+            return name
+        check = getattr(member, "check_formulas", None)
+        if callable(check) and not isinstance(member, type):
+            check(where)
         gives_way = getattr(standing, "gives_way", False)
         if standing is not None and standing is not member and not gives_way and _source(standing) != _source(member):
             what = f"the {self.kind} '{name}' is there already, in {_source(standing)[0]}"
@@ -93,6 +103,27 @@ class Family(Generic[Member]):
         for watcher in self._watchers:
             watcher(name, member)
         return name
+
+    def portable(self, name: str) -> Member | type | str:
+        """What stands for a member in another process: its class, or the instance that was given, where this program
+        added it; else its name."""
+        if name in self._announced_names or name not in self._added:
+            return name
+        member = self._added[name]
+        return type(member) if not isinstance(member, type) and getattr(type(member), "name", "") == name else member
+
+    def spelled(self, name: str) -> str:
+        """How a text names a member in another process: FILE.py:NAME of one that this program added, else its name.
+
+        NAME is that of its class; of an instance that a module holds, the name that it has there.
+        """
+        if self.portable(name) == name:
+            return name
+        member = self._added[name]
+        file, title = _source(member)
+        held = vars(sys.modules.get(_class_of(member).__module__, sys))
+        title = next((one for one, value in held.items() if value is member), title)
+        return f"{file}:{title}" if file.endswith(".py") and title.isidentifier() else name
 
     def watch(self, watcher: Callable[[str, Member], None]) -> None:
         """Call `watcher(name, member)` for every member that is added from now on; the same one only once."""
@@ -106,7 +137,7 @@ class Family(Generic[Member]):
         """What an installed package brings; a broken one costs a warning and nothing else."""
         where = f"entry point {self.group}: {point.name} = {point.value}"
         try:
-            self.add(point.load(), where)
+            self._announced_names.add(self.add(point.load(), where))
         except Exception as error:  # a package of somebody else's
             warnings.warn(f"{where} is left out: {type(error).__name__}: {error}", GonioWarning, stacklevel=4)
 
@@ -159,6 +190,23 @@ def family_of(thing: object) -> Family[object]:
     return family
 
 
+def _class_of(member: object) -> type:
+    return member if isinstance(member, type) else type(member)
+
+
+def _same(standing: object, member: object) -> bool:
+    """Whether one member can stand for another: the same, or instances of one class with the same values."""
+    if standing is member:
+        return True
+    if isinstance(standing, type) or isinstance(member, type) or type(standing) is not type(member):
+        return False
+    return _settings(standing) == _settings(member)
+
+
+def _settings(member: object) -> dict[str, str]:
+    return {name: repr(value) for name, value in getattr(member, "__dict__", {}).items() if not name.startswith("_")}
+
+
 def _source(member: object) -> tuple[str, str]:
     """File (or module) and name of a member: the same for a class that was loaded anew."""
     thing = member if isinstance(member, type) or callable(member) else type(member)
@@ -180,11 +228,23 @@ def subclasses_of(base: type[Member]) -> Callable[[object], tuple[str, type[Memb
 
 
 def instances_of(base: type[Member]) -> Callable[[object], tuple[str, Member] | None]:
-    """As `subclasses_of`, for families whose members need no parameters: one instance of each class."""
+    """As `subclasses_of`, for families whose members are instances: the one that a class makes without arguments, or
+    one that is given, whose values are then part of its name: "gtr-gamma-1.5"."""
 
     def member(thing: object) -> tuple[str, Member] | None:
+        if isinstance(thing, base):
+            name = str(getattr(thing, "name", ""))
+            given = "name" in getattr(thing, "__dict__", {})
+            values = [] if given else [f"-{key}-{value}" for key, value in sorted(_settings(thing).items())]
+            return (name + "".join(values).replace(" ", ""), thing) if name else None
         found = of_class(thing)
-        return None if found is None else (found[0], found[1]())
+        if found is None:
+            return None
+        try:
+            return found[0], found[1]()
+        except TypeError as error:
+            what = f"{getattr(thing, '__name__', thing)}() fails: {error}"
+            raise InputError(what, _source(thing)[0], "give its arguments defaults, or name an instance") from None
 
     of_class = subclasses_of(base)
     return member

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 from .arguments import checked
+from .errors import out_of_loop
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -46,6 +47,11 @@ def alone(call: Callable[P, R]) -> Callable[P, R]:
         with COMPUTING:
             try:
                 return call(*args, **kwargs)
+            except RuntimeError as error:
+                cause = out_of_loop(error)
+                if cause is error:
+                    raise
+                raise cause from error
             finally:
                 settle()
 

@@ -27,7 +27,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..material import tree
 from ..material.bsdf import BSDF
-from ..material.parameters import IndexParameter, Parameter, Value
+from ..material.parameters import ChoiceParameter, IndexParameter, Parameter, Value
 from ..optics.indices import DispersiveIndex
 from . import documents, library, outside
 from .texts import apart, assignment, class_named, split, taken_apart
@@ -175,7 +175,8 @@ def typed(parameter: Parameter, value: Value) -> object:
     if parameter.kind == "choice":
         name = value.strip().strip('"') if isinstance(value, str) else value
         # a distribution or a masking term of the user's own
-        return outside.member(name, where=where) if isinstance(name, str) and outside.names_code(name) else name
+        family = getattr(parameter, "family", None)
+        return outside.member(name, None, where, family) if isinstance(name, str) and outside.names_code(name) else name
     if parameter.kind == "flag":
         if str(value).lower() not in ("true", "false"):
             raise InputError(f"'{value}' given, true or false expected", where)
@@ -193,7 +194,7 @@ def typed(parameter: Parameter, value: Value) -> object:
 def written(value: Value) -> str:
     """A value as `typed` takes it, a material with the parameters that are not the default."""
     if isinstance(value, BSDF):
-        inner = ",".join(f"{name}={written(v)}" for name, v in settings(value).items())
+        inner = ",".join(f"{name}={setting(value, name, v)}" for name, v in settings(value).items())
         return f"{spelled(type(value))}({inner})" if inner else spelled(type(value))
     if isinstance(value, bool | np.bool_):
         return str(bool(value)).lower()
@@ -204,6 +205,18 @@ def written(value: Value) -> str:
     if isinstance(value, float | int | np.floating | np.integer):
         return f"{value:.6g}"
     return str(value)
+
+
+def setting(material: object, path: str, value: Value) -> str:
+    """The value of a material's parameter as `typed` takes it in any process: as `written`, and FILE.py:NAME of a
+    distribution, or another member, that this program alone knows.
+
+    path  "alpha", "base.ndf"
+    """
+    above, _, name = path.rpartition(".")
+    owner = tree.value_at(material, above) if above and isinstance(material, BSDF) else material
+    parameter = owner.parameters().get(name) if isinstance(owner, BSDF) else None
+    return parameter.spelled(value) if isinstance(parameter, ChoiceParameter) else written(value)
 
 
 def as_json(material: BSDF) -> dict[str, object]:
@@ -222,7 +235,8 @@ def as_json(material: BSDF) -> dict[str, object]:
         elif material.parameters()[name].kind == "file":
             found[name] = os.path.abspath(os.path.expanduser(value))
         elif isinstance(value, bool | str):
-            found[name] = value
+            parameter = material.parameters()[name]
+            found[name] = parameter.spelled(str(value)) if isinstance(parameter, ChoiceParameter) else value
         elif isinstance(value, DispersiveIndex):
             found[name] = value.constants.name
         else:
@@ -245,6 +259,17 @@ def from_json(described: Mapping[str, object]) -> BSDF:
     """The material that `as_json` describes."""
     fields = dict(described)
     return made(class_named(str(fields.pop("type")), "material"), fields)[0]
+
+
+def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
+    """The material with other values, by path: text, or what JSON has for them. InputError for what cannot be."""
+    typed_values = {}
+    for path, value in values.items():
+        above, _, name = path.rpartition(".")
+        owner = tree.value_at(material, above) if above else material
+        parameter = owner.parameters().get(name) if isinstance(owner, BSDF) else None
+        typed_values[path] = value if parameter is None else typed(parameter, value)
+    return tree.replace(material, typed_values, "--param")
 
 
 def settings(material: BSDF) -> dict[str, Value]:

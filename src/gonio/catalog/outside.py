@@ -6,36 +6,36 @@ in a program, and by the reader of scenes where code is allowed.
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import inspect
-import re
-import sys
-import traceback
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
-from .. import members
-from ..errors import GonioError, InputError, did_you_mean
+from ..errors import GonioError, InputError
 from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.sample import Sample
-from ..ops import RecordingError
+from ..models.user_code import (
+    PREFIX,
+    files_in,
+    forget,
+    is_outside,
+    line_in,
+    member,
+    module_of,
+    names_code,
+    place_of,
+    thing,
+    with_imports,
+)
+from ..ops import ForbiddenOperator, RecordingError
 from ..owner import alone
 
-_CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w+)")
-PREFIX = "gonio_file_"  # of the names under which such modules stand in sys.modules
-
-Stamp = tuple[int, int]
-_loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
-
-
-def names_code(text: str) -> bool:
-    """Whether a text is FILE.py:CLASS."""
-    return _CODE.fullmatch(text.strip()) is not None
+__all__ = [
+    "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",
+    "names_code", "names_data", "probe", "reader_of", "thing", "with_imports",
+]  # fmt: skip
 
 
 def reader_of(text: str) -> type[BSDF] | None:
@@ -52,32 +52,13 @@ def load(text: str, folder: Path | None = None, where: str = "MODEL") -> type[BS
     return _material(thing(text, folder, where))
 
 
-def member(text: str, folder: Path | None = None, where: str = "MODEL") -> str:
-    """The name of what FILE.py:CLASS names: a distribution, a masking term or another member, which is registered."""
-    named = thing(text, folder, where)
-    return members.family_of(named).add(named, f"{inspect.getsourcefile(named)}{_line_of(named)}")
-
-
-def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> type:
-    """The class that FILE.py:CLASS names, whatever it is; see `load`."""
-    match = _CODE.fullmatch(text.strip())
-    if match is None:
-        raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
-    try:
-        path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
-        raise InputError(f"'{match['file']}' is no path of a file: {error}", where, "FILE.py:CLASS") from None
-    module, name = module_of(path, where), match["name"]
-    named = vars(module).get(name)
-    if not isinstance(named, type):
-        own = [n for n, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__]
-        raise InputError(f"no class '{name}' in it", str(path), did_you_mean(name, own) if own else "it has none")
-    return named
-
-
-def _material(cls: type) -> type[BSDF]:
+def _material(cls: object) -> type[BSDF]:
     """The class itself as a material; InputError where it cannot be one."""
-    place = f"{inspect.getsourcefile(cls)}{_line_of(cls)}"
+    place = place_of(cls)
+    family = getattr(cls, "family", BSDF.family)
+    if family is not BSDF.family or not isinstance(cls, type):
+        hint = f"a material takes it: conductor(ndf=FILE.py:{getattr(cls, '__name__', 'NAME')})"
+        raise InputError(f"a {family.kind} given, the class of a material expected", place, hint)
     if not issubclass(cls, BSDF):
         return adopt(cls, place)
     if cls.eval is BSDF.eval:
@@ -87,11 +68,6 @@ def _material(cls: type) -> type[BSDF]:
         what = f"{cls.__name__} shadows Gonio's material '{cls.name}'"
         raise InputError(what, place, f"give the class another name, such as My{cls.__name__}")
     return cls
-
-
-def files_in(text: str) -> list[Path]:
-    """The files that a material's text names, those of inner materials and members too."""
-    return [Path(match["file"]) for match in re.finditer(r"(?P<file>[^({=,\s]+\.py):\w+", text)]
 
 
 def adopt(cls: type, where: str = "") -> type[BSDF]:
@@ -125,80 +101,6 @@ def _forward(inner: object, name: str) -> Callable[..., object]:
     return forwarded
 
 
-def forget() -> None:
-    """Run files anew when they are asked for next, also those that did not change: what they import may have."""
-    _loaded.clear()
-
-
-def is_outside(cls: type) -> bool:
-    """Whether a class came from a file that `load` ran."""
-    return cls.__module__.startswith(PREFIX)
-
-
-# --------------------------------------------------------------------------- running a file
-
-
-def module_of(path: Path, where: str) -> ModuleType:
-    """The file's module, run where it has not been since it was saved."""
-    try:
-        about = path.stat()
-        source = path.read_bytes() if path.is_file() else None
-    except (OSError, ValueError) as error:
-        raise InputError(f"no file '{path}'", where, str(getattr(error, "strerror", "") or "")) from None
-    if source is None:
-        raise InputError(f"'{path}' is no file", where)
-    stamp = (about.st_mtime_ns, about.st_size)
-    if path in _loaded and _loaded[path][0] == stamp:
-        return _loaded[path][1]
-    name = PREFIX + hashlib.sha256(str(path).encode("utf-8", "surrogateescape")).hexdigest()[:16]
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    before = sys.modules.get(name)
-    sys.modules[name] = module  # dataclasses and pickles look a class's module up
-    sys.path.insert(0, str(path.parent))  # a file may import its neighbours
-    try:
-        exec(compile(source, str(path), "exec"), vars(module))
-    except (KeyboardInterrupt, GeneratorExit):
-        raise
-    except BaseException as error:
-        sys.modules.pop(name)
-        if before is not None:
-            sys.modules[name] = before
-        raise _located(error, path) from error
-    finally:
-        sys.path.remove(str(path.parent))
-    _loaded[path] = stamp, module
-    return module
-
-
-def _located(error: BaseException, path: Path) -> GonioError:
-    """What went wrong while a file ran, with file and line."""
-    if isinstance(error, SyntaxError) and error.filename:
-        text = f": {error.text.strip()}" if error.text else ""
-        return InputError(
-            f"{type(error).__name__}: {error.msg}{text}", f"{error.filename}:{error.lineno}", "mend the line"
-        )
-    place = line_in(error, path) or str(path)
-    if isinstance(error, GonioError):
-        return InputError(error.what, f"{place}: {error.where}" if error.where else place, error.hint)
-    text = str(error).strip().partition("\n")[0]
-    return InputError(f"{type(error).__name__}: {text}" if text else type(error).__name__, place, "the file must run")
-
-
-def line_in(error: BaseException, path: Path) -> str:
-    """file:line of the innermost call in a file, "" where there is none."""
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
-    return f"{path}:{frames[-1].lineno}" if frames else ""
-
-
-def _line_of(cls: type) -> str:
-    try:
-        return f":{inspect.getsourcelines(cls)[1]}"
-    except (OSError, TypeError):
-        return ""
-
-
 # --------------------------------------------------------------------------- trying a material
 
 
@@ -209,6 +111,35 @@ def probe(material: BSDF) -> BSDF:
     if any(is_outside(type(inner)) for _, inner in tree.walk(material)):
         _try(material)
     return material
+
+
+@alone
+def check_operators(material: BSDF) -> BSDF:
+    """The material itself; InputError, with file and line, where a formula of the user's has `**` on a value.
+
+    Formulas are recorded only where their file has the operator at all: the verifier runs others, also those that never
+    end, under its own watch.
+    """
+    classes = {type(inner) for _, inner in tree.walk(material)}
+    files = [_file_of(cls) for cls in classes if not cls.__module__.startswith("gonio.")]
+    if not any(file and "**" in Path(file).read_text(encoding="utf-8", errors="replace") for file in files):
+        return material
+    for formula in ("eval", "pdf", "sample"):
+        try:
+            material.record(formula)
+        except ForbiddenOperator as error:
+            if "`**`" in error.what:
+                raise InputError(error.what, error.where, error.hint) from error
+        except Exception:
+            continue  # for a law to report
+    return material
+
+
+def _file_of(cls: type) -> str:
+    try:
+        return inspect.getsourcefile(cls) or ""
+    except (OSError, TypeError):  # typed at a prompt
+        return ""
 
 
 WO = np.array([[0.0, 0.6, 0.8], [0.36, -0.48, 0.8]])
@@ -229,7 +160,7 @@ def _recorded(material: BSDF, formula: str, path: Path) -> bool:
     try:
         result = material.record(formula).entry.result
     except RecordingError as error:
-        if "`if`" in error.what:  # a single ray would pass it unseen
+        if isinstance(error, ForbiddenOperator):  # a single ray would pass it unseen
             raise InputError(error.what, error.where, error.hint) from error
         return False
     except Exception:

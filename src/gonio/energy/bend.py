@@ -59,7 +59,7 @@ def form_of(ndf: str, masking: str, side: str = "") -> Form:
     """The form of a table: of a metal, or of a side of glass."""
     if not term(masking).smith:
         return FORMS["schlick-glass" if side else "schlick"]
-    kind = "ggx" if distribution(ndf).long_tailed else "narrow"
+    kind = "ggx" if distribution(ndf).falls_slowly else "narrow"
     return FORMS[f"{side}-{kind}" if side else kind]
 
 

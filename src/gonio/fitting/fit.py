@@ -152,7 +152,9 @@ def moving_of(
     material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
     given = dict(fixed or {})
     if given:
-        material = tree.replace(material, given)
+        texts = {path: value for path, value in given.items() if isinstance(value, str)}
+        others = {path: value for path, value in given.items() if path not in texts}
+        material = tree.replace(notation.changed(material, texts), others)
     moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
     return material, [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
 

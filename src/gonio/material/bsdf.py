@@ -432,7 +432,8 @@ class BSDF(Material):
         return hash((type(self), *(_hashable(getattr(self, name)) for name in self.parameters())))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return tree.rebuild_from, (type(self), {name: getattr(self, name) for name in self.parameters()})
+        values = {name: parameter.portable(getattr(self, name)) for name, parameter in self.parameters().items()}
+        return tree.rebuild_from, (type(self), values)
 
 
 def _folders() -> list[str]:

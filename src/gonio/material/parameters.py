@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GonioWarning, InputError, did_you_mean
+from ..members import Family
+from ..models import user_code
 from ..ops import Pair, Scalar, Spectrum, backend, graph, sincos
 from ..optics import indices
 
@@ -146,6 +148,10 @@ class Parameter:
         self.check(value, where)
         return value
 
+    def portable(self, value: object) -> object:
+        """What a pickled material has in the value's place."""
+        return value
+
     def bind(self, value: object, types: backend.Types) -> Value:
         """The value as Dr.Jit values of these types; what shapes the code stays as it is."""
         return value
@@ -161,6 +167,9 @@ class Parameter:
     def rows(self, value: object) -> int:
         """How many rays the value has entries for, 1 where it is the same for all."""
         return 1
+
+
+Choices: TypeAlias = "Mapping[str, str] | Callable[[], Mapping[str, str]] | Family[Any]"
 
 
 class _Numeric(Parameter):
@@ -299,15 +308,32 @@ class ChoiceParameter(Parameter):
     """A choice between names; it shapes the code, so it is known before anything runs."""
 
     kind = "choice"
-    members: Mapping[str, str] | Callable[[], Mapping[str, str]] = dataclasses.field(default_factory=dict)
+    members: Choices = dataclasses.field(default_factory=dict)
 
     @property
     def choices(self) -> dict[str, str]:
+        if isinstance(self.members, Family):
+            return self.members.titles()
         return dict(self.members() if callable(self.members) else self.members)
 
     @property
     def range(self) -> str:
         return " | ".join(self.choices)
+
+    def taken(self, value: object, where: str) -> Value:
+        return super().taken(user_code.member_name(value, where, self.family), where)
+
+    @property
+    def family(self) -> Family[Any] | None:
+        """The family whose members may be chosen; None of a choice between plain names."""
+        return self.members if isinstance(self.members, Family) else None
+
+    def spelled(self, name: str) -> str:
+        """The name as a text for another process: FILE.py:NAME of a member that this program alone has."""
+        return name if self.family is None else self.family.spelled(name)
+
+    def portable(self, value: object) -> object:
+        return value if self.family is None or not isinstance(value, str) else self.family.portable(value)
 
     def check(self, value: object, where: str) -> None:
         known = self.choices
@@ -424,15 +450,21 @@ def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
     return _declare(AngleParameter, default, doc, unit="rad")
 
 
-def choice(
-    default: str, doc: str, choices: Mapping[str, str] | Callable[[], Mapping[str, str]], *, white: str | None = None
-) -> str:
+def choice(default: object, doc: str, choices: Choices, *, white: str | None = None) -> Value:
     """Declare a choice between names; it shapes the code, so it is known before anything runs.
 
-    choices  name -> what it means, or a function that returns them (members may be registered later)
+    default  a name; of a family's members also a class or an instance, or FILE.py:CLASS beside the file that says so
+    choices  name -> what it means, or a function that returns them; or a family, `go.NDF.family`, whose members may be
+             given as classes, instances and FILE.py:CLASS too
     white    the name that stands in the material's white twin, such as F = 1
     """
-    return _declare(ChoiceParameter, default, doc, members=choices, white=white)
+    return _declare(
+        ChoiceParameter,
+        user_code.member_name(default, "choice", choices if isinstance(choices, Family) else None),
+        doc,
+        members=choices,
+        white=white,
+    )
 
 
 def flag(default: bool, doc: str) -> bool:

@@ -18,14 +18,15 @@ from typing import Protocol, TypeVar, overload
 from ..errors import InputError
 from . import graph
 from .backend import drjit, get_precision, in_formula, is_drjit, set_precision, types_like
-from .graph import Graph, Node, RecordingError, record
+from .graph import ForbiddenOperator, Graph, Node, RecordingError, record
 from .interpolation import fetch, inset, lookup
 from .table import Table
 from .types import Direction, Mask, Mode, Pair, Precision, Scalar, Spectrum, Value, Vector, Vector3
 
 __all__ = [
-    "Direction", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar", "Spectrum",
-    "Table", "Vector", "Vector3", "abs", "atan2", "channels", "clamp", "copysign", "cos", "dot", "erf", "exp",
+    "Direction", "ForbiddenOperator", "Graph", "Mask", "Mode", "Node", "Pair", "Precision", "RecordingError", "Scalar",
+    "Spectrum", "Table", "Vector", "Vector3", "abs", "atan2", "channels", "clamp", "copysign", "cos", "dot", "erf",
+    "exp",
     "fetch", "floor", "fma", "function", "get_precision", "inset", "inv_pi", "is_short", "is_single", "isfinite", "log",
     "lookup", "max_component", "maximum", "mean", "minimum", "norm", "normalize", "of_channels", "pi", "pow",
     "record", "rsqrt", "safe_div", "safe_sqrt", "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3",

@@ -41,6 +41,10 @@ class RecordingError(GonioError):
     """Code that the recorder cannot follow; names the file and line."""
 
 
+class ForbiddenOperator(RecordingError):
+    """Python that means something else on a value, or nothing: `if`, `and`, `**`. With some values it would run."""
+
+
 def _source_line() -> str:
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
@@ -124,9 +128,15 @@ class Node:
         return f"%{self.index}:{self.type}={self.op}"
 
     def __bool__(self) -> bool:
-        raise RecordingError(
+        raise ForbiddenOperator(
             "a Python `if`, `and`, `or` or `not` on a value", _source_line(), "use where(mask, a, b), &, | and ~"
         )
+
+    def __pow__(self, other: object) -> Node:
+        hint = "use ops.pow(x, p), which is 0 where x <= 0, or ops.sqr(x)"
+        raise ForbiddenOperator("`**` on a value, which is no number where x < 0", _source_line(), hint)
+
+    __rpow__ = __pow__
 
     def __getattr__(self, name: str) -> Node:
         if name in _COMPONENTS and _COMPONENTS[name] < _SIZES.get(self.type, 0):

@@ -10,6 +10,7 @@ Dr.Jit and shader agree. To put nodes on both ends of an axis, use `inset`.
 
 from __future__ import annotations
 
+import re
 from functools import reduce
 from itertools import product
 
@@ -21,12 +22,12 @@ from .backend import Array, Types, drjit
 class Table:
     """Numbers on a grid of one to three axes, with channels last; compared by identity, never changed.
 
-    name    what it holds, as shader code and manifests call it
+    name    what it holds, as shader code and manifests call it: other letters than those of an identifier become _
     values  shape (axis, ..., channels), float64
     """
 
     def __init__(self, name: str, values: np.ndarray) -> None:
-        self.name = name
+        self.name = re.sub(r"\W", "_", name)
         self.values = np.array(values, dtype=np.float64, order="C")
         self.values.setflags(write=False)
         self._arrays: dict[type, Array] = {}

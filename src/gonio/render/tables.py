@@ -26,7 +26,9 @@ from ..energy.tables import prefilter
 from ..energy.tables.baked import Baked, homework_pictures, load
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, is_model, models
-from ..optics.ndf import distributions
+from ..members import Family
+from ..optics.masking import Masking
+from ..optics.ndf import NDF, distributions
 from ..owner import public
 from ..pictures import images
 
@@ -75,6 +77,7 @@ def bake(
     Raises InputError for bad options or a folder that cannot be written, MachineError where the disk is full.
     """
     folder = None if output is None else files.check_folder(output)
+    ndf, masking = _named(ndf, NDF.family, "--ndf"), _named(masking, Masking.family, "--masking")
     if _is_picture(target, lut):
         others: dict[str, object] = {"size": size, "method": method, "spp": spp, "points": points, "seed": seed}
         others |= {"layout": layout, "aspect": aspect, "azimuths": azimuths, "store": store, "flip": flip}
@@ -180,10 +183,16 @@ def _target(target: str | Path | BSDF) -> str | BSDF:
     return notation.named(target)[0]
 
 
+def _named(text: str | None, family: Family[Any], option: str) -> str | None:
+    """The name of a distribution or a masking term that is given by name, or as FILE.py:CLASS."""
+    return outside.member(text, None, option, family) if text is not None and outside.names_code(text) else text
+
+
 def _own(target: str, name: str) -> str | BSDF:
     """A material of a file, or the name of a distribution there."""
     thing = outside.thing(name, where="TARGET")
-    return notation.named(target)[0] if issubclass(thing, BSDF) else outside.member(name, where="TARGET")
+    material = getattr(thing, "family", BSDF.family) is BSDF.family
+    return notation.named(target)[0] if material else outside.member(name, None, "TARGET", NDF.family)
 
 
 def _pictures(baked: Baked) -> dict[str, bytes]:

@@ -234,7 +234,8 @@ def _unpacked(known: Facts, folder: Path) -> Request:
     """The request, with its files in a folder of this machine."""
     text = json.dumps(known["request"])
     for path, content in known["files"].items():
-        inside = os.path.relpath(path, known["folder"]) if known["folder"] else Path(content, Path(path).name)
+        # code finds what it imports beside it
+        inside = os.path.relpath(path, known["folder"] or Path(path).anchor)
         target = folder / inside
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(crew.file(content), target)

@@ -9,6 +9,7 @@ registered later, or a class in a file beside the scene ("ward.py:Ward"), which 
 from __future__ import annotations
 
 import functools
+import inspect
 import math
 import threading
 import warnings
@@ -49,7 +50,7 @@ from ..catalog import documents, library, outside
 from ..catalog.documents import Document
 from ..errors import GonioError, GonioWarning, InputError
 from ..material import BSDF, Parameter, models
-from ..material.parameters import IndexParameter
+from ..material.parameters import ChoiceParameter, IndexParameter
 from ..measure import SAMPLE, parted
 from ..optics.dispersion import DispersiveIndex
 from .files import located
@@ -157,6 +158,17 @@ class MaterialPart(Part):
     def preset(self) -> str | None:
         found: str | None = self.__dict__.get(_attribute("preset"))
         return found
+
+    def code(self) -> list[Path]:
+        """The Python files of the user's that it runs: its own, those of a distribution, a masking term, ..., and what
+        these import from their folders."""
+        texts = [inspect.getsourcefile(self.model) or ""] if outside.is_outside(self.model) else []
+        for name, (value, _, _) in self.arguments().items():
+            parameter = self.model.parameters()[name]
+            if isinstance(parameter, ChoiceParameter) and isinstance(value, str):
+                spelled = parameter.spelled(value)
+                texts += [spelled.rpartition(":")[0]] if outside.names_code(spelled) else []
+        return [file for text in texts for file in outside.with_imports(Path(text))]
 
     def located(self, file: str, locate: Locate | None, pointer: str) -> str:
         """A file parameter's path: a scene's files lie in its folder, unless it may reach further."""
@@ -274,14 +286,49 @@ def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
     return check
 
 
+def _chosen(parameter: ChoiceParameter, key: str) -> Callable[[object, ValidationInfo], str]:
+    """What takes a name, also of a member that was registered since, or FILE.py:CLASS, where code is allowed."""
+
+    def check(value: object, info: ValidationInfo) -> str:
+        if isinstance(value, str) and parameter.family is not None and outside.names_code(value):
+            context = info.context or {}
+            if not context.get("allow_code"):
+                raise _no_code(value)
+            try:
+                return outside.member(value, context.get("folder"), key, parameter.family)
+            except InputError as error:
+                raise invalid(f"{error.where}: {error.what}", error.hint) from None
+        known = parameter.choices
+        if not isinstance(value, str) or value not in known:
+            *names, last = [f"'{name}'" for name in known]
+            expected = f"{', '.join(names)} or {last}" if names else last
+            raise PydanticCustomError("literal_error", "one of the names", {"expected": expected})
+        return value
+
+    return check
+
+
+def _choice_schema(parameter: ChoiceParameter) -> dict[str, Any]:
+    names: dict[str, Any] = {"type": "string", "enum": list(parameter.choices)}
+    return names if parameter.family is None else {"anyOf": [names, {"type": "string", "pattern": _CODE}]}
+
+
+_CODE = r"\.py:\w+$"
+
+
+def _no_code(name: str, key: str = "") -> PydanticCustomError:
+    hint = "read the file first; then --allow-code lets the scene run it"
+    return invalid(f"'{name}' is code, which a scene alone does not run", hint, key)
+
+
 def _doc(parameter: Parameter) -> str:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     return f"{parameter.name}: {parameter.doc}{unit}"
 
 
 def _field(parameter: Parameter, key: str, required: bool, doc: str = "") -> tuple[Any, Any]:
-    if parameter.kind == "choice":
-        kind: Any = Literal[tuple(parameter.choices)]
+    if isinstance(parameter, ChoiceParameter):
+        kind: Any = Annotated[str, PlainValidator(_chosen(parameter, key)), WithJsonSchema(_choice_schema(parameter))]
     else:
         of_kind = Index if isinstance(parameter, IndexParameter) else _KINDS[parameter.kind]
         kind = Annotated[of_kind, AfterValidator(_in_range(parameter, key))]
@@ -487,8 +534,7 @@ def _own(value: object, info: ValidationInfo) -> MaterialPart:
             known = ", ".join(f"'{one}'" for one in (*BY_TYPE, *Document.family.all()))
             raise PydanticCustomError("union_tag_invalid", "unknown type", {"tag": name, "expected_tags": known})
         if not context.get("allow_code"):
-            hint = "read the file first; then --allow-code lets the scene run it"
-            raise invalid(f"'{name}' is code, which a scene alone does not run", hint, "type")
+            raise _no_code(name, "type")
         try:
             code: Any = outside.load(name, context.get("folder"))
             part = _own_part(name, code)
@@ -521,6 +567,6 @@ else:
 
 def any_material(references: Iterable[dict[str, str]]) -> dict[str, Any]:
     """The schema of any material, from references to those of Gonio's."""
-    pattern = {"type": {"type": "string", "pattern": r"\.py:\w+$"}}
+    pattern = {"type": {"type": "string", "pattern": _CODE}}
     own = {"type": "object", "properties": pattern, "required": ["type"], "description": "A class in a file."}
     return {"oneOf": [*references, own]}

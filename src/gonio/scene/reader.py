@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import inspect
 import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -147,14 +146,16 @@ def _key(part: type[Part], field: str) -> str:
 def sources(description: SceneDescription) -> tuple[Callable[[], str], dict[str, Path]]:
     """What writes the scene as text, overrides and all, and the files it names: textures, meshes, Python that runs."""
     named: dict[str, Path] = {}
+    folder = description.folder.resolve()
     for where, part in parts(description):
         if (name := part.__dict__.get("file")) is not None:
             named[str(name)] = description.locate(name, f"{where}/file")
         if isinstance(part, MaterialPart) and part._source:
             named[part._source] = description.locate(part._source, where)
-        if isinstance(part, MaterialPart) and outside.is_outside(part.model):
-            code = Path(inspect.getsourcefile(part.model) or "")
-            named[code.name] = code
+        if isinstance(part, MaterialPart):
+            for code in part.code():
+                near = code.is_relative_to(folder)
+                named[code.relative_to(folder).as_posix() if near else str(code)] = code
 
     def text() -> str:
         return json.dumps(

@@ -11,6 +11,7 @@ import contextlib
 import dataclasses
 import functools
 import inspect
+import os
 import shlex
 import traceback
 from collections.abc import Callable, Mapping
@@ -19,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..catalog import notation
+from ..catalog import notation, outside
 from ..errors import GonioError, InputError
 from ..material import BSDF, Breach, Parameter, Sample, models, tree
 from ..material.sample import SampleArrays
@@ -181,7 +182,9 @@ class Subject:
         """A command line that puts this BSDF on trial again."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
-            parts += ["--param", f"{name}={notation.written(value)}"]
+            # a file of the user's as it is named from here
+            text = notation.setting(self.model, name, value).removeprefix(f"{Path.cwd()}{os.sep}")
+            parts += ["--param", f"{name}={text}"]
         return " ".join(part if part == "verify" else shlex.quote(part) for part in [*parts, *more])
 
     # ------------------------------------------------------------------ the protocol
@@ -314,4 +317,4 @@ def of(model: Any) -> Subject:
         return model
     if not isinstance(model, BSDF):
         raise InputError(f"{type(model).__name__} given, a material expected", "verify", "give a gonio.BSDF")
-    return Subject(model, notation.spelled(type(model)), notation.settings(model))
+    return Subject(outside.check_operators(model), notation.spelled(type(model)), notation.settings(model))

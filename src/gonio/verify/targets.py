@@ -73,9 +73,9 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         properties = {key: _property(value) for key, value in given.items()}
         plugin = foreign.plugin_in(head, properties)
         if plugin is not None:
-            return Subject(plugin, head, properties)
     cls, own = notation.taken_apart(target, "TARGET")
     bsdf, values = notation.made(cls, {**own, **given})
+    bsdf = outside.check_operators(bsdf)
     if kind is Kind.NAME:
         return Subject(bsdf, cls.name, values)
     # what a file describes stands there; what is set beside it is told

@@ -124,7 +124,7 @@ def stretch(ndf: str, masking: str) -> tuple[bend.Form, str]:
     """How the stretched axis bends mu into s, and the same in words."""
     if not term(masking).smith:
         return bend.Form(0, 1, 2.0), "sqrt(mu / (mu + 4 k)), k the masking's"
-    if distribution(ndf).long_tailed:
+    if distribution(ndf).falls_slowly:
         return bend.Form(0, 1, 4.0), "sqrt(mu / (mu + 4 alpha))"
     return bend.Form(1, 2, 4.0), "sqrt(mu / sqrt(mu^2 + (4 alpha)^2))"
 

@@ -31,7 +31,7 @@ class AshikhminShirley(_Glossy):
     exponent: Width = width(default=100.0, doc="falloff of the lobe; two for anisotropy", low=0.0, high=math.inf)
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
-    fresnel: str = choice("schlick", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
+    fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
     coupled: bool = flag(default=False, doc="the paper's diffuse part, which gives way to the lobe")
 
     breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}

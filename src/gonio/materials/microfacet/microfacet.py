@@ -47,17 +47,17 @@ def rotation_angle() -> Angle:
 
 def ndf_choice() -> str:
     """Declare the distribution of normals."""
-    return choice("ggx", "distribution of microfacet normals", lambda: NDF.family.titles())
+    return choice("ggx", "distribution of microfacet normals", NDF.family)
 
 
 def masking_choice() -> str:
     """Declare the masking term."""
-    return choice("smith-correlated", "masking and shadowing", lambda: masking.Masking.family.titles())
+    return choice("smith-correlated", "masking and shadowing", masking.Masking.family)
 
 
 def fresnel_choice() -> str:
     """Declare the Fresnel reflectance."""
-    return choice("exact", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
+    return choice("exact", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
 
 
 def sampling_choice() -> str:
@@ -81,6 +81,10 @@ class _Microfacet(BSDF):
         fresnel: str
         albedo: Colour
         sampling: str
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        distribution(self.ndf).check_widths(self.alpha, f"{type(self).__name__}.alpha")
 
     @property
     def delta(self) -> Delta:

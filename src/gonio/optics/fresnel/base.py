@@ -6,11 +6,12 @@ those of the metal over the index of the dielectric outside. Cosines, >= 0, are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ClassVar, TypeVar
 
 from ...members import Family, instances_of
 from ...ops import Scalar, Spectrum, fma, function, maximum, safe_sqrt, sqr, where
+from ..part import Part
 from ..special import gauss
 
 R = TypeVar("R", Scalar, Spectrum)
@@ -20,7 +21,7 @@ N = TypeVar("N", float, Scalar, Spectrum)
 NODES = 10
 
 
-class Fresnel:
+class Fresnel(Part):
     """Reflectance of unpolarized light at a smooth interface, at an angle and on average.
 
     The first line of a member's docstring is its title in the manual.
@@ -31,6 +32,16 @@ class Fresnel:
     name: ClassVar[str] = ""
     family: ClassVar[Family[Fresnel]]
     white: ClassVar[bool] = False
+    formulas: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "curve": ("float", "spectrum", "spectrum"),
+        "conductor": ("float", "spectrum", "spectrum", "spectrum"),
+        "dielectric": ("float", "float", "float", "float"),
+    }
+
+    def missing(self) -> str:
+        own = type(self)
+        both = own.conductor is not Fresnel.conductor and own.dielectric is not Fresnel.dielectric
+        return "" if both or own.curve is not Fresnel.curve else "curve(self, cos_i, r0)"
 
     def curve(self, cos_i: Scalar | float, r0: R) -> R:
         """Reflectance under cos_i of an interface that reflects r0 at normal incidence."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ...members import Family, instances_of
 from ...ops import Direction, Pair, Scalar, dot, function, where
-from ..ndf import NDF
+from ..ndf import NDF, distribution
+from ..part import Part
 
 
-class Masking:
+class Masking(Part):
     """Masking and shadowing G of a pair of directions, made from a distribution of normals and its widths.
 
     The first line of a member's docstring is its title in the manual.
@@ -21,6 +23,16 @@ class Masking:
     name: ClassVar[str] = ""
     family: ClassVar[Family[Masking]]
     smith: ClassVar[bool] = True
+    formulas: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "reflected": ("ndf", "vec3", "vec3", "vec3", "vec2", "float"),
+        "transmitted": ("ndf", "vec3", "vec3", "vec3", "vec2", "float"),
+    }
+
+    def missing(self) -> str:
+        return "" if type(self).reflected is not Masking.reflected else "reflected(self, ndf, wo, wi, m, alpha)"
+
+    def _given(self, kind: str) -> object:
+        return distribution("ggx")
 
     def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """G of two directions on the same side of the surface, m the normal that mirrors one into the other."""

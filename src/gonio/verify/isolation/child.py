@@ -84,9 +84,12 @@ def object_(material: Any) -> Item:
     if not isinstance(material, BSDF):
         material = getattr(material, "model", material)
     if isinstance(material, BSDF):
-        classes = [type(inner) for _, inner in tree.walk(material)]
+        classes: list[type] = [type(inner) for _, inner in tree.walk(material)]
+        parts = (leaf.parameter.portable(leaf.value) for leaf in tree.leaves(material) if not leaf.parameter.numeric)
+        classes += [part if isinstance(part, type) else type(part) for part in parts]  # distributions and their like
         if any(outside.is_outside(cls) for cls in classes):
-            settings = [f"{name}={notation.written(value)}" for name, value in notation.settings(material).items()]
+            values = notation.settings(material).items()
+            settings = [f"{name}={notation.setting(material, name, value)}" for name, value in values]
             return Item(notation.spelled(type(material)), tuple(settings))
         with contextlib.suppress(Exception):
             if not any(cls.__module__ == "__main__" for cls in classes):

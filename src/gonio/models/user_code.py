@@ -1,0 +1,210 @@
+"""Python files of the user's own: FILE.py:NAME, which is code.
+
+A file runs only where the user named it, or allowed a scene to: on the command line, in a program, in another such
+file, and in scenes where code is allowed.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import inspect
+import re
+import sys
+import traceback
+from pathlib import Path
+from types import FrameType, ModuleType
+from typing import Any
+
+from .. import members
+from ..errors import GonioError, InputError, did_you_mean
+
+_CODE = re.compile(r"(?P<file>.+\.py):(?P<name>\w+)")
+PREFIX = "gonio_file_"  # of the names under which such modules stand in sys.modules
+
+Stamp = tuple[int, int]
+_loaded: dict[Path, tuple[Stamp, ModuleType]] = {}
+
+
+def names_code(text: str) -> bool:
+    """Whether a text is FILE.py:CLASS."""
+    return _CODE.fullmatch(text.strip()) is not None
+
+
+def member(
+    text: str, folder: Path | None = None, where: str = "MODEL", family: members.Family[Any] | None = None
+) -> str:
+    """The name of what FILE.py:NAME names: a distribution, a masking term or another member, which is registered.
+
+    family  what it must be a member of; InputError for another's
+    """
+    named = thing(text, folder, where)
+    return _added(named, place_of(named), family)
+
+
+def member_name(value: object, where: str, family: members.Family[Any] | None = None) -> object:
+    """The name of a member that a program hands over: a class of a family or an instance of one, which is registered,
+    or FILE.py:NAME, from the folder of the file that says so. Whatever else is given is returned as it stands.
+
+    A text runs code only where a program's own line calls Gonio with it: not from scenes, pages or documents.
+    """
+    if isinstance(value, str):
+        folder = _folder_of_caller() if names_code(value) else None
+        return value if folder is None else member(value, folder, where, family)
+    return _added(value, where, family) if isinstance(getattr(value, "family", None), members.Family) else value
+
+
+def _added(named: object, where: str, family: members.Family[Any] | None) -> str:
+    own = members.family_of(named)
+    if family is not None and own is not family:
+        what = f"{getattr(named, '__name__', type(named).__name__)} is a {own.kind}, a {family.kind} expected"
+        raise InputError(what, where, "known: " + ", ".join(family.all()))
+    return own.add(named, where)
+
+
+def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object:
+    """What FILE.py:NAME names: a class, or an instance of a distribution, a masking term or another member.
+
+    folder  what a relative path starts from; the current folder if not given
+    """
+    match = _CODE.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
+    try:
+        path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
+        raise InputError(f"'{match['file']}' is no path of a file: {error}", where, "FILE.py:CLASS") from None
+    module, name = module_of(path, where), match["name"]
+    named = vars(module).get(name)
+    if not isinstance(named, type) and not isinstance(getattr(named, "family", None), members.Family):
+        own = [n for n, v in vars(module).items() if isinstance(v, type) and v.__module__ == module.__name__]
+        raise InputError(f"no class '{name}' in it", str(path), did_you_mean(name, own) if own else "it has none")
+    return named
+
+
+_CONSTRUCTING = ("gonio.material.bsdf", "gonio.material.parameters", __name__)  # who a constructor's call goes through
+
+
+def _folder_of_caller() -> Path | None:
+    """The folder of the file whose line called the constructor of a material, or declared a parameter; the current one
+    at a prompt. None where that is a line of Gonio's, which hands on what a scene or a page says."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        code, module = frame.f_code, str(frame.f_globals.get("__name__", ""))
+        generated = code.co_name == "__init__" and code.co_filename.startswith("<")
+        if not generated and code.co_name != "__post_init__" and module not in _CONSTRUCTING:
+            break
+        frame = frame.f_back
+    if frame is None or module.partition(".")[0] == __name__.partition(".")[0]:
+        return None
+    file = Path(frame.f_code.co_filename)
+    return file.resolve().parent if file.is_file() else Path()
+
+
+def files_in(text: str) -> list[Path]:
+    """The files that a material's text names, those of inner materials and members too."""
+    return [Path(match["file"]) for match in re.finditer(r"(?P<file>[^({=,\s]+\.py):\w+", text)]
+
+
+def with_imports(path: Path) -> list[Path]:
+    """A Python file, and those beside it that it imports, and so on: what it says depends on all of them."""
+    found: dict[Path, None] = {}
+    waiting = [path]
+    while waiting:
+        file = waiting.pop()
+        if file in found:
+            continue
+        found[file] = None
+        try:
+            nodes = list(ast.walk(ast.parse(file.read_bytes())))
+        except (OSError, SyntaxError, ValueError):
+            continue
+        names = [name.name for node in nodes if isinstance(node, ast.Import) for name in node.names]
+        names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+        for first in {name.partition(".")[0] for name in names}:
+            # "" is `from . import`: all of the package
+            package = path.parent / first if first else file.parent
+            beside = [
+                path.parent / f"{first}.py",
+                *(package.rglob("*.py") if (package / "__init__.py").is_file() else []),
+            ]
+            waiting += [one for one in beside if one.is_file()]
+    return list(found)
+
+
+def forget() -> None:
+    """Run files anew when they are asked for next, also those that did not change: what they import may have."""
+    _loaded.clear()
+
+
+def is_outside(cls: type) -> bool:
+    """Whether a class came from a file that `load` ran."""
+    return cls.__module__.startswith(PREFIX)
+
+
+# --------------------------------------------------------------------------- running a file
+
+
+def module_of(path: Path, where: str) -> ModuleType:
+    """The file's module, run where it has not been since it was saved."""
+    try:
+        about = path.stat()
+        source = path.read_bytes() if path.is_file() else None
+    except (OSError, ValueError) as error:
+        raise InputError(f"no file '{path}'", where, str(getattr(error, "strerror", "") or "")) from None
+    if source is None:
+        raise InputError(f"'{path}' is no file", where)
+    stamp = (about.st_mtime_ns, about.st_size)
+    if path in _loaded and _loaded[path][0] == stamp:
+        return _loaded[path][1]
+    name = PREFIX + hashlib.sha256(str(path).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    before = sys.modules.get(name)
+    sys.modules[name] = module  # dataclasses and pickles look a class's module up
+    sys.path.insert(0, str(path.parent))  # a file may import its neighbours
+    try:
+        exec(compile(source, str(path), "exec"), vars(module))
+    except (KeyboardInterrupt, GeneratorExit):
+        raise
+    except BaseException as error:
+        sys.modules.pop(name)
+        if before is not None:
+            sys.modules[name] = before
+        raise _located(error, path) from error
+    finally:
+        sys.path.remove(str(path.parent))
+    _loaded[path] = stamp, module
+    return module
+
+
+def _located(error: BaseException, path: Path) -> GonioError:
+    """What went wrong while a file ran, with file and line."""
+    if isinstance(error, SyntaxError) and error.filename:
+        text = f": {error.text.strip()}" if error.text else ""
+        return InputError(
+            f"{type(error).__name__}: {error.msg}{text}", f"{error.filename}:{error.lineno}", "mend the line"
+        )
+    place = line_in(error, path) or str(path)
+    if isinstance(error, GonioError):
+        return InputError(error.what, f"{place}: {error.where}" if error.where else place, error.hint)
+    text = str(error).strip().partition("\n")[0]
+    return InputError(f"{type(error).__name__}: {text}" if text else type(error).__name__, place, "the file must run")
+
+
+def line_in(error: BaseException, path: Path) -> str:
+    """file:line of the innermost call in a file, "" where there is none."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
+    return f"{path}:{frames[-1].lineno}" if frames else ""
+
+
+def place_of(thing: object) -> str:
+    """FILE:LINE of a class, or of that of an instance; what is known of it."""
+    cls = thing if isinstance(thing, type) else type(thing)
+    try:
+        file = inspect.getsourcefile(cls)
+        return f"{file}:{inspect.getsourcelines(cls)[1]}"
+    except (OSError, TypeError):
+        return cls.__qualname__

@@ -1,0 +1,107 @@
+"""What the parts of a microfacet material share: distributions of normals, masking terms and Fresnel kinds.
+
+Each is a class whose one instance is known by name. One of the user's own is tried when it joins its family: what is
+missing, or cannot run, is an error with its line then, instead of a failure deep inside a render.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Mapping
+from typing import ClassVar
+
+from .. import ops
+from ..errors import GonioError, InputError, summary, user_line
+from ..ops import backend, graph
+from ..ops.types import Value
+
+GUIDE = "docs/your-own-material.md, under 'A distribution, a masking term, a Fresnel kind'"
+SAMPLES = {"vec3": (0.36, 0.48, 0.8), "vec2": (0.3, 0.4), "spectrum": (0.2, 0.5, 0.9), "float": (0.6,)}
+
+
+class Part:
+    """Base of the three.
+
+    name      in options, scenes and manuals; made from the class name where a class does not give its own
+    formulas  method -> kinds of its arguments, and of what it returns; what is no kind of value `_given` gives
+    """
+
+    name: ClassVar[str] = ""
+    formulas: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    def __init_subclass__(cls, **more: object) -> None:
+        super().__init_subclass__(**more)
+        if "name" not in vars(cls):
+            words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", cls.__name__).lower().replace("_", "-")
+            cls.name = "" if words.startswith("-") else words
+
+    def missing(self) -> str:
+        """What must be written and is not, as its signature: "D(self, m, alpha)"; "" where nothing is missing."""
+        return ""
+
+    def check_formulas(self, where: str = "") -> None:
+        """Raise InputError where a formula is missing, cannot run, or returns what it must not."""
+        missing = self.missing()
+        if missing:
+            method = missing.partition("(")[0]
+            hint = f"write {missing}; see {GUIDE}"
+            raise InputError(f"{type(self).__name__} has no `{method}`", self.place() or where, hint)
+        for method, kinds in self.formulas.items():
+            formula = inspect.unwrap(getattr(type(self), method))
+            if not formula.__module__.startswith("gonio."):
+                self._try(method, kinds)
+
+    def place(self, method: str = "") -> str:
+        """FILE:LINE of the class, or of a method of it."""
+        try:
+            thing = inspect.unwrap(getattr(type(self), method)) if method else type(self)
+            return f"{inspect.getsourcefile(thing)}:{inspect.getsourcelines(thing)[1]}"
+        except (OSError, TypeError):
+            return ""
+
+    def _given(self, kind: str) -> object:
+        """What stands for an argument that is no value, such as a distribution."""
+        raise NotImplementedError(kind)
+
+    def _try(self, method: str, kinds: tuple[str, ...]) -> None:
+        """By recording, which compiles nothing; by running it where code is for Dr.Jit alone."""
+        formula = inspect.unwrap(getattr(type(self), method)).__get__(self)
+        *given, expected = kinds
+        names = list(inspect.signature(formula).parameters)[: len(given)]
+        try:
+            inspect.signature(formula).bind(*given)
+        except TypeError as error:
+            what = f"{method} of {type(self).__name__}: {error}; it is called with {len(given)} arguments and self"
+            raise InputError(what, self.place(method), f"see {GUIDE}") from None
+        values = {name: kind for name, kind in zip(names, given, strict=True) if kind in SAMPLES}
+        others: dict[str, Value] = {
+            name: self._given(kind) for name, kind in zip(names, given, strict=True) if kind not in SAMPLES
+        }
+        try:
+            kind = graph.type_of(graph.record(formula, types=values, name=method, **others).entry.result)
+        except ops.ForbiddenOperator as error:
+            raise InputError(error.what, error.where, error.hint) from error
+        except Exception:
+            self._run(method, given)
+            return
+        if kind != expected:
+            hint = "alpha is a pair: use alpha.x and alpha.y" if kind == "vec2" else "return one value per ray"
+            what = f"{method} of {type(self).__name__} returned a {kind}, a {expected} expected"
+            raise InputError(what, self.place(method), hint)
+
+    def _run(self, method: str, kinds: list[str]) -> None:
+        types = backend.types("float64")
+        values = [_sample(kind, types) if kind in SAMPLES else self._given(kind) for kind in kinds]
+        try:
+            getattr(self, method)(*values)
+        except GonioError:
+            raise
+        except Exception as error:
+            hint = f"it must run on Dr.Jit values, in the words of gonio.ops; see {GUIDE}"
+            raise InputError(summary(error), user_line(error) or self.place(method), hint) from error
+
+
+def _sample(kind: str, types: backend.Types) -> Value:
+    value = SAMPLES[kind]
+    return types.float([*value] * 2) if kind == "float" else backend.vector_of([value] * 2, len(value), types)
