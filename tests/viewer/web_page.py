@@ -24,6 +24,12 @@ PIXELS = """async (samples) => {
 }"""
 
 
+def decoded(found: Any) -> np.ndarray:
+    """The picture that `PIXELS` gives, (height, width, 4)."""
+    width, height, text, _ = found
+    return np.frombuffer(base64.b64decode(text), "<f4").reshape(height, width, 4)
+
+
 class Page:
     """A tab with the page, what it wrote on its console, and what it asked the network for."""
 
@@ -52,8 +58,7 @@ class Page:
 
     def picture(self, samples: int = 64) -> np.ndarray:
         """Mean radiance, (height, width, 4): RGB times coverage, coverage."""
-        width, height, text, _ = self.tab.evaluate(PIXELS, samples)
-        return np.frombuffer(base64.b64decode(text), "<f4").reshape(height, width, 4)
+        return decoded(self.tab.evaluate(PIXELS, samples))
 
     def control(self, label: str) -> Any:
         return self.tab.locator(".lil-controller", has=self.tab.locator(".lil-name", has_text=re.compile(f"^{label}")))

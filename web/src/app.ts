@@ -3,12 +3,14 @@ import { attachCamera } from "./camera";
 import type { PageData, Values, Vec3 } from "./data";
 import { type EnvironmentPicture, environmentFromData } from "./environment";
 import { Evaluator } from "./evaluator";
+import { type Flaw, described } from "./flaws";
+import { Inspector } from "./inspector";
 import { type MeshBuffers, type Mesh, shaderBall, torus, upload } from "./meshes";
 import type { App, Panel, Picked, Picture, Presenter } from "./panel";
 import { type Hit, hitBalls, hitSphere } from "./pick";
 import { type DrawnBall, Renderer, type Scene } from "./renderer";
-import { type Shader, ShaderLibrary, isNumeric } from "./shaders";
-import { Change, type State, Store, initialState } from "./state";
+import { type Shader, ShaderLibrary } from "./shaders";
+import { Change, type Slot, type State, Store, initialState } from "./state";
 import { decodeState, encodeState } from "./url";
 import { cameraFrame, cross, dot, normalize, pixelRay, sub } from "./vectors";
 
@@ -32,6 +34,7 @@ export class PageApp implements App {
   readonly gl: WebGL2RenderingContext;
   readonly shaders: ShaderLibrary;
   readonly renderer: Renderer;
+  private readonly inspector: Inspector;
   private ownEvaluator: Evaluator | null = null;
   environment: EnvironmentPicture | null = null;
   presenter: Presenter | null = null;
@@ -40,15 +43,19 @@ export class PageApp implements App {
   /** After a new picture, reference or picked point. */
   onRefresh: (what: Refresh) => void = () => {};
   onSay: (text: string, kind: "info" | "error") => void = () => {};
+  /** What the page waits for, by what makes it wait; null: no more. */
+  onBusy: (what: "shader" | "server", text: string | null) => void = () => {};
   /** A live page asks its server for a variant that is not here. */
   onMissingVariant: (slot: number) => void = () => {};
+  /** What is wrong with the picture, as a line; "" where nothing is. */
+  onFlaws: (text: string) => void = () => {};
   /** The user's file cannot be shown, and why; null where it can again. */
   onFault: (fault: Fault | null) => void = () => {};
   reference: Picture | null = null;
   private meshes: Partial<Record<State["view"]["mesh"], MeshBuffers>> = {};
   private pickedAt: Picked | null = null;
   private lastHit: Hit | null = null;
-  private lastShader = new Map<number, Shader>();
+  private lastShader = new Map<string, Shader>(); // by row and ball
   private changed = -Infinity;
   private steps = 1;
   private slow = false;
@@ -57,7 +64,10 @@ export class PageApp implements App {
   private scheduled = false;
   private dirty = false;
   private converging = false;
+  private failed = false;
+  private flawed = "";
   private resolveReady: () => void = () => {};
+  private rejectReady: (error: unknown) => void = () => {};
 
   constructor(
     readonly data: PageData,
@@ -71,9 +81,13 @@ export class PageApp implements App {
     this.store.state = this.fromLink();
     this.shaders = new ShaderLibrary(gl, data);
     this.renderer = new Renderer(gl, this.shaders);
-    this.ready = new Promise((resolve) => {
+    this.shaders.programs.onMaking = (titles) => this.onBusy("shader", titles.length ? `Compiling the shader of ${titles.join(", ")}` : null);
+    this.inspector = new Inspector(this, (flaws) => this.showFlaws(flaws));
+    this.ready = new Promise((resolve, reject) => {
       this.resolveReady = resolve;
+      this.rejectReady = reject;
     });
+    this.ready.catch(() => {}); // said on the page
     const pictured = data.scene.lights.find((l) => l.type === "environment" && l.image?.data);
     if (pictured?.type === "environment" && pictured.image?.data)
       this.environment = environmentFromData(gl, pictured.image.width, pictured.image.height, pictured.image.data);
@@ -110,7 +124,7 @@ export class PageApp implements App {
    * Other materials and rows in the place of the page's own, after the user's file was saved. What was changed on the
    * page stays, where what it belongs to is still there.
    */
-  renew(made: Pick<PageData, "revision" | "materials" | "scene">): void {
+  renew(made: Pick<PageData, "revision" | "materials" | "scene" | "dfg">): void {
     const { lights, view } = this.state;
     const changes = encodeState(this.state, this.store.initial);
     Object.assign(this.data, made);
@@ -125,37 +139,56 @@ export class PageApp implements App {
   // ---------------------------------------------------------------- the state, resolved
 
   /** Weights that are not off on some ball of a row. */
-  switchedOn(slot: number): string[] {
-    const { material, values, balls } = this.slot(slot);
+  switchedOn({ material, values, balls }: Slot): string[] {
     const parameters = this.shaders.material(material).variants[0]?.manifest.parameters ?? [];
     return parameters
       .filter(({ path, off, value }) => off !== null && balls.some(({ set }) => (set[path] ?? values[path] ?? value) !== off))
       .map(({ path }) => path);
   }
 
-  /** The shader that fits a row, or null where the page lacks it. */
-  fitting(slot: number): Shader | null {
-    const { material, choices } = this.slot(slot);
-    return this.shaders.find(material, choices, this.switchedOn(slot));
+  /** The shader that fits a ball, or null where the page lacks it. */
+  fitting(slot: number, ball: number): Shader | null {
+    return this.fit(this.slot(slot), ball);
   }
 
-  shaderOf(slot: number): Shader {
-    const { material } = this.slot(slot);
-    const found = this.fitting(slot);
+  private fit(row: Slot, ball: number): Shader | null {
+    return this.shaders.find(row.material, row.choices, this.wantedValues(row, ball), this.switchedOn(row));
+  }
+
+  /** Balls of a row whose shader the page lacks. */
+  lacking(row: Slot): number[] {
+    return row.balls.flatMap((_, ball) => (this.fit(row, ball) ? [] : [ball]));
+  }
+
+  /** Whether a row can be shown as it is, sooner or later: a page without a server keeps to what it holds. */
+  possible(row: Slot): boolean {
+    return Boolean(this.data.socket) || this.lacking(row).length === 0;
+  }
+
+  /** What draws a ball; without one that of the selected, where it is of this row, else of the first. */
+  shaderOf(slot: number, ball?: number): Shader {
+    const { selection } = this.state;
+    const { material, balls } = this.slot(slot);
+    const index = ball ?? (selection.slot === slot ? Math.min(selection.ball, balls.length - 1) : 0);
+    const found = this.fitting(slot, index);
+    const place = `${slot} ${index}`;
     if (found) {
-      this.lastShader.set(slot, found);
+      this.lastShader.set(place, found);
       return found;
     }
     // Until the server has written it, the last one that fitted.
-    const last = this.lastShader.get(slot);
+    const last = this.lastShader.get(place);
     return last?.material.id === material ? last : this.shaders.at(this.shaders.material(material), 0);
   }
 
+  /** What a ball is drawn with: what tables were found from has the values of its shader, also where others are wanted. */
   valuesOf(slot: number, ball: number): Values {
-    const values: Values = {};
-    for (const parameter of this.shaderOf(slot).manifest.parameters) if (isNumeric(parameter)) values[parameter.path] = parameter.value;
-    const { values: own, balls } = this.slot(slot);
-    return { ...values, ...own, ...balls[ball]?.set };
+    return { ...this.wantedValues(this.slot(slot), ball), ...this.shaderOf(slot, ball).variant.fixed };
+  }
+
+  /** Declared, then the row's, then the ball's own. */
+  wantedValues({ material, values, balls }: Slot, ball: number): Values {
+    return { ...this.shaders.declared(material), ...values, ...balls[ball]?.set };
   }
 
   visibleSlots(): number[] {
@@ -164,7 +197,7 @@ export class PageApp implements App {
     return slots.flatMap((slot, index) => (slot.visible ? [index] : []));
   }
 
-  private slot(index: number): State["slots"][number] {
+  slot(index: number): Slot {
     const slot = this.state.slots[index];
     if (!slot) throw new Error(`There is no row ${index}.`);
     return slot;
@@ -183,9 +216,9 @@ export class PageApp implements App {
   private rowsOf(visible: number[]): DrawnBall[] {
     const { spacing } = this.state.view;
     return visible.flatMap((slot, row) => {
-      const shader = this.shaderOf(slot);
       const { balls } = this.slot(slot);
       return balls.map((_, ball): DrawnBall => {
+        const shader = this.shaderOf(slot, ball);
         const center: Vec3 = [(ball - (balls.length - 1) / 2) * spacing, ((visible.length - 1) / 2 - row) * spacing, 0];
         return { slot, ball, shader, values: this.valuesOf(slot, ball), center };
       });
@@ -194,7 +227,7 @@ export class PageApp implements App {
 
   scene(): Scene {
     const minuend = this.comparesRows() ? this.rowsOf(this.visibleSlots().slice(0, 1)) : [];
-    return { state: this.state, balls: this.balls(), minuend, environment: this.environment, mesh: this.meshBuffers(), paper: this.paper() };
+    return { state: this.state, balls: this.balls(), minuend, environment: this.environment, mesh: this.meshBuffers(), paper: this.paper(), flaws: this.inspector.flaws };
   }
 
   private meshBuffers(): MeshBuffers | null {
@@ -223,7 +256,7 @@ export class PageApp implements App {
     if (change.touches("slots", "solo", "selection")) this.selectShown();
     if (change.touches("slots"))
       this.state.slots.forEach((_, index) => {
-        if (!this.fitting(index)) this.onMissingVariant(index);
+        if (this.lacking(this.slot(index)).length) this.onMissingVariant(index);
       });
     if (change.touches("slots", "selection", "camera", "view.mesh", "view.spacing", "solo")) this.repick();
     this.saveLink();
@@ -241,6 +274,7 @@ export class PageApp implements App {
   invalidate(): void {
     this.changed = performance.now();
     this.dirty = true;
+    this.inspector.changed();
     this.schedule();
   }
 
@@ -278,28 +312,62 @@ export class PageApp implements App {
     if (this.fence && !this.dirty) {
       if (this.gl.getSyncParameter(this.fence, this.gl.SYNC_STATUS) !== this.gl.SIGNALED) return this.schedule();
       this.learn(now - this.submitted, moving);
+      this.shaders.programs.drawn();
+      const done = this.renderer.done(this.scene());
+      if (!moving && this.inspector.due(done)) void this.inspector.look(done);
     }
+    try {
+      const scene = this.scene();
+      // The last picture stands, and the page stays alive, until the new one can be drawn.
+      if (!this.renderer.ready(scene)) return this.schedule();
+      this.resize(moving && this.slow ? 2 : 1);
+      if (this.dirty) this.renderer.invalidate();
+      this.dirty = false;
+      const steps = moving ? 1 : this.steps;
+      for (let i = 0; i < steps && !this.renderer.done(scene); i++) this.renderer.step(scene, moving);
+      this.renderer.present(scene, this.presenter, this.canvas.width, this.canvas.height);
+      this.submit(now);
+      this.resolveReady();
+      this.onRefresh("picture");
+      if (moving || !this.renderer.done(scene) || this.inspector.due(true)) this.schedule();
+      this.mended();
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** No picture can be drawn: that is said until one can. */
+  private fail(error: unknown): void {
+    const what = error instanceof Error ? error.message : String(error);
+    console.error(what);
+    this.failed = true;
+    this.onFault({ what, where: "The picture cannot be drawn", hint: "" });
+    this.shaders.programs.drawn();
+    this.rejectReady(error);
+  }
+
+  private mended(): void {
+    if (!this.failed) return;
+    this.failed = false;
+    this.onFault(null);
+  }
+
+  private showFlaws(flaws: readonly Flaw[]): void {
+    const text = described(flaws);
+    if (text && text !== this.flawed) console.warn(text);
+    if (text !== this.flawed) this.redraw();
+    this.flawed = text;
+    this.onFlaws(text);
+  }
+
+  /** Canvas and sums, these by so much coarser. */
+  private resize(coarse: number): void {
     const [width, height] = this.size();
     if (this.canvas.width !== width || this.canvas.height !== height) {
       this.canvas.width = width;
       this.canvas.height = height;
     }
-    const coarse = moving && this.slow ? 2 : 1;
     this.renderer.resize(width / coarse, height / coarse);
-    if (this.dirty) this.renderer.invalidate();
-    this.dirty = false;
-    try {
-      const scene = this.scene();
-      const steps = moving ? 1 : this.steps;
-      for (let i = 0; i < steps && !this.renderer.done(scene); i++) this.renderer.step(scene, moving);
-      this.renderer.present(scene, this.presenter, width, height);
-      this.submit(now);
-      this.resolveReady();
-      this.onRefresh("picture");
-      if (moving || !this.renderer.done(scene)) this.schedule();
-    } catch (error) {
-      this.say(error instanceof Error ? error.message : String(error), "error");
-    }
   }
 
   private submit(now: number): void {
@@ -333,13 +401,15 @@ export class PageApp implements App {
         this.changed = -Infinity;
         const wanted = () => !this.dirty && !renderer.done(scene) && (renderer.samples < samples || !renderer.settled);
         while (wanted()) {
-          for (let i = 0; i < 8 && wanted(); i++) renderer.step(scene, false);
+          if (renderer.ready(scene)) for (let i = 0; i < 8 && wanted(); i++) renderer.step(scene, false);
           await new Promise((resolve) => setTimeout(resolve));
         }
       } while (this.dirty); // changed meanwhile: the picture is that of the state it is returned with
     } finally {
       this.converging = false;
     }
+    this.shaders.programs.drawn();
+    await this.inspector.look(false);
     renderer.present(this.scene(), this.presenter, this.canvas.width, this.canvas.height);
     return this.picture();
   }

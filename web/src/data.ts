@@ -39,6 +39,8 @@ export interface Parameter {
   field: string | null;
   /** The value at which what a weight weighs is not there; null where there is none. */
   off: number | null;
+  /** Whether tables were found from its value: another value needs another variant. */
+  fixed: boolean;
 }
 
 export interface TableTexture {
@@ -79,10 +81,22 @@ export interface Variant {
   choices: Choices;
   /** Weights that it was written without: it does for balls that have them off. */
   off: string[];
+  /** Values that its tables were found from: it does for balls that have them so. */
+  fixed: Record<string, number | number[]>;
+  /** Distribution and masking of the facets that reflect in it; null where none do. */
+  facets: [string, string] | null;
   manifest: Manifest;
   text: string;
   /** Uniform name to little-endian float32 in base64, x fastest, channels last. */
   tables: Record<string, string>;
+}
+
+/** A and B of the split sum of some facets, over mu (x) and roughness (y), at texel centres. */
+export interface SplitSum {
+  facets: [string, string];
+  size: [number, number];
+  channels: 2;
+  data: string;
 }
 
 export interface Preset {
@@ -165,7 +179,7 @@ export interface PageData {
   display: { tone: Tone; exposure: number };
   /** What the reader should know of this scene, a line each. */
   notes?: string[];
-  dfg: null | { size: [number, number]; channels: 2; data: string };
+  dfg: SplitSum[];
 }
 
 /** Reads the JSON that page.py wrote into the document. */

@@ -5,14 +5,16 @@
  * into a row of float texels; where a browser cannot draw into floats, every pixel computes it again.
  */
 import type { Manifest, Values } from "./data";
-import { HEADER, type Program, type Shader } from "./shaders";
+import { HEADER, type Program, type Source } from "./programs";
+import type { Shader } from "./shaders";
+import { isLong } from "./size";
 
 const SIZES = { float: 1, vec2: 2, vec3: 3 } as const;
 
 /** Flat varyings: WebGL 2 promises 15 vectors a stage, of which a mesh needs four. */
 const MOST_VARYINGS = 11;
-/** Rows of texels kept, one for each set of parameters. */
-const MOST_KEPT = 64;
+/** Rows of texels kept, one for each set of parameters: more than there are balls in a picture. */
+const MOST_KEPT = 256;
 
 /** In as few vec4 as will hold it: what each holds, and the struct made again of `derived_0`, `derived_1`, ... */
 function packed(manifest: Manifest): { vectors: string[]; unpack: string } {
@@ -78,54 +80,65 @@ export class DerivedTables {
     return Boolean(gl.getExtension("EXT_color_buffer_float"));
   }
 
-  /** The row of a shader's parameters; `use` puts a program with its uniforms and tables in use. */
-  row(shader: Shader, values: Values, use: (vertex: string, fragment: string) => Program): WebGLTexture {
-    const fields = shader.manifest.fields.map(({ path }) => values[path]);
-    const key = `${shader.key} ${JSON.stringify(fields)}`;
+  /** What computes the rows of a shader. */
+  source(shader: Shader): Source {
+    const { manifest, code, text } = shader;
+    return {
+      key: `${code} derived`,
+      title: shader.material.title,
+      long: isLong(shader),
+      vertex: () => `${HEADER}void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0), 0.0, 1.0); }\n`,
+      fragment: () => {
+        const { vectors } = packed(manifest);
+        return `${HEADER}${text}
+uniform ${manifest.struct} material;
+layout(location = 0) out vec4 texel;
+void main() {
+${computed(manifest)}  vec4 all[${vectors.length}] = vec4[${vectors.length}](${vectors.join(", ")});
+  texel = all[int(gl_FragCoord.x)];
+}
+`;
+      },
+    };
+  }
+
+  /** The row of a shader's parameters, once it is drawn. */
+  row(shader: Shader, values: Values): WebGLTexture | null {
+    const key = keyOf(shader, values);
     const known = this.kept.get(key);
-    if (known) {
-      this.kept.delete(key); // and last in line again
-      this.kept.set(key, known);
-      return known;
-    }
+    if (!known) return null;
+    this.kept.delete(key); // and last in line again
+    this.kept.set(key, known);
+    return known;
+  }
+
+  /** Draws a row by the program of `source`; `bind` sets its uniforms and tables. */
+  draw(shader: Shader, values: Values, program: Program, bind: () => void): void {
     const { gl } = this;
-    const { vectors } = packed(shader.manifest);
+    const width = packed(shader.manifest).vectors.length;
     const texture = gl.createTexture();
-    const state = this.state();
     const framebuffer = gl.createFramebuffer();
-    // its own unit, so that no binding of another is lost
-    gl.activeTexture(gl.TEXTURE0 + gl.getParameter(gl.MAX_COMBINED_TEXTURE_IMAGE_UNITS) - 1);
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, vectors.length, 1);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, 1);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    gl.viewport(0, 0, vectors.length, 1);
-    for (const one of STATES(gl)) gl.disable(one);
+    gl.viewport(0, 0, width, 1);
+    for (const one of [gl.BLEND, gl.DEPTH_TEST, gl.SCISSOR_TEST, gl.STENCIL_TEST, gl.CULL_FACE]) gl.disable(one);
     gl.colorMask(true, true, true, true);
-    use(
-      `${HEADER}void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0), 0.0, 1.0); }\n`,
-      `${HEADER}${shader.text}
-uniform ${shader.manifest.struct} material;
-layout(location = 0) out vec4 texel;
-void main() {
-${computed(shader.manifest)}  vec4 all[${vectors.length}] = vec4[${vectors.length}](${vectors.join(", ")});
-  texel = all[int(gl_FragCoord.x)];
-}
-`,
-    );
+    gl.useProgram(program.handle);
+    bind();
     this.vao ??= gl.createVertexArray();
     gl.bindVertexArray(this.vao);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.deleteFramebuffer(framebuffer);
-    state();
-    this.kept.set(key, texture);
+    this.kept.set(keyOf(shader, values), texture);
     for (const [old, one] of this.kept) {
       if (this.kept.size <= MOST_KEPT) break;
       gl.deleteTexture(one);
       this.kept.delete(old);
     }
-    return texture;
   }
 
   /** Drops the rows of shaders that the page has no more. */
@@ -136,25 +149,6 @@ ${computed(shader.manifest)}  vec4 all[${vectors.length}] = vec4[${vectors.lengt
         this.kept.delete(key);
       }
   }
-
-  /** What a draw in the middle of another one changes; called, it is as it was. */
-  private state(): () => void {
-    const { gl } = this;
-    const framebuffer = gl.getParameter(gl.FRAMEBUFFER_BINDING) as WebGLFramebuffer | null;
-    const program = gl.getParameter(gl.CURRENT_PROGRAM) as WebGLProgram | null;
-    const array = gl.getParameter(gl.VERTEX_ARRAY_BINDING) as WebGLVertexArrayObject | null;
-    const viewport = gl.getParameter(gl.VIEWPORT) as Int32Array;
-    const mask = gl.getParameter(gl.COLOR_WRITEMASK) as boolean[];
-    const on = STATES(gl).filter((one) => gl.isEnabled(one));
-    return () => {
-      gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-      gl.useProgram(program);
-      gl.bindVertexArray(array);
-      gl.viewport(...(Array.from(viewport) as [number, number, number, number]));
-      gl.colorMask(...(mask as [boolean, boolean, boolean, boolean]));
-      for (const one of on) gl.enable(one);
-    };
-  }
 }
 
-const STATES = (gl: WebGL2RenderingContext) => [gl.BLEND, gl.DEPTH_TEST, gl.SCISSOR_TEST, gl.STENCIL_TEST, gl.CULL_FACE];
+const keyOf = (shader: Shader, values: Values): string => `${shader.key} ${JSON.stringify(shader.manifest.fields.map(({ path }) => values[path]))}`;

@@ -1,6 +1,6 @@
 /** From linear radiance to the screen: exposure, tone curve, sRGB; in a pass of its own, over what was summed. */
 import type { Tone } from "./data";
-import { HEADER, link, type Program } from "./shaders";
+import { HEADER, link, type Program } from "./programs";
 
 export const TONES: Record<Tone, { index: number; doc: string }> = {
   none: { index: 0, doc: "Clipped at 1, then sRGB." },
@@ -22,11 +22,35 @@ vec3 tone_mapped(vec3 c, int curve) {
 }
 `;
 
+/**
+ * `page_finite(vec3)`, and `page_broken(vec3)`: not a number, which is what a picture holds of all that is not finite.
+ * Tests of bits stay where a compiler takes every value for a number.
+ */
+export const BROKEN_GLSL = `
+bool page_finite(vec3 v) {
+  return all(notEqual(floatBitsToUint(v) & uvec3(0x7f800000u), uvec3(0x7f800000u)));
+}
+bool page_broken(vec3 v) {
+  return any(greaterThan(floatBitsToUint(v) & uvec3(0x7fffffffu), uvec3(0x7f800000u)));
+}
+`;
+
+/** The pattern that stands for what is no light. */
+export const CHECKER_GLSL = `
+vec3 page_checker() {
+  ivec2 cell = ivec2(gl_FragCoord.xy) / 6;
+  return ((cell.x + cell.y) & 1) == 0 ? vec3(1.0, 0.0, 0.8) : vec3(0.0);
+}
+`;
+
 export const FULLSCREEN_VERTEX = `${HEADER}
 void main() { gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float(gl_VertexID >> 1) - 1.0, 0.0, 1.0); }
 `;
 
-const FRAGMENT = `${HEADER}${TONE_GLSL}
+/** Boxes of balls that are known to be black by a fault. */
+export const MOST_BLACK = 64;
+
+const FRAGMENT = `${HEADER}${TONE_GLSL}${BROKEN_GLSL}${CHECKER_GLSL}
 uniform sampler2D picture;      // sums
 uniform sampler2D early;        // what counts beside them while they are few: see renderer.ts
 uniform float samples, early_share, exposure;
@@ -38,7 +62,23 @@ uniform sampler2D environment_map;
 uniform float has_map, environment_scale, environment_rotation;
 uniform vec3 environment_constant, right, up, back;
 uniform vec2 half_size, size;
+uniform bool has_broken;        // values that are no numbers: each is drawn as large as can be seen
+uniform int black_count;
+uniform vec4 black_boxes[${MOST_BLACK}];
 out vec4 color;
+
+bool wrong(vec2 position) {
+  ivec2 pixels = textureSize(picture, 0);
+  ivec2 at = ivec2(position * vec2(pixels));
+  int reach = has_broken ? 2 : 0;
+  for (int y = -reach; y <= reach; y++)
+    for (int x = -reach; x <= reach; x++)
+      if (page_broken(texelFetch(picture, clamp(at + ivec2(x, y), ivec2(0), pixels - 1), 0).rgb)) return true;
+  vec2 p = 2.0 * position - 1.0;
+  for (int i = 0; i < black_count; i++)
+    if (all(greaterThan(p, black_boxes[i].xy)) && all(lessThan(p, black_boxes[i].zw))) return texelFetch(picture, at, 0).a > 0.0;
+  return false;
+}
 
 vec3 behind(vec2 p) {
   if (has_map < 0.5) return environment_constant * environment_scale;
@@ -50,6 +90,10 @@ vec3 behind(vec2 p) {
 
 void main() {
   vec2 position = gl_FragCoord.xy / size;
+  if (wrong(position)) {
+    color = vec4(page_checker(), 1.0);
+    return;
+  }
   vec4 sum = texture(picture, position) / samples;
   if (has_sign) {
     float value = dot(sum.rgb, vec3(1.0 / 3.0)) / max(sum.a, 1e-6) * exposure;

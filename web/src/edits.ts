@@ -3,20 +3,29 @@
  * are linked, to the parameter of the same name in the others.
  */
 import type { PageApp } from "./app";
-import type { Choices, Material, Parameter, Preset, Value } from "./data";
-import { variantChoice } from "./shaders";
-import type { State } from "./state";
+import type { Material, Parameter, Preset, Value } from "./data";
+import { sameNumbers, variantChoice } from "./shaders";
+import type { Slot, State } from "./state";
 import { short } from "./ui/dom";
 
 /** A compensated material holds its base: "base.alpha" there is "alpha" of a plain one. */
 export const bare = (path: string): string => path.replace(/^(base\.)+/, "");
 
 /** Whether the balls of the row differ in this parameter: then an edit goes to the selected ball alone. */
-export const perBall = (slot: State["slots"][number], path: string): boolean => slot.balls.some((ball) => path in ball.set);
+export const perBall = (slot: Slot, path: string): boolean => slot.balls.some((ball) => path in ball.set);
 
+/** The parameter of the same name in another row: of its material, of its base, or the only one of that name inside. */
 function twin(app: PageApp, slot: number, path: string): string | null {
-  const parameters = app.shaderOf(slot).manifest.parameters;
-  return parameters.find((p) => p.path === path)?.path ?? parameters.find((p) => bare(p.path) === bare(path))?.path ?? null;
+  const paths = app.shaderOf(slot).manifest.parameters.map((p) => p.path);
+  const name = path.split(".").at(-1);
+  const inside = paths.filter((one) => one.split(".").at(-1) === name);
+  return paths.find((one) => one === path) ?? paths.find((one) => bare(one) === bare(path)) ?? (inside.length === 1 ? (inside[0] as string) : null);
+}
+
+/** Puts a row in its place, unless this page has no server and holds no shader for it: then it says so. */
+function commit(app: PageApp, state: State, index: number, row: Slot): void {
+  if (app.possible(row)) state.slots[index] = row;
+  else app.say(`Row ${String.fromCharCode(65 + index)} stays as it is: this page holds no shader for that. \`gonio view\` has them all.`);
 }
 
 const others = (app: PageApp, slot: number): number[] => (app.state.linked ? app.state.slots.map((_, i) => i).filter((i) => i !== slot) : []);
@@ -25,13 +34,14 @@ export function setParameter(app: PageApp, slot: number, path: string, value: Va
   const { ball } = app.state.selection;
   app.store.update("slots", (state) => {
     const write = (index: number, target: string) => {
-      const row = state.slots[index] as State["slots"][number];
+      const row = structuredClone(state.slots[index] as Slot);
       if (perBall(row, target)) {
         const one = row.balls[Math.min(ball, row.balls.length - 1)];
         if (!one) return;
         one.set = { ...one.set, [target]: value };
         one.label = labelOf(one.set);
       } else row.values = { ...row.values, [target]: value };
+      commit(app, state, index, row);
     };
     write(slot, path);
     for (const other of others(app, slot)) {
@@ -47,7 +57,7 @@ const kindOf = (app: PageApp, slot: number, path: string) => app.shaderOf(slot).
 export function setBall(app: PageApp, slot: number, values: Record<string, Value>, label: string): void {
   const { ball } = app.state.selection;
   app.store.update("slots", (state) => {
-    const balls = (state.slots[slot] as State["slots"][number]).balls;
+    const { balls } = state.slots[slot] as Slot;
     const one = balls[Math.min(ball, balls.length - 1)];
     if (!one) return;
     one.set = { ...one.set, ...values };
@@ -93,40 +103,39 @@ export function currentValue(app: PageApp, slot: number, parameter: Parameter): 
 
 export function applyPreset(app: PageApp, slot: number, preset: Preset): void {
   app.store.update("slots", (state) => {
-    const write = (index: number, chosen: Preset) => {
-      const row = state.slots[index] as State["slots"][number];
-      const choices = { ...row.choices };
-      for (const [path, value] of Object.entries(chosen.set)) {
-        if (typeof value === "string" || typeof value === "boolean") choices[path] = value;
-        else if (perBall(row, path))
-          for (const ball of row.balls) {
-            ball.set = { ...ball.set, [path]: value };
-            ball.label = labelOf(ball.set);
-          }
-        else row.values = { ...row.values, [path]: value };
-      }
-      if (app.data.socket || app.shaders.find(row.material, choices)) row.choices = choices;
-    };
-    write(slot, preset);
+    commit(app, state, slot, withPreset(state.slots[slot] as Slot, preset));
     for (const other of others(app, slot)) {
-      const same = app.shaders.material((state.slots[other] as State["slots"][number]).material).presets.find((p) => p.name === preset.name);
-      if (same) write(other, same);
+      const row = state.slots[other] as Slot;
+      const same = app.shaders.material(row.material).presets.find((p) => p.name === preset.name);
+      if (same) commit(app, state, other, withPreset(row, same));
     }
   });
 }
 
+/** Whether this page can show a preset on a row; asked of hundreds at every change. */
+export function possiblePreset(app: PageApp, slot: number, preset: Preset): boolean {
+  const row = app.slot(slot);
+  const parameters = app.shaders.material(row.material).variants[0]?.manifest.parameters ?? [];
+  const shapes = ({ path, field, off, fixed }: Parameter) => path in preset.set && (fixed || off !== null || field === null);
+  return Boolean(app.data.socket) || !parameters.some(shapes) || app.possible(withPreset(row, preset));
+}
+
+function withPreset(row: Slot, preset: Preset): Slot {
+  const [choices, values, own] = [{ ...row.choices }, { ...row.values }, {} as Record<string, Value>];
+  for (const [path, value] of Object.entries(preset.set)) {
+    if (typeof value === "string" || typeof value === "boolean") choices[path] = value;
+    else if (perBall(row, path)) own[path] = value;
+    else values[path] = value;
+  }
+  const written = (set: Record<string, Value>) => ({ label: labelOf({ ...set, ...own }), set: { ...set, ...own } });
+  return { ...row, choices, values, balls: Object.keys(own).length ? row.balls.map(({ set }) => written(set)) : row.balls };
+}
+
 /** The preset whose values the row, or the selected ball of it, has now. */
 export function currentPreset(app: PageApp, slot: number, material: Material): string {
-  const values = app.valuesOf(slot, app.state.selection.slot === slot ? app.state.selection.ball : 0);
-  const same = (path: string, value: Value): boolean => {
-    if (typeof value === "string" || typeof value === "boolean") return currentChoice(app, slot, path) === value;
-    const [x, y] = [[value].flat(), [values[path]].flat() as number[]];
-    // A number stands for all where the other side has several.
-    return (x.length > y.length ? x : y).every((_, i) => {
-      const [a, b] = [x[i] ?? x[0], y[i] ?? y[0]] as [number, number];
-      return Math.abs(a - b) <= 1e-6 * Math.max(1, Math.abs(a));
-    });
-  };
+  const values = app.wantedValues(app.slot(slot), app.state.selection.slot === slot ? app.state.selection.ball : 0);
+  const same = (path: string, value: Value): boolean =>
+    typeof value === "string" || typeof value === "boolean" ? currentChoice(app, slot, path) === value : sameNumbers(value, values[path] as Value);
   return material.presets.find((preset) => Object.entries(preset.set).every(([path, value]) => same(path, value)))?.name ?? "";
 }
 
@@ -138,13 +147,10 @@ export function currentChoice(app: PageApp, slot: number, path: string): string 
 
 /** Values of a choice that the page holds shaders for, the other choices staying as they are. */
 export function possibleChoices(app: PageApp, slot: number, parameter: Parameter): { value: string; doc: string; here: boolean }[] {
-  const row = app.state.slots[slot];
+  const row = app.slot(slot);
   const names = parameter.kind === "flag" ? { true: "on", false: "off" } : (parameter.choices ?? {});
-  return Object.entries(names).map(([value, doc]) => ({
-    value,
-    doc,
-    here: Boolean(row && app.shaders.find(row.material, { ...row.choices, [parameter.path]: typed(parameter, value) })),
-  }));
+  const here = (value: string) => app.lacking({ ...row, choices: { ...row.choices, [parameter.path]: typed(parameter, value) } }).length === 0;
+  return Object.entries(names).map(([value, doc]) => ({ value, doc, here: here(value) }));
 }
 
 const typed = (parameter: Parameter, value: string): string | boolean => (parameter.kind === "flag" ? value === "true" : value);
@@ -153,10 +159,8 @@ export function setChoice(app: PageApp, slot: number, parameter: Parameter, text
   const value = typed(parameter, text);
   app.store.update("slots", (state) => {
     const write = (index: number, path: string) => {
-      const row = state.slots[index] as State["slots"][number];
-      const choices: Choices = { ...row.choices, [path]: value };
-      // A page without a server keeps to what it holds.
-      if (app.data.socket || app.shaders.find(row.material, choices)) row.choices = choices;
+      const row = state.slots[index] as Slot;
+      commit(app, state, index, { ...row, choices: { ...row.choices, [path]: value } });
     };
     write(slot, parameter.path);
     for (const other of others(app, slot)) {
@@ -169,7 +173,7 @@ export function setChoice(app: PageApp, slot: number, parameter: Parameter, text
 
 export function setMaterial(app: PageApp, slot: number, id: string): void {
   app.store.update("slots", (state) => {
-    const row = state.slots[slot] as State["slots"][number];
+    const row = state.slots[slot] as Slot;
     const first = app.shaders.material(id).variants[0];
     row.material = id;
     row.choices = { ...first?.choices };
@@ -180,5 +184,7 @@ export function setMaterial(app: PageApp, slot: number, id: string): void {
     row.values = kept(row.values);
     for (const ball of row.balls) ball.set = kept(ball.set);
     row.label = app.shaders.material(id).title;
+    // Values that this page's tables were not found from cannot stay.
+    if (!app.possible(row)) for (const set of [row.values, ...row.balls.map((ball) => ball.set)]) Object.assign(set, first?.fixed);
   });
 }

@@ -3,11 +3,12 @@
  * of every ball and, for the split sum, the environment blurred by the lobe at a few widths.
  */
 import { type Values, decodeBase64 } from "./data";
-import { albedoText, atOnce, prefilterText } from "./glsl";
+import { SAMPLES_VERTEX, albedoText, prefilterText } from "./glsl";
 import { distribution } from "./importance";
+import type { Source } from "./programs";
 import type { Shader, ShaderLibrary } from "./shaders";
+import { isLong } from "./size";
 import { createTarget, floatToHalf, sequence, type Target } from "./targets";
-import { FULLSCREEN_VERTEX } from "./display";
 
 export interface EnvironmentPicture {
   /** Changes with the picture: what was made of the old one is made anew. */
@@ -87,7 +88,18 @@ export class AlbedoTables {
     return this.target?.texture ?? null;
   }
 
-  /** The row of a ball; runs `passes` more passes while its sum is not complete. */
+  /** What sums up the rows of a shader. */
+  source(shader: Shader): Source {
+    return {
+      key: `albedo ${shader.code}`,
+      title: shader.material.title,
+      long: isLong(shader),
+      vertex: () => SAMPLES_VERTEX,
+      fragment: () => albedoText(shader),
+    };
+  }
+
+  /** The row of a ball, whose values are derived; runs `passes` more passes while its sum is not complete. */
   row(shader: Shader, values: Values, passes: number): { row: number; complete: boolean; finished: boolean } {
     const { gl } = this;
     this.target ??= createTarget(gl, ALBEDO_WIDTH, ALBEDO_ROWS, this.full, false);
@@ -106,10 +118,9 @@ export class AlbedoTables {
     }
     entry.used = this.clock;
     const before = entry.passes;
-    const limit = this.full ? ALBEDO_PASSES : 8; // float16 sums saturate
+    const limit = this.full ? ALBEDO_PASSES : 2; // float16 sums saturate
     if (entry.passes < limit) {
-      const some = atOnce(shader, ALBEDO_SAMPLES);
-      const program = this.shaders.program(`albedo ${shader.key}`, FULLSCREEN_VERTEX, albedoText(shader, some));
+      const program = this.shaders.program(this.source(shader));
       gl.useProgram(program.handle);
       this.shaders.bind(program, shader, values, 0);
       gl.uniform1f(program.uniform("width"), ALBEDO_WIDTH);
@@ -118,11 +129,10 @@ export class AlbedoTables {
       gl.disable(gl.DEPTH_TEST);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE);
-      for (let i = 0; i < passes && entry.passes < limit; i++, entry.passes++)
-        for (let from = 0; from < ALBEDO_SAMPLES; from += some) {
-          gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * ALBEDO_SAMPLES + from));
-          gl.drawArrays(gl.TRIANGLES, 0, 3);
-        }
+      for (let i = 0; i < passes && entry.passes < limit; i++, entry.passes++) {
+        gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * ALBEDO_SAMPLES));
+        gl.drawArraysInstanced(gl.TRIANGLES, 0, 3, ALBEDO_SAMPLES);
+      }
       gl.disable(gl.BLEND);
     }
     return { row: entry.row, complete: entry.passes >= limit, finished: before < limit && entry.passes >= limit };
@@ -181,6 +191,17 @@ export class PrefilteredEnvironments {
     private full: boolean,
   ) {}
 
+  /** What blurs by the lobe of a shader. */
+  source(shader: Shader): Source {
+    return {
+      key: `prefilter ${shader.code}`,
+      title: shader.material.title,
+      long: isLong(shader),
+      vertex: () => SAMPLES_VERTEX,
+      fragment: () => prefilterText(shader),
+    };
+  }
+
   /** Texture and level for a ball; null where nothing was made for it yet and it is not to be made now. */
   of(shader: Shader, values: Values, picture: EnvironmentPicture, make = true): PrefilteredLevel | null {
     const alpha = alphaOf(shader);
@@ -229,19 +250,20 @@ export class PrefilteredEnvironments {
 
   private pass(entry: Prefiltered, shader: Shader, values: Values, alpha: string | null, picture: EnvironmentPicture): void {
     const { gl } = this;
-    const some = atOnce(shader, LEVEL_SAMPLES);
-    const program = this.shaders.program(`prefilter ${shader.key}`, FULLSCREEN_VERTEX, prefilterText(shader, some));
-    gl.useProgram(program.handle);
-    gl.disable(gl.DEPTH_TEST);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE);
+    const program = this.shaders.program(this.source(shader));
     entry.framebuffers.forEach((framebuffer, level) => {
       const passes = (alpha ? SHARP_PASSES[level] : undefined) ?? LEVEL_PASSES;
       if (entry.passes >= passes) return;
       const size = entry.width >> level;
       const roughness = level / Math.max(entry.framebuffers.length - 1, 1);
       const width = Math.max(roughness * roughness, 1e-3);
-      this.shaders.bind(program, shader, alpha ? { ...values, [alpha]: [width, width] } : values, 1);
+      const own = alpha ? { ...values, [alpha]: [width, width] } : values;
+      this.shaders.derive(shader, own);
+      gl.useProgram(program.handle);
+      gl.disable(gl.DEPTH_TEST);
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE);
+      this.shaders.bind(program, shader, own, 1);
       gl.activeTexture(gl.TEXTURE0);
       gl.bindTexture(gl.TEXTURE_2D, picture.texture);
       gl.uniform1i(program.uniform("environment_map"), 0);
@@ -252,10 +274,8 @@ export class PrefilteredEnvironments {
       gl.uniform1f(program.uniform("points"), LEVEL_SAMPLES * passes);
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
       gl.viewport(0, 0, size, size / 2);
-      for (let from = 0; from < LEVEL_SAMPLES; from += some) {
-        gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * LEVEL_SAMPLES + from));
-        gl.drawArrays(gl.TRIANGLES, 0, 3);
-      }
+      gl.uniform3fv(program.uniform("random_point"), sequence(3, entry.passes * LEVEL_SAMPLES));
+      gl.drawArraysInstanced(gl.TRIANGLES, 0, 3, LEVEL_SAMPLES);
     });
     gl.disable(gl.BLEND);
     entry.passes += 1;

@@ -8,7 +8,9 @@
  */
 import type { Values } from "./data";
 import { derivedIn, derivedOut } from "./derived";
-import { HEADER, type Program, type Shader, type ShaderLibrary } from "./shaders";
+import { HEADER, type Program, type Source } from "./programs";
+import type { Shader, ShaderLibrary } from "./shaders";
+import { isLong } from "./size";
 import { SOBOL_WIDTH, sobolTexels } from "./sobol";
 
 /** One entry a query; `value` is f(wo, wi) |cos theta_i| in 1/sr per channel, interleaved RGB. */
@@ -188,7 +190,9 @@ uniform int start;`;
     more: { declarations?: string; width?: number; height?: number; bind?: (program: Program, unit: number) => void } = {},
   ): Promise<Float32Array[]> {
     const gl = this.gl;
-    const program = this.program(shader, kind, body, outputs, more.declarations ?? "");
+    const program = await this.library.programs.made(source(shader, kind, body, outputs, more.declarations ?? ""));
+    for (const one of this.library.derivingSources(shader)) await this.library.programs.made(one);
+    this.library.derive(shader, values);
     const width = more.width ?? Math.min(count, WIDTH);
     const height = more.height ?? Math.ceil(count / WIDTH);
     const inputs = [first, second].map((floats) => directions(gl, floats));
@@ -231,6 +235,7 @@ uniform int start;`;
     gl.activeTexture(gl.TEXTURE0);
     try {
       await finished(gl);
+      this.library.programs.drawn();
       return buffers.map((buffer) => {
         const floats = new Float32Array(width * height * 4);
         gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
@@ -242,21 +247,33 @@ uniform int start;`;
       for (const buffer of buffers) gl.deleteBuffer(buffer);
     }
   }
+}
 
-  private program(shader: Shader, kind: string, body: string, outputs: number, declarations: string): Program {
-    const { struct } = shader.manifest;
-    const out = derivedOut(shader);
-    const derived = derivedIn(shader, true);
-    const vertex = out
-      ? `${HEADER}${shader.text}
-uniform ${struct} material;
+function source(shader: Shader, kind: string, body: string, outputs: number, declarations: string): Source {
+  return {
+    key: `${shader.code}/evaluator/${kind}`,
+    title: shader.material.title,
+    long: isLong(shader),
+    vertex: () => vertexText(shader),
+    fragment: () => fragmentText(shader, body, outputs, declarations),
+  };
+}
+
+function vertexText(shader: Shader): string {
+  const out = derivedOut(shader);
+  if (!out) return `${HEADER}void main() {${VERTEX_MAIN}\n}`;
+  return `${HEADER}${shader.text}
+uniform ${shader.manifest.struct} material;
 ${out.declarations}
 void main() {
 ${out.body}${VERTEX_MAIN}
-}`
-      : `${HEADER}void main() {${VERTEX_MAIN}\n}`;
-    const fragment = `${HEADER}${shader.text}
-uniform ${struct} material;
+}`;
+}
+
+function fragmentText(shader: Shader, body: string, outputs: number, declarations: string): string {
+  const derived = derivedIn(shader, true);
+  return `${HEADER}${shader.text}
+uniform ${shader.manifest.struct} material;
 uniform sampler2D first_rows;
 uniform sampler2D second_rows;
 ${declarations}
@@ -269,8 +286,6 @@ void main() {
   vec3 first = row_of(first_rows), second = row_of(second_rows);
 ${derived.body}${body}
 }`;
-    return this.library.program(`${shader.key}/evaluator/${kind}`, vertex, fragment);
-  }
 }
 
 const self = (shader: Shader) => (shader.manifest.derived ? "material, derived" : "material");

@@ -5,8 +5,11 @@
  */
 import type { Manifest } from "./data";
 import { derivedIn, derivedOut } from "./derived";
+import { BROKEN_GLSL } from "./display";
 import { IMPORTANCE_GLSL } from "./importance";
-import { HEADER, type Shader } from "./shaders";
+import { HEADER } from "./programs";
+import type { Shader } from "./shaders";
+import { fitsLoop } from "./size";
 import type { Term } from "./state";
 
 export const MAX_LIGHTS = 8;
@@ -24,20 +27,8 @@ export interface ShadingKey {
   term: Term;
 }
 
-/**
- * Characters beyond which a material is called in no loop: what draws in software compiles a loop around such a call for
- * minutes, until the browser gives up.
- */
-const LONG = 40_000;
-const isLong = (shader: Shader) => shader.text.length > LONG;
-/** How many samples of `count` one draw takes. */
-export const atOnce = (shader: Shader, count: number): number => (isLong(shader) ? 1 : count);
 /** How many times the part of a light is written for so many: once, in a loop, or for each. */
-export const copies = (shader: Shader, lights: number): number => (isLong(shader) ? lights : Math.min(lights, 1));
-
-/** A body that reads `i`, from 0 to below a count. */
-const repeated = (count: number, body: string): string =>
-  count === 1 ? `  { const int i = 0;\n${body}  }\n` : `  for (int i = 0; i < ${count}; i++) {\n${body}  }\n`;
+export const copies = (shader: Shader, lights: number): number => (fitsLoop(shader, "eval") ? Math.min(lights, 1) : lights);
 
 /** The material's text, its uniform, and `call("eval", "wo, wi")` with the arguments that its functions want: `derived` among them. */
 export function materialText(shader: Shader): { text: string; call: (name: "eval" | "pdf" | "sample" | "terms", rest: string) => string } {
@@ -284,7 +275,7 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
   const { text, call } = materialText(shader);
   const derived = derivedIn(shader, true);
   const factor = isFactor(key.term);
-  const parts = [HEADER, text, CAMERA, DEPTH_RANGE, derived.declarations, RANDOM];
+  const parts = [HEADER, text, BROKEN_GLSL, CAMERA, DEPTH_RANGE, derived.declarations, RANDOM];
   const body: string[] = [];
   if (factor) {
     const known = hasTerm(manifest, key.term);
@@ -301,7 +292,7 @@ export function fragmentText(shader: Shader, key: ShadingKey): string {
     vec3 wi = d * frame;
     radiance += irradiance * (${scattered(shader, key.term)});
   }`;
-      if (!isLong(shader)) body.push(`  for (int i = 0; i < light_count; i++) {\n${light("i")}`);
+      if (fitsLoop(shader, "eval")) body.push(`  for (int i = 0; i < light_count; i++) {\n${light("i")}`);
       else for (let i = 0; i < key.lights; i++) body.push(`  {\n${light(String(i))}`);
     }
     const uses = [key.environment, key.minus];
@@ -350,42 +341,55 @@ ${place}
   vec3 wo = outward * frame;
   vec3 radiance = vec3(0.0);
 ${derived.body}${body.join("\n")}
-  // One bad sample would stay in the sum for good. What is not finite counts as missing light, and the eye sees a dot.
-  if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
+  // What is no finite number stays in the sum for good, and is shown as such: left out, it would pass for a dark material.
+  if (!page_finite(radiance)) radiance = vec3(uintBitsToFloat(0x7fc00000u));
   color = vec4(draw_gain * radiance, draw_cover);
 }
 `;
 }
 
+/**
+ * Covers the target once a sample: a draw of as many instances adds them up, and no shader has a loop around a material,
+ * which software would compile for minutes.
+ */
+export const SAMPLES_VERTEX = `${HEADER}
+flat out int index;
+void main() {
+  index = gl_InstanceID;
+  gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float(gl_VertexID >> 1) - 1.0, 0.0, 1.0);
+}
+`;
+
+// R3 (Roberts 2018) from a start
+const POINT = "fract(START + float(index) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703))";
+
 /** E(mu) of a ball, by the material's own sampling: rows of the albedo table. */
-export function albedoText(shader: Shader, samples: number): string {
+export function albedoText(shader: Shader): string {
   const { text, call } = materialText(shader);
   const derived = derivedIn(shader, false);
   return `${HEADER}${text}${derived.declarations}
-uniform vec3 random_point;
+uniform vec3 random_point;   // the page moves the starting point on from pass to pass
 uniform float width;
+flat in int index;
 layout(location = 0) out vec4 color;
 void main() {
 ${derived.body}  float t = gl_FragCoord.x / width;
   float mu = t * t;
   vec3 wo = vec3(sqrt(max(1.0 - mu * mu, 0.0)), 0.0, mu);
-  vec3 sum = vec3(0.0);
-  // R3 (Roberts 2018); the page moves the starting point on from pass to pass
-${repeated(samples, `    vec3 u = fract(random_point + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
-    vec3 weight = ${call("sample", "wo, u")}.weight;
-    if (!any(isnan(weight)) && !any(isinf(weight))) sum += weight;
-`)}  color = vec4(sum, ${samples}.0);
+  vec3 u = ${POINT.replace("START", "random_point")};
+  color = vec4(${call("sample", "wo, u")}.weight, 1.0);
 }
 `;
 }
 
 /** One level of the prefiltered environment: seen straight on, where the lobe goes, with the weights normalised. */
-export function prefilterText(shader: Shader, samples: number): string {
+export function prefilterText(shader: Shader): string {
   const { text, call } = materialText(shader);
   const derived = derivedIn(shader, false);
   return `${HEADER}${text}${derived.declarations}${RANDOM}${ENVIRONMENT}
 uniform vec2 size;
 uniform float points;   // over all passes
+flat in int index;
 layout(location = 0) out vec4 color;
 void main() {
 ${derived.body}  vec2 uv = gl_FragCoord.xy / size;
@@ -393,18 +397,15 @@ ${derived.body}  vec2 uv = gl_FragCoord.xy / size;
   vec3 n = vec3(sin(theta) * sin(p), cos(theta), sin(theta) * cos(p));
   vec3 t = normalize(abs(n.y) < 0.99 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0) - n.x * n);
   mat3 frame = mat3(t, cross(n, t), n);
-  vec4 sum = vec4(0.0);
-  vec3 start = random_point + page_shift(uvec2(gl_FragCoord.xy), 11u);
-${repeated(samples, `    vec3 u = fract(start + float(i) * vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703));
-    Sample s = ${call("sample", "vec3(0.0, 0.0, 1.0), u")};
-    float weight = dot(s.weight, vec3(1.0 / 3.0));
-    // As much of the picture as one sample stands for, by its mip levels (Krivanek and Colbert 2008): a small sun
-    // would else be hit by few samples and leave blotches.
-    float share = 1.0 / (points * max(s.pdf, 1e-6));
-    vec2 texels = vec2(textureSize(environment_map, 0));
-    float lod = s.delta ? 0.0 : max(0.0, 0.5 * log2(share * texels.x * texels.y / 12.566370614359172) + 0.5);
-    if (weight > 0.0) sum += weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), lod).rgb, 1.0);
-`)}  color = sum;
+  vec3 u = ${POINT.replace("START", "random_point + page_shift(uvec2(gl_FragCoord.xy), 11u)")};
+  Sample s = ${call("sample", "vec3(0.0, 0.0, 1.0), u")};
+  float weight = dot(s.weight, vec3(1.0 / 3.0));
+  // As much of the picture as one sample stands for, by its mip levels (Krivanek and Colbert 2008): a small sun
+  // would else be hit by few samples and leave blotches.
+  float share = 1.0 / (points * max(s.pdf, 1e-6));
+  vec2 texels = vec2(textureSize(environment_map, 0));
+  float lod = s.delta ? 0.0 : max(0.0, 0.5 * log2(share * texels.x * texels.y / 12.566370614359172) + 0.5);
+  color = weight > 0.0 ? weight * vec4(textureLod(environment_map, environment_uv(frame * s.wi), lod).rgb, 1.0) : vec4(0.0);
 }
 `;
 }

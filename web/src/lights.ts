@@ -1,7 +1,7 @@
 /** The lights that act, and how the shaders hear of them. */
 import type { AreaLight, DirectionalLight, EnvironmentLight, PointLight, Vec3 } from "./data";
 import { MAX_LIGHTS } from "./glsl";
-import type { Program } from "./shaders";
+import type { Program } from "./programs";
 import type { Light, State } from "./state";
 import { normalize } from "./vectors";
 
@@ -29,9 +29,8 @@ export const environmentOf = (lights: Light[]): (EnvironmentLight & { on: boolea
   lights.find((l): l is EnvironmentLight & { on: boolean; name: string } => l.type === "environment") ?? null;
 
 export function bindLights(gl: WebGL2RenderingContext, program: Program, lights: LocalLight[]): void {
-  const count = program.uniform("light_count");
-  if (!count) return;
-  gl.uniform1i(count, lights.length);
+  // A shader that is called for each light in no loop has no count; what a program lacks, a driver leaves aside.
+  gl.uniform1i(program.uniform("light_count"), lights.length);
   const kinds = new Int32Array(4 * MAX_LIGHTS);
   const [place, power, u, v] = [0, 0, 0, 0].map(() => new Float32Array(3 * MAX_LIGHTS)) as [Float32Array, Float32Array, Float32Array, Float32Array];
   lights.forEach((light, i) => {

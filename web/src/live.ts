@@ -5,7 +5,7 @@
  * scenes that still arrive are dropped. The connection comes back by itself, later and later.
  */
 import type { Fault, PageApp } from "./app";
-import type { PageData, Variant } from "./data";
+import type { PageData, SplitSum, Variant } from "./data";
 import { actingLights } from "./lights";
 import { halfToFloat } from "./targets";
 import { fitted } from "./vectors";
@@ -34,6 +34,7 @@ interface FrameHeader {
 const QUIET = 40; // ms without a change before the scene is sent: a slider sends sixty changes a second
 const TARGET = 1024;
 const MOST_PIXELS = 1_000_000;
+const MOST_ASKED = 8; // shaders at a time: a server has other pages
 
 export class Live {
   readonly status: LiveState = { connected: false, device: "", samples: 0, target: TARGET, done: false, seconds: 0, message: "connecting" };
@@ -46,7 +47,7 @@ export class Live {
   private timer = 0;
   private wait = 500;
   private uploaded = new Set<string>();
-  private asked = new Map<number, string>();
+  private asked = new Map<number, { wish: string; place: string; title: string }>();
   private waiting = new Set<string>();
 
   constructor(
@@ -72,13 +73,11 @@ export class Live {
       this.wait = 500;
       this.sent = "";
       this.uploaded.clear();
-      this.waiting.clear();
+      this.forget();
       Object.assign(this.status, { connected: true, message: "" });
       this.onStatus();
       this.send();
-      this.app.state.slots.forEach((_, index) => {
-        if (!this.app.fitting(index)) this.ask(index);
-      });
+      this.app.state.slots.forEach((_, index) => this.ask(index));
     });
     socket.addEventListener("message", (event) => {
       if (typeof event.data === "string") this.read(event.data);
@@ -173,16 +172,41 @@ export class Live {
     return picture.key;
   }
 
+  /**
+   * Asks for the shaders that the balls of a row lack. One that comes brings the page back here, so what is wanted by
+   * then is asked for then: of a slider that moves on, not every value.
+   */
   private ask(slot: number): void {
-    const row = this.app.state.slots[slot];
-    if (!row) return;
-    const on = this.app.switchedOn(slot);
-    const wish = JSON.stringify([row.material, row.choices, on]);
-    if (this.waiting.has(wish)) return;
-    this.waiting.add(wish);
-    this.wishes += 1;
-    this.asked.set(this.wishes, wish);
-    this.text({ type: "choice", id: this.wishes, revision: this.app.data.revision, material: row.material, choices: row.choices, on });
+    const { app } = this;
+    const row = app.slot(slot);
+    const on = app.switchedOn(row);
+    for (const ball of app.lacking(row)) {
+      const place = `${slot} ${ball}`;
+      const values = app.wantedValues(row, ball);
+      const paths = app.shaders.material(row.material).variants[0]?.manifest.parameters.filter((p) => p.fixed).map((p) => p.path) ?? [];
+      const fixed = Object.fromEntries(paths.map((path) => [path, values[path]]));
+      const wish = JSON.stringify([row.material, row.choices, on, fixed]);
+      const busy = [...this.asked.values()].some((one) => one.place === place);
+      if (this.waiting.has(wish) || busy || this.asked.size >= MOST_ASKED) continue;
+      this.waiting.add(wish);
+      this.wishes += 1;
+      this.asked.set(this.wishes, { wish, place, title: app.shaders.material(row.material).title });
+      this.text({ type: "choice", id: this.wishes, revision: app.data.revision, material: row.material, choices: row.choices, on, fixed });
+    }
+    this.showWaiting();
+  }
+
+  /** A layer or a choice whose shader the server writes: until it is here, the picture is that of before. */
+  private showWaiting(): void {
+    const titles = new Set([...this.asked.values()].map(({ title }) => title));
+    this.app.onBusy("server", titles.size ? `The server writes the shader of ${[...titles].join(", ")}` : null);
+  }
+
+  /** What was asked for: nobody answers any more. */
+  private forget(): void {
+    this.waiting.clear();
+    this.asked.clear();
+    this.showWaiting();
   }
 
   private read(text: string): void {
@@ -191,28 +215,32 @@ export class Live {
       this.status.device = String(message["device"] ?? "");
     } else if (message.type === "error") {
       this.status.message = String(message["what"]);
+      if (this.asked.delete(Number(message["id"]))) this.showWaiting(); // not asked for again: the answer would be the same
       this.app.say([message["what"], message["where"], message["hint"]].filter(Boolean).join(" — "), "error");
     } else if (message.type === "stage") {
-      this.renew(message as unknown as Pick<PageData, "revision" | "materials" | "scene">);
+      this.renew(message as unknown as Pick<PageData, "revision" | "materials" | "scene" | "dfg">);
     } else if (message.type === "fault") {
       this.app.onFault(message as unknown as Fault);
     } else if (message.type === "variant" && message["revision"] === this.app.data.revision) {
       const material = this.app.shaders.material(String(message["material"]));
       material.variants.push(message["variant"] as Variant);
-      const wish = this.asked.get(Number(message["id"]));
-      if (wish) this.waiting.delete(wish);
+      const dfg = message["dfg"] as SplitSum | null;
+      if (dfg && !this.app.data.dfg.some(({ facets }) => facets.join() === dfg.facets.join())) this.app.data.dfg.push(dfg);
+      const asked = this.asked.get(Number(message["id"]));
+      if (asked) this.waiting.delete(asked.wish);
       this.asked.delete(Number(message["id"]));
+      this.showWaiting();
       this.app.store.update("slots", () => {});
     }
     this.onStatus();
   }
 
   /** A saved file: everything that was asked for is asked for anew. */
-  private renew(made: Pick<PageData, "revision" | "materials" | "scene">): void {
+  private renew(made: Pick<PageData, "revision" | "materials" | "scene" | "dfg">): void {
     const { app } = this;
     this.sent = "";
     this.id += 1;
-    this.waiting.clear();
+    this.forget();
     this.awaited = app.frames; // the page's own picture comes first: both want all of a small machine
     if (app.reference) app.setReference({ ...app.reference, stale: true });
     app.renew(made);

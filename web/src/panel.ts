@@ -74,9 +74,9 @@ export interface App {
   readonly canvas: HTMLCanvasElement;
   /** The element over the canvas for handles, marks and labels (pointer-events: none; children may switch it on). */
   readonly overlay: HTMLElement;
-  /** The shader that a slot's material and choices select. */
-  shaderOf(slot: number): Shader;
-  /** Every field's value of one ball: declared, then the row's, then the ball's own. */
+  /** The shader that draws a ball; without one, the selected ball of the slot, or its first. */
+  shaderOf(slot: number, ball?: number): Shader;
+  /** Every field's value of one ball, as its shader draws it: declared, then the row's, then the ball's own. */
   valuesOf(slot: number, ball: number): Values;
   /** Slots that are shown now: all, or the solo one. */
   visibleSlots(): number[];

@@ -4,14 +4,17 @@
  * A sample's position in the pixel and its random numbers come from low-discrepancy sequences, so that the sum tends
  * to the box-filtered picture that a path tracer makes. Only the pixels that a ball may cover are visited.
  */
-import { type Values, type Vec3, decodeFloats } from "./data";
-import { TONES, displayProgram } from "./display";
+import type { Values, Vec3 } from "./data";
+import { MOST_BLACK, TONES, displayProgram } from "./display";
 import { AlbedoTables, type EnvironmentPicture, type PrefilteredLevel, PrefilteredEnvironments, alphaOf, roughnessOf } from "./environment";
+import { type Box, type Flaw, boxOf, count } from "./flaws";
 import { DEPTH_FRAGMENT, DEPTH_VERTEX, type EnvironmentUse, type ShadingKey, copies, fragmentText, hasTerm, isFactor, isSigned, isWhole, splits, vertexText } from "./glsl";
 import { actingLights, bindLights, environmentOf, localLights } from "./lights";
 import type { MeshBuffers } from "./meshes";
 import type { Picture, Presenter } from "./panel";
-import type { Program, Shader, ShaderLibrary } from "./shaders";
+import type { Program, Source } from "./programs";
+import type { Shader, ShaderLibrary } from "./shaders";
+import { isLong } from "./size";
 import type { State } from "./state";
 import { type Target, areaSequence, createTarget, deleteTarget, floatBlending, readTarget, sequence } from "./targets";
 import { type Frame, cameraFrame, fitted, length, sphereBounds, sub } from "./vectors";
@@ -34,6 +37,8 @@ export interface Scene {
   mesh: MeshBuffers | null;
   /** sRGB of the page behind the balls. */
   paper: Vec3;
+  /** What is wrong with the last picture of them. */
+  flaws: readonly Flaw[];
 }
 
 interface Draw extends DrawnBall {
@@ -49,6 +54,10 @@ const SAMPLES_HALF = 64; // float16 sums: at 64 a sample is still 16 units in th
 
 /** From so many samples on the split sum no longer counts beside them: docs/viewer.md, "Light of an environment". */
 const EARLY_END = 64;
+
+/** How an environment is integrated, and what is taken off. */
+type Uses = Pick<ShadingKey, "environment" | "minus">;
+const SPLIT_SUM: Uses = { environment: "split-sum", minus: "none" };
 
 interface Prepared {
   draw: Draw;
@@ -73,7 +82,6 @@ export class Renderer {
   private readonly prefiltered: PrefilteredEnvironments;
   private readonly empty: WebGLVertexArrayObject;
   private black: WebGLTexture;
-  private readonly dfg: WebGLTexture | null;
   /** False while tables that the picture is made of still refine. */
   settled = true;
 
@@ -89,13 +97,6 @@ export class Renderer {
     this.black = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.black);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-    const { dfg } = shaders.data;
-    this.dfg = dfg ? gl.createTexture() : null;
-    if (dfg) {
-      gl.bindTexture(gl.TEXTURE_2D, this.dfg);
-      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RG32F, dfg.size[0], dfg.size[1], 0, gl.RG, gl.FLOAT, decodeFloats(dfg.data));
-      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    }
   }
 
   get width(): number {
@@ -165,10 +166,11 @@ export class Renderer {
         draws.push({ draw: { ...draw, gain: 0, cover: 0 }, ...rest });
         continue;
       }
+      if (!this.shaders.programs.ready(this.sources(scene, draw.shader, SPLIT_SUM))) return;
       if (!this.prefiltered.of(draw.shader, draw.values, environment, !hurry)?.complete) return;
       // Samples that it is worth: the smoother the ball, the less it errs. At every number of them the picture is nearer the truth.
       const weight = 4 / Math.max(roughness, 0.25) ** 2;
-      draws.push(this.prepare(scene, { ...draw, gain: weight, cover: weight }, { environment: "split-sum", minus: "none" }, true));
+      draws.push(this.prepare(scene, { ...draw, gain: weight, cover: weight }, SPLIT_SUM, true));
     }
     if (draws.every(({ draw }) => draw.gain === 0)) return;
     this.hasEarly = true;
@@ -218,7 +220,7 @@ export class Renderer {
   }
 
   /** How the environment is integrated, and what is taken off again. */
-  environmentUse(scene: Scene, shader: Shader): Pick<ShadingKey, "environment" | "minus"> {
+  environmentUse(scene: Scene, shader: Shader): Uses {
     const { view } = scene.state;
     const splitting = view.term === "split" || view.term === "split-error";
     const environment = this.integral(scene, shader, splitting);
@@ -240,11 +242,11 @@ export class Renderer {
     // The two numbers hold single scattering and multiply a reflectance at normal incidence: a compensated material,
     // or one without Fresnel's term, takes its own albedo instead.
     const single = hasTerm(manifest, "F") && !hasTerm(manifest, "multi");
-    return !splits(manifest) ? "sampled" : this.dfg && single && alphaOf(shader) ? "dfg" : "split-sum";
+    return !splits(manifest) ? "sampled" : this.shaders.splitSum(shader) && single && alphaOf(shader) ? "dfg" : "split-sum";
   }
 
   /** `environmentUse`, with what is sampled by a picture where there is one. */
-  private uses(scene: Scene, shader: Shader): Pick<ShadingKey, "environment" | "minus"> {
+  private uses(scene: Scene, shader: Shader): Uses {
     if (isFactor(scene.state.view.term)) return { environment: "none", minus: "none" };
     const { environment, minus } = this.environmentUse(scene, shader);
     const pictured = scene.environment && environmentOf(actingLights(scene.state))?.image;
@@ -252,18 +254,46 @@ export class Renderer {
     return { environment: way(environment), minus: way(minus) };
   }
 
-  private prepare(scene: Scene, draw: Draw, uses: Pick<ShadingKey, "environment" | "minus">, hurry: boolean): Prepared {
-    const { gl } = this;
+  /** Whether the next picture can be drawn without waiting for a program; begins to make those that are missing. */
+  ready(scene: Scene): boolean {
+    const shown = [...scene.balls, ...scene.minuend].map(({ shader }) => shader);
+    return this.shaders.programs.ready([...new Set(shown)].flatMap((shader) => this.sources(scene, shader, this.uses(scene, shader))));
+  }
+
+  private sources(scene: Scene, shader: Shader, uses: Uses): Source[] {
+    const { environment: use } = uses;
+    const tables = [
+      ...(use === "albedo" || use === "split-sum" ? [this.albedo.source(shader)] : []),
+      ...((use === "split-sum" || use === "dfg") && scene.environment ? [this.prefiltered.source(shader)] : []),
+    ];
+    return [...this.shaders.derivingSources(shader), ...tables, this.shading(scene, shader, uses)];
+  }
+
+  /** What draws a ball. */
+  private shading(scene: Scene, shader: Shader, uses: Uses): Source {
     const { term } = scene.state.view;
     // Lights that are no environment are summed exactly: between two integrals of it nothing of them is left.
-    const lights = term === "split-error" ? 0 : copies(draw.shader, localLights(actingLights(scene.state)).length);
+    const lights = term === "split-error" ? 0 : copies(shader, localLights(actingLights(scene.state)).length);
     const key: ShadingKey = { geometry: scene.mesh ? "mesh" : "sphere", lights, ...uses, term };
+    return {
+      key: `${shader.code} ${key.geometry} ${key.lights} ${key.environment} ${key.minus} ${key.term}`,
+      title: shader.material.title,
+      long: isLong(shader),
+      vertex: () => vertexText(shader, key.geometry),
+      fragment: () => fragmentText(shader, key),
+    };
+  }
+
+  /** What a ball's draw needs besides its program: tables are drawn into framebuffers of their own. */
+  private prepare(scene: Scene, draw: Draw, uses: Uses, hurry: boolean): Prepared {
+    const { gl } = this;
     const { environment: use } = uses;
     let row = 0;
     let level: PrefilteredLevel | null = null;
     const tables: { complete: boolean; finished: boolean }[] = [];
+    this.shaders.derive(draw.shader, draw.values);
+    gl.bindVertexArray(this.empty);
     if (use === "albedo" || use === "split-sum") {
-      gl.bindVertexArray(this.empty);
       const made = this.albedo.row(draw.shader, draw.values, hurry ? 1 : 4);
       row = made.row;
       tables.push(made);
@@ -273,8 +303,7 @@ export class Renderer {
       if (level) tables.push(level);
     }
     const [complete, finished] = [tables.every((table) => table.complete), tables.some((table) => table.finished)];
-    const name = `${draw.shader.key} ${key.geometry} ${key.lights} ${key.environment} ${key.minus} ${key.term}`;
-    return { draw, program: this.shaders.program(name, vertexText(draw.shader, key.geometry), fragmentText(draw.shader, key)), row, level, complete, finished };
+    return { draw, program: this.shaders.program(this.shading(scene, draw.shader, uses)), row, level, complete, finished };
   }
 
   private camera(program: Program, frame: Frame): void {
@@ -292,7 +321,7 @@ export class Renderer {
 
   private depthPass(mesh: MeshBuffers, draws: Draw[], frame: Frame): void {
     const { gl } = this;
-    const program = this.shaders.program("depth", DEPTH_VERTEX, DEPTH_FRAGMENT);
+    const program = this.shaders.program({ key: "depth", title: "depth", long: false, vertex: () => DEPTH_VERTEX, fragment: () => DEPTH_FRAGMENT });
     gl.useProgram(program.handle);
     this.camera(program, frame);
     gl.colorMask(false, false, false, false);
@@ -328,7 +357,8 @@ export class Renderer {
     gl.uniform1f(program.uniform("albedo_row"), row);
     texture("prefiltered", level?.texture ?? null);
     gl.uniform1f(program.uniform("prefiltered_level"), level?.level ?? 0);
-    texture("dfg_table", this.dfg);
+    gl.activeTexture(gl.TEXTURE0 + unit); // where one that is made only now may be bound
+    if (program.uniform("dfg_table")) texture("dfg_table", this.shaders.splitSumTexture(draw.shader));
     const width = alphaOf(draw.shader);
     if (width) gl.uniform1f(program.uniform("dfg_roughness"), Math.sqrt(([draw.values[width]].flat() as number[])[0] ?? 0));
     gl.uniform3fv(program.uniform("random_point"), sequence(3, this.samples));
@@ -368,6 +398,22 @@ export class Renderer {
     return this.hasEarly ? Math.max(0, 1 - this.samples / EARLY_END) / Math.sqrt(this.samples) : 0;
   }
 
+  /** What the sum holds of each ball; waits for the GPU. Null where floats cannot be read back, or a mesh hides where balls are. */
+  inspect(scene: Scene): ReturnType<typeof count> | null {
+    const { gl, target } = this;
+    if (!target || this.samples === 0 || !gl.getExtension("EXT_color_buffer_float")) return null;
+    gl.bindVertexArray(this.empty);
+    const found = count(gl, this.shaders, target, this.boxes(scene));
+    gl.bindVertexArray(null);
+    return found;
+  }
+
+  private boxes(scene: Scene): (Box | null)[] {
+    const { width, height } = this;
+    const frame = cameraFrame(scene.state.camera);
+    return scene.balls.map(({ center }) => boxOf(frame, center, width / height));
+  }
+
   /** Draws the sum to the canvas, or lets a panel draw it its own way. */
   present(scene: Scene, presenter: Presenter | null, width: number, height: number): void {
     const { gl, target } = this;
@@ -397,6 +443,11 @@ export class Renderer {
     gl.uniform1i(program.uniform("has_sign"), scene.minuend.length > 0 || isSigned(state.view.term) ? 1 : 0);
     gl.uniform3fv(program.uniform("theme"), scene.paper);
     const shown = environmentOf(actingLights(state)) !== null && (state.furnace || state.view.background === "environment");
+    const boxes = scene.flaws.length ? this.boxes(scene) : [];
+    const black = scene.balls.flatMap(({ slot, ball }, i) => (boxes[i] && scene.flaws.some((f) => f.kind === "black" && f.slot === slot && f.ball === ball) ? [boxes[i]] : [])).slice(0, MOST_BLACK);
+    gl.uniform1i(program.uniform("has_broken"), scene.flaws.some((flaw) => flaw.kind === "no number") ? 1 : 0);
+    gl.uniform1i(program.uniform("black_count"), black.length);
+    if (black.length) gl.uniform4fv(program.uniform("black_boxes"), black.flat());
     gl.uniform1i(program.uniform("in_environment"), shown && !isFactor(state.view.term) ? 1 : 0);
     let unit = 2;
     this.environmentUniforms(program, scene, (name, value) => {

@@ -261,17 +261,6 @@ def from_json(described: Mapping[str, object]) -> BSDF:
     return made(class_named(str(fields.pop("type")), "material"), fields)[0]
 
 
-def changed(material: BSDF, values: Mapping[str, object]) -> BSDF:
-    """The material with other values, by path: text, or what JSON has for them. InputError for what cannot be."""
-    typed_values = {}
-    for path, value in values.items():
-        above, _, name = path.rpartition(".")
-        owner = tree.value_at(material, above) if above else material
-        parameter = owner.parameters().get(name) if isinstance(owner, BSDF) else None
-        typed_values[path] = value if parameter is None else typed(parameter, value)
-    return tree.replace(material, typed_values, "--param")
-
-
 def settings(material: BSDF) -> dict[str, Value]:
     """The parameters that are not the default, by name."""
     found = {}

@@ -16,7 +16,9 @@ from ..errors import GonioError, InputError
 from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.sample import Sample
-from ..models.user_code import (
+from ..ops import ForbiddenOperator, RecordingError
+from ..owner import alone
+from .user_code import (
     PREFIX,
     files_in,
     forget,
@@ -29,12 +31,10 @@ from ..models.user_code import (
     thing,
     with_imports,
 )
-from ..ops import ForbiddenOperator, RecordingError
-from ..owner import alone
 
 __all__ = [
     "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",
-    "names_code", "names_data", "probe", "reader_of", "thing", "with_imports",
+    "names_code", "probe", "reader_of", "thing", "with_imports",
 ]  # fmt: skip
 
 

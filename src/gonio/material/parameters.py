@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Never, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..catalog import user_code
 from ..errors import GonioWarning, InputError, did_you_mean
 from ..members import Family
-from ..models import user_code
 from ..ops import Pair, Scalar, Spectrum, backend, graph, sincos
 from ..optics import indices
 

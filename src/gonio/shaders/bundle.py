@@ -312,6 +312,7 @@ TERMS = {
 
 
 def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
+    fixed = model.fixed
     for path, parameter, value, _ in tree.surface(model):
         yield {
             "path": path,
@@ -326,6 +327,7 @@ def _parameters(model: BSDF, fields: set[str]) -> Iterator[dict[str, Json]]:
             "choices": parameter.choices,
             "field": programs.flat(path) if path in fields else None,
             "off": parameter.off,
+            "fixed": path in fixed,
         }
 
 

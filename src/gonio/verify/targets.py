@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..catalog import notation, operands, texts
+from ..catalog import notation, operands, outside, texts
 from ..catalog.operands import Kind
 from ..errors import InputError
 from .subject import Subject
@@ -73,6 +73,7 @@ def _build(target: str, given: dict[str, str]) -> Subject:
         properties = {key: _property(value) for key, value in given.items()}
         plugin = foreign.plugin_in(head, properties)
         if plugin is not None:
+            return Subject(plugin, head, properties)
     cls, own = notation.taken_apart(target, "TARGET")
     bsdf, values = notation.made(cls, {**own, **given})
     bsdf = outside.check_operators(bsdf)

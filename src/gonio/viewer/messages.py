@@ -138,7 +138,8 @@ class Upload(Part):
 
 
 class Wish(Part):
-    """Ask for a material's shader with other choices, and with these weights (`on`) that are off by themselves."""
+    """Ask for a material's shader with other choices, with these weights (`on`) that are off by themselves, and with
+    tables that are found from these values (`fixed`)."""
 
     type: Literal["choice"]
     id: Annotated[int, Field(ge=0, lt=2**53)]
@@ -146,6 +147,7 @@ class Wish(Part):
     material: Key
     choices: dict[Path, Choice] = Field(max_length=32)
     on: list[Path] = Field(default=[], max_length=64)
+    fixed: dict[Path, Value] = Field(default_factory=dict, max_length=64)
 
 
 Message = Annotated[Scene | Ack | Upload | Wish, Field(discriminator="type")]
@@ -197,17 +199,19 @@ def environment(upload: Upload, content: bytes) -> NDArray[np.float32]:
     return pixels
 
 
-def failure(error: GonioError, kind: str = "error") -> str:
+def failure(error: GonioError, kind: str = "error", wish: int | None = None) -> str:
     """An error as the page shows it.
 
     kind  "error", which goes by, or "fault": the user's file is broken, until the next "stage"
+    wish  the id of what was asked for and cannot be had
     """
-    return json.dumps({"type": kind, "what": error.what, "where": error.where, "hint": error.hint})
+    asked = {} if wish is None else {"id": wish}
+    return json.dumps({"type": kind, **asked, "what": error.what, "where": error.where, "hint": error.hint})
 
 
 def stage(data: PageData) -> str:
     """Other materials and rows in the place of those that the page has."""
-    parts = {"revision": data["revision"], "materials": data["materials"], "scene": data["scene"]}
+    parts = {key: data[key] for key in ("revision", "materials", "scene", "dfg")}  # type: ignore[literal-required]
     return json.dumps({"type": "stage", **parts}, allow_nan=False)
 
 

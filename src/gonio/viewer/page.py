@@ -11,7 +11,7 @@ import hashlib
 import html as escaping
 import itertools
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias, TypedDict
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..energy.tables import bake
-from ..errors import InputError, MachineError
+from ..errors import InputError, MachineError, did_you_mean
 from ..material import BSDF, tree
 from ..material.recording import switched_off
 from ..owner import alone
@@ -35,12 +35,16 @@ Json: TypeAlias = "dict[str, object]"  # what becomes JSON, as docs/viewer.md de
 class VariantData(TypedDict):
     """A material with some choices made, as shader code.
 
-    off  paths of weights at whose value of nothing it was written: it does for balls that have them so
+    off     paths of weights at whose value of nothing it was written: it does for balls that have them so
+    fixed   values that its tables were found from (`BSDF.fixed`), by path: it does for balls that have them so
+    facets  [distribution, masking] of what reflects in it, where that are facets: which of the page's `dfg` is its own
     """
 
     key: str
     choices: dict[str, Value]
     off: list[str]
+    fixed: dict[str, Value]
+    facets: list[str] | None
     manifest: Json
     text: str
     tables: dict[str, str]
@@ -53,6 +57,15 @@ class MaterialData(TypedDict):
     title: str
     presets: list[PresetData]
     variants: list[VariantData]
+
+
+class SplitSumData(TypedDict):
+    """A and B of the split sum of some facets, over mu (x) and roughness (y), at texel centres."""
+
+    facets: list[str]
+    size: list[int]
+    channels: int
+    data: str
 
 
 class PageData(TypedDict):
@@ -68,7 +81,7 @@ class PageData(TypedDict):
     scene: Json
     display: Json
     notes: list[str]
-    dfg: Json
+    dfg: list[SplitSumData]
 
 
 VERSION = 1
@@ -94,6 +107,12 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> Page
     Raises InputError where a model cannot be written as shader code.
     """
     used = {row.material for row in what.rows}
+    materials = [
+        material_data(key, m, _switched_on(what, key), socket is None, _fixed(what, key))
+        for key, m in what.materials.items()
+        if key in used
+    ]
+    facets = {tuple(v["facets"]): None for m in materials for v in m["variants"] if v["facets"]}
     return {
         "version": VERSION,
         "generator": f"gonio {__version__}",
@@ -101,11 +120,7 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> Page
         "mode": "export" if socket is None else "live",
         "socket": socket,
         "revision": revision,
-        "materials": [
-            material_data(key, m, _switched_on(what, key), socket is None)
-            for key, m in what.materials.items()
-            if key in used
-        ],
+        "materials": materials,
         "scene": {
             "rows": [
                 {
@@ -122,44 +137,82 @@ def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> Page
         },
         "display": {"tone": "none", "exposure": 0.0},
         "notes": list(what.notes),
-        "dfg": split_sum_data(),
+        "dfg": [table for ndf, masking in facets if (table := split_sum_data(ndf, masking))],
     }
 
 
 def _switched_on(what: Stage, key: str) -> set[str]:
     """Paths of the weights that are not off on some ball of a material."""
-    material = what.materials[key].bsdf
-    balls = [ball.values for row in what.rows if row.material == key for ball in row.balls]
     return {
         leaf.path
-        for leaf in tree.leaves(material)
+        for leaf in tree.leaves(what.materials[key].bsdf)
         if leaf.parameter.off is not None
-        and any(not leaf.parameter.is_off(values.get(leaf.path, leaf.value)) for values in balls)
+        and any(not leaf.parameter.is_off(values.get(leaf.path, leaf.value)) for values in _balls(what, key))
     }
 
 
-def material_data(key: str, material: stage.Material, on: Collection[str] = (), whole: bool = True) -> MaterialData:
+def _fixed(what: Stage, key: str) -> list[dict[str, Value]]:
+    """The distinct values on the balls of a material of what its tables are found from."""
+    fixed = what.materials[key].bsdf.fixed
+    found: list[dict[str, Value]] = []
+    for values in _balls(what, key):
+        own = {path: value for path, value in values.items() if path in fixed}
+        if own not in found:
+            found.append(own)
+    return found
+
+
+def _balls(what: Stage, key: str) -> list[Mapping[str, Value]]:
+    return [ball.values for row in what.rows if row.material == key for ball in row.balls]
+
+
+def material_data(
+    key: str,
+    material: stage.Material,
+    on: Collection[str] = (),
+    whole: bool = True,
+    fixed: Sequence[Mapping[str, Value]] = ({},),
+) -> MaterialData:
     """A material with its presets and one variant for every combination of its choices, the model's own first.
 
     on     paths of weights that its balls switch on
-    whole  add variants with every layer, for a page that nobody writes another for
+    whole  add variants with every layer, and with what presets choose, for a page that nobody writes another for
+    fixed  values by path, of what its tables are found from: a variant each
     """
+    presets = stage.presets(material.bsdf)
     names = list(material.choices)
-    combinations = [dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())]
-    variants = [variant_data(material.bsdf, choices, on) for choices in combinations]
+    combinations: list[dict[str, Value]] = [
+        dict(zip(names, c, strict=True)) for c in itertools.product(*material.choices.values())
+    ]
+    if whole:
+        chosen = [_choices_of(preset) for preset in presets]
+        combinations += [made for i, made in enumerate(chosen) if made and made not in chosen[:i]]
+    wanted = [(choices, values) for choices in combinations for values in fixed]
+    variants = [variant_data(material.bsdf, choices, on, values) for choices, values in wanted]
     if whole and any(variant["off"] for variant in variants):
         every = switched_off(material.bsdf)
-        variants += [variant_data(material.bsdf, choices, every) for choices in combinations]
-    return {"id": key, "title": material.title, "presets": stage.presets(material.bsdf), "variants": variants}
+        variants += [variant_data(material.bsdf, choices, every, values) for choices, values in wanted]
+    return {"id": key, "title": material.title, "presets": presets, "variants": variants}
+
+
+def _choices_of(preset: PresetData) -> dict[str, Value]:
+    return {path: value for path, value in preset["set"].items() if isinstance(value, str | bool)}
 
 
 @alone
-def variant_data(bsdf: BSDF, choices: Mapping[str, Value], on: Collection[str] = ()) -> VariantData:
+def variant_data(
+    bsdf: BSDF, choices: Mapping[str, Value], on: Collection[str] = (), fixed: Mapping[str, Value] | None = None
+) -> VariantData:
     """Shader, manifest and tables of a model with some choices made otherwise, without the layers that are off.
 
-    on  paths of weights that are written all the same
+    on     paths of weights that are written all the same
+    fixed  other values of what the tables are found from; InputError for what they do not depend on
     """
-    bundle = written_for(stage.replaced(bsdf, choices, "choices"), "glsl", lean=True, on=on)
+    own = {leaf.path: leaf.value for leaf in tree.leaves(bsdf) if leaf.path in bsdf.fixed}
+    if wrong := next((path for path in fixed or {} if path not in own), None):
+        raise InputError(f"no table is found from '{wrong}'", "fixed", did_you_mean(wrong, sorted(own)))
+    made = stage.replaced(bsdf, {**choices, **(fixed or {})}, "choices")
+    bundle = written_for(made, "glsl", lean=True, on=on)
     tables = {name: encode(values) for name, values in bundle.tables.items()}
     manifest = bundle.manifest
     for texture in manifest["textures"]:
@@ -170,14 +223,25 @@ def variant_data(bsdf: BSDF, choices: Mapping[str, Value], on: Collection[str] =
     key = hashlib.sha256(code.encode()).hexdigest()[:16]
     fields = {field["path"] for field in manifest["fields"]}
     off = [p["path"] for p in manifest["parameters"] if p["off"] is not None and p["path"] not in fields]
+    held = {p["path"]: p["value"] for p in manifest["parameters"] if p["fixed"] and p["value"] is not None}
+    for parameter in manifest["parameters"]:  # a variant's own values are no declaration
+        if parameter["path"] in held:
+            parameter["value"] = np.asarray(own[parameter["path"]], float).tolist()
     return {
         "key": key,
         "choices": dict(choices),
         "off": off,
+        "fixed": held,
+        "facets": _facets(made) if any(term["name"] == "D" for term in manifest["terms"]) else None,
         "manifest": manifest,
         "text": bundle.text,
         "tables": tables,
     }
+
+
+def _facets(bsdf: BSDF) -> list[str] | None:
+    surfaces = (inner.microsurface for _, inner in tree.walk(bsdf))
+    return next(([surface.ndf, surface.masking] for surface in surfaces if surface is not None), None)
 
 
 def encode(values: NDArray[np.floating]) -> str:
@@ -186,10 +250,13 @@ def encode(values: NDArray[np.floating]) -> str:
 
 
 @lru_cache
-def split_sum_data() -> Json:
-    """A and B of the split sum (Karis2013) for GGX, over mu (x) and roughness (y), at texel centres."""
-    values = bake.bake("ggx", lut=["dfg"], size=DFG_SIZE).arrays["dfg"]
-    return {"size": [DFG_SIZE, DFG_SIZE], "channels": 2, "data": encode(values)}
+def split_sum_data(ndf: str, masking: str) -> SplitSumData | None:
+    """A and B of the split sum (Karis2013) for a distribution and a masking term; None where they have no table."""
+    try:
+        values = bake.bake(ndf, lut=["dfg"], size=DFG_SIZE, masking=masking).arrays["dfg"]
+    except InputError:
+        return None
+    return {"facets": [ndf, masking], "size": [DFG_SIZE, DFG_SIZE], "channels": 2, "data": encode(values)}
 
 
 # --------------------------------------------------------------------------- HTML
@@ -279,4 +346,4 @@ def export(what: Stage, path: Path) -> Path:
     return target
 
 
-__all__ = ["content_policy", "export", "html", "page_data", "variant_data"]
+__all__ = ["content_policy", "export", "html", "page_data", "split_sum_data", "variant_data"]

@@ -89,13 +89,16 @@ class Session:
             if received["type"] == "websocket.disconnect":
                 return
             began, more = time.thread_time(), 0.0
+            wish = None
             try:
                 if received.get("text") is not None:
-                    self._take(messages.parse(received["text"]))
+                    message = messages.parse(received["text"])
+                    wish = message.id if isinstance(message, messages.Wish) else None
+                    self._take(message)
                 elif received.get("bytes") is not None:
                     await self._take_upload(received["bytes"])
             except GonioError as error:
-                self.send(messages.failure(error))
+                self.send(messages.failure(error, wish=wish))
                 more = NONSENSE_SECONDS
             await self._pace(time.thread_time() - began + more)
 
@@ -372,12 +375,14 @@ class _Variant:
     def __call__(self) -> None:
         wish = self.wish
         try:
-            variant = page.variant_data(self.stage.materials[wish.material].bsdf, dict(wish.choices), wish.on)
-            answer = {"type": "variant", "id": wish.id, "material": wish.material, "variant": variant}
+            bsdf = self.stage.materials[wish.material].bsdf
+            variant = page.variant_data(bsdf, dict(wish.choices), wish.on, dict(wish.fixed))
+            dfg = page.split_sum_data(*variant["facets"]) if variant["facets"] else None
+            answer = {"type": "variant", "id": wish.id, "material": wish.material, "variant": variant, "dfg": dfg}
             answer["revision"] = wish.revision
             self.session.send_from_thread(json.dumps(answer, allow_nan=False))
         except GonioError as error:
-            self.session.send_from_thread(messages.failure(error))
+            self.session.send_from_thread(messages.failure(error, wish=wish.id))
         except Exception as error:
             what = f"the shader cannot be written: {type(error).__name__}: {error}"
-            self.session.send_from_thread(messages.failure(GonioError(what, wish.material)))
+            self.session.send_from_thread(messages.failure(GonioError(what, wish.material), wish=wish.id))

@@ -10,19 +10,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NotRequired, TypeAlias, TypedDict
 
 import numpy as np
 
-from ..catalog import notation, operands, outside
+from ..catalog import operands, outside
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, Parameter, model, tree
 from ..ops import backend
+from .targets import Named, named
 from .watch import Code
 
+Leaf: TypeAlias = "tree.Leaf[BSDF]"
 Value: TypeAlias = "float | bool | str | Sequence[float]"  # of a parameter, as JSON has it
 Light: TypeAlias = "dict[str, object]"  # as docs/viewer.md writes it
 
@@ -215,30 +217,38 @@ def of_targets(targets: Sequence[str], parameters: Sequence[str] = ()) -> Stage:
 
 
 def _of_targets(targets: Sequence[str], parameters: Sequence[str]) -> Stage:
+    found, notes = shown(targets, parameters)
+    return replace(of_models([one.bsdf for one in found], [one.given for one in found]), notes=tuple(notes))
+
+
+def shown(targets: Sequence[str], parameters: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
+    """`targets.named`, of what a page can show; InputError for anything else."""
     for target in targets:
         if operands.MATERIALS.isdisjoint(operands.readings(target)):
             hint = "the page's shader code is written from Gonio's models only"
             raise InputError(f"'{target}' is no model of Gonio", "MODEL", hint)
-    found = notation.several(targets, parameters)
-    bsdfs = [outside.probe(notation.made(cls, settings)[0]) for cls, settings in found]
-    return of_models(bsdfs, [{*settings} for _, settings in found])
+    return named(targets, parameters)
 
 
-def of_models(bsdfs: Sequence[BSDF], given: Sequence[set[str]] | None = None) -> Stage:
+def of_models(bsdfs: Sequence[BSDF], given: Sequence[Collection[str]] | None = None) -> Stage:
     """One row a model. Where no width is given, five balls from smooth to rough; else five over its first number.
 
-    given  per model, the names of parameters that the user has fixed
+    given  per model, the paths of parameters that the user has fixed
     """
     if not bsdfs:
         return homework()
-    fixed = given or [set() for _ in bsdfs]
+    free = [
+        [leaf for leaf in tree.leaves(bsdf) if leaf.path not in fixed]
+        for bsdf, fixed in zip(bsdfs, given or [()] * len(bsdfs), strict=True)
+    ]
+    mains = _mains(free)
     materials, rows = {}, []
     titles = _titles(bsdfs)
-    for index, (bsdf, names, title) in enumerate(zip(bsdfs, fixed, titles, strict=True)):
+    for index, (bsdf, main, title) in enumerate(zip(bsdfs, mains, titles, strict=True)):
         key = f"m{index}"
         path, choices = _masking(bsdf)
         materials[key] = Material(title, bsdf, {path: choices} if path else {})
-        rows.append(Row(title, key, _series(bsdf, names)))
+        rows.append(Row(title, key, _series(main) if main else (Ball(_title(bsdf)),)))
     title = ", ".join(titles)
     return Stage(title, materials, tuple(rows))
 
@@ -270,20 +280,45 @@ def _accepts(bsdf: BSDF, values: Mapping[str, Value]) -> bool:
     return True
 
 
-def _series(bsdf: BSDF, fixed: set[str]) -> tuple[Ball, ...]:
-    """Balls over the first width that is not fixed, else over the first such number, else one ball."""
-    free = [leaf for leaf in tree.leaves(bsdf) if fixed.isdisjoint((leaf.path, leaf.path.partition(".")[0]))]
-    for path, parameter, value, _ in free:
-        if parameter.kind == "alpha" and not isinstance(value, tuple):
-            return tuple(_rough(path, r) for r in ROUGHNESS)
-    for path, parameter, value, _ in free:
-        if parameter.kind == "float":
-            return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, value))
-    for path, parameter, _, owner in free:
-        named = any(parameter.name in preset.values for preset in owner.presets().values())  # colours to choose from
-        if parameter.kind == "spectrum" and parameter.high <= 1.0 and not named:
-            return tuple(Ball(f"{path} {_short(v)}", {path: [v] * 3}) for v in (0.1, 0.3, 0.5, 0.7, 0.9))
-    return (Ball(_title(bsdf)),)
+def _mains(free: Sequence[Sequence[Leaf]]) -> list[Leaf | None]:
+    """Of each row what its balls run over, None where that is nothing.
+
+    Rows that hold the same material, one of them inside another, run over the same: a width, else what another row runs
+    over.
+    """
+    mains = [_main(leaves) for leaves in free]
+    names = {main.path for main in mains if main is not None}
+    for row, main in enumerate(mains):
+        if main is None or main.parameter.kind == "alpha" or "." in main.path:
+            continue
+        inside = (leaf for leaf in free[row] if "." in leaf.path and leaf.parameter.name in names - {main.path})
+        mains[row] = next(inside, main)
+    return mains
+
+
+def _main(leaves: Sequence[Leaf]) -> Leaf | None:
+    """The first width, else the first number, else the first colour that is none of several in a preset."""
+    for leaf in leaves:
+        if leaf.parameter.kind == "alpha" and not isinstance(leaf.value, tuple):
+            return leaf
+    for leaf in leaves:
+        if leaf.parameter.kind == "float":
+            return leaf
+    for leaf in leaves:
+        named = any(leaf.parameter.name in preset.values for preset in leaf.owner.presets().values())
+        if leaf.parameter.kind == "spectrum" and leaf.parameter.high <= 1.0 and not named:
+            return leaf
+    return None
+
+
+def _series(main: Leaf) -> tuple[Ball, ...]:
+    """Balls over a parameter."""
+    path, parameter, value, _ = main
+    if parameter.kind == "alpha":
+        return tuple(_rough(path, r) for r in ROUGHNESS)
+    if parameter.kind == "float":
+        return tuple(Ball(f"{path} {_short(v)}", {path: v}) for v in _steps(parameter, value))
+    return tuple(Ball(f"{path} {_short(v)}", {path: [v] * 3}) for v in (0.1, 0.3, 0.5, 0.7, 0.9))
 
 
 def _steps(parameter: Parameter, value: float) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from numbers import Integral
 from typing import TYPE_CHECKING
 
@@ -70,15 +71,15 @@ def _stage(models: tuple[object, ...]) -> stage.Stage:
     if not models:
         return stage.homework()
     bsdfs: list[BSDF] = []
-    given: list[set[str]] = []
+    given: list[Collection[str]] = []
     for model in models:
         if isinstance(model, BSDF):
             bsdfs.append(model)
             given.append(_own(model))
         elif isinstance(model, str):
-            named = stage.of_targets([model])
-            bsdfs += [m.bsdf for m in named.materials.values()]
-            given.append(set())
+            (one,), _ = stage.shown([model])
+            bsdfs.append(one.bsdf)
+            given.append(one.given)
         else:
             name = model.__name__ if isinstance(model, type) else type(model).__name__
             hint = ""

@@ -68,6 +68,7 @@ class ComparePanel implements Panel {
           ["mean x / mean r", figures.meanRatio.toFixed(5), "1 where no energy is lost or made"],
           ["FLIP", figures.flip === null ? "…" : figures.flip.toFixed(5), "0 same, 1 far: what is seen when flipping between the two as shown on this screen"],
           ["pixels", figures.pixels.toLocaleString("en"), PIXELS[this.comparison.settings().pixels]],
+          ...(figures.broken ? [["no number", figures.broken.toLocaleString("en"), "pixels without a finite number, checkered: they count in FLIP alone, as they look"] as [string, string, string]] : []),
           ["samples", `${figures.samples[0]} and ${figures.samples[1]}`, "a pixel of the raster picture (x) and of the reference (r)"],
         ]
       : [];

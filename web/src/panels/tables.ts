@@ -1,5 +1,5 @@
 /** The tables that the shaders read, as pictures, with the float32 number of the texel under the pointer. */
-import { decodeFloats } from "../data";
+import { type SplitSum, decodeFloats } from "../data";
 import type { App, Panel } from "../panel";
 import type { Change } from "../state";
 import { check, element, exact, range, select, short, Sketch } from "../plots/base";
@@ -74,9 +74,10 @@ class TablesPanel implements Panel {
   /** The albedo that facets have, which everybody looks for first, then all tables of the shown models. */
   private collect(): void {
     const wanted = new Map<string, () => Table>();
-    const { dfg } = this.app.data;
-    const facets = this.app.visibleSlots().some((slot) => this.app.shaderOf(slot).manifest.terms?.some(({ name }) => name === "D"));
-    if (dfg && facets) wanted.set("dfg", () => splitSum(dfg.size, decodeFloats(dfg.data)));
+    for (const slot of this.app.visibleSlots()) {
+      const dfg = this.app.shaders.splitSum(this.app.shaderOf(slot));
+      if (dfg) wanted.set(`dfg ${dfg.facets.join(" ")}`, () => splitSum(dfg));
+    }
     for (const slot of this.app.visibleSlots()) {
       const { key, manifest, variant, material } = this.app.shaderOf(slot);
       for (const texture of manifest.textures) {
@@ -215,14 +216,15 @@ class TablesPanel implements Panel {
 }
 
 /** A and B of the split sum, and their sum: the albedo of the same lobe where nothing is absorbed. */
-function splitSum(size: number[], ab: Float32Array): Table {
+function splitSum({ facets: [distribution, masking], size, data }: SplitSum): Table {
+  const ab = decodeFloats(data);
   const floats = new Float32Array((ab.length / 2) * 3);
   for (let i = 0; i < ab.length / 2; i++) {
     const [a, b] = [ab[2 * i] as number, ab[2 * i + 1] as number];
     floats.set([a, b, a + b], 3 * i);
   }
   return {
-    label: "GGX: albedo, and A and B of the split sum",
+    label: `${distribution === "ggx" ? "GGX" : distribution}, ${masking}: albedo, and A and B of the split sum`,
     size,
     channels: 3,
     axes: ["μ", "roughness"],

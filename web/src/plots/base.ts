@@ -26,7 +26,7 @@ export function overlaid(app: App): Model[] {
       letter: letterOf(slot),
       label: `${letterOf(slot)}  ${label}${name ? `, ${name}` : ""}`,
       color: app.slotColor(slot),
-      shader: app.shaderOf(slot),
+      shader: app.shaderOf(slot, ball),
       values: app.valuesOf(slot, ball),
     };
   });

@@ -3,8 +3,8 @@
  * or their difference in false colour. Both go through the same exposure and tone curve (display.ts).
  */
 import type { App, Picture, Presenter } from "../panel";
-import { FULLSCREEN_VERTEX, TONE_GLSL, TONES } from "../display";
-import { HEADER, link, type Program } from "../shaders";
+import { BROKEN_GLSL, CHECKER_GLSL, FULLSCREEN_VERTEX, TONE_GLSL, TONES } from "../display";
+import { HEADER, link, type Program } from "../programs";
 import type { CompareMode } from "../state";
 import { createTarget, deleteTarget, readTarget } from "../targets";
 import { colorTable } from "./colormaps";
@@ -13,7 +13,7 @@ import { rgb } from "./theme";
 
 const MODES: Record<CompareMode | "reference", number> = { off: 0, reference: 1, wipe: 2, side: 3, difference: 4 };
 
-const FRAGMENT = `${HEADER}${TONE_GLSL}
+const FRAGMENT = `${HEADER}${TONE_GLSL}${BROKEN_GLSL}${CHECKER_GLSL}
 uniform sampler2D raster;      // sums, bottom row first
 uniform sampler2D reference;   // means, top row first
 uniform sampler2D differences; // top row first; negative: does not count
@@ -31,6 +31,7 @@ vec4 picture(bool second, vec2 at) {
 }
 
 vec3 shown(vec4 light) {
+  if (page_broken(light.rgb)) return page_checker();
   // In the furnace the light is all round, behind the balls too; else the theme's colour is, as paper.
   if (furnace) return tone_mapped((light.rgb + max(1.0 - light.a, 0.0)) * exposure, curve);
   vec3 ball = tone_mapped(light.rgb / max(light.a, 1e-6) * exposure, curve);

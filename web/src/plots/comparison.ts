@@ -8,7 +8,7 @@ import { element, latest, short } from "./base";
 import { colorTable, css } from "./colormaps";
 import { CompareView } from "./compare_view";
 import { flipMap } from "./flip";
-import { counted, differenceMap, measure, type Measures, meanOf, type Pair, type Pixels, PIXELS, quantile } from "./metrics";
+import { counted, differenceMap, measure, type Measures, meanOf, type Pair, type Pixels, PIXELS, quantile, withoutBroken } from "./metrics";
 
 export type Kind = "absolute" | "relative" | "flip";
 export const KINDS: Record<Kind, string> = { absolute: "|x − r|", relative: "(x − r)² / (r² + 0.01)", flip: "FLIP" };
@@ -16,6 +16,8 @@ export const COMPARISON = "compare";
 export const SETTINGS = { kind: "absolute" as Kind, pixels: "inside" as Pixels, range: "auto" };
 
 export interface Figures extends Measures {
+  /** Pixels that hold no finite number and count in FLIP alone. */
+  broken: number;
   flip: number | null;
   samples: [number, number];
 }
@@ -125,9 +127,11 @@ export class Comparison {
     this.pair = pair;
     this.lack = "";
     const mask = counted(pair, pixels);
-    const figures = measure(pair, mask);
+    // What is no number has no distance; on the screen it is a pattern, which FLIP sees as anybody does.
+    const { finite, broken } = withoutBroken(pair, mask);
+    const figures = { ...measure(pair, finite), broken };
     this.figures = { ...figures, flip: this.flip?.mean ?? null, samples };
-    if (kind !== "flip") this.paint(differenceMap(pair, mask, kind), pair);
+    if (kind !== "flip") this.paint(differenceMap(pair, finite, kind), pair);
     for (const listener of this.listeners) listener();
     const screen = [samples, exposure, tone, theme, pair.width, pair.height].join();
     if (screen !== this.flipOf) {

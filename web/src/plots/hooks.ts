@@ -19,11 +19,11 @@ export interface TestHooks {
 
 export function testHooks(app: App): TestHooks {
   return {
-    evaluate: async (slot, ball, wo, wi) => plainAll(await app.evaluator.evaluate(app.shaderOf(slot), app.valuesOf(slot, ball), wo, wi)),
-    sample: async (slot, ball, wo, u) => plainAll(await app.evaluator.sample(app.shaderOf(slot), app.valuesOf(slot, ball), wo, u)),
-    terms: async (slot, ball, wo, wi) => plainAll(await app.evaluator.terms(app.shaderOf(slot), app.valuesOf(slot, ball), wo, wi)),
+    evaluate: async (slot, ball, wo, wi) => plainAll(await app.evaluator.evaluate(app.shaderOf(slot, ball), app.valuesOf(slot, ball), wo, wi)),
+    sample: async (slot, ball, wo, u) => plainAll(await app.evaluator.sample(app.shaderOf(slot, ball), app.valuesOf(slot, ball), wo, u)),
+    terms: async (slot, ball, wo, wi) => plainAll(await app.evaluator.terms(app.shaderOf(slot, ball), app.valuesOf(slot, ball), wo, wi)),
     albedo: async (slot, ball, wo, error) => {
-      const estimate = await app.evaluator.albedo(app.shaderOf(slot), app.valuesOf(slot, ball), wo, { error });
+      const estimate = await app.evaluator.albedo(app.shaderOf(slot, ball), app.valuesOf(slot, ball), wo, { error });
       return { value: plain(estimate.value), error: plain(estimate.error), samples: estimate.samples };
     },
     flip: async (test, reference, width, height) => plain(await flipMap(test, reference, width, height)),

@@ -2,7 +2,7 @@
 import type { Vec3 } from "../data";
 import { add, cross, dot, normalize, scale, sub } from "../vectors";
 import { frameAround } from "./directions";
-import { HEADER, link, type Program } from "../shaders";
+import { HEADER, link, type Program } from "../programs";
 
 export interface Surface {
   /** xyz and RGB (0 to 1), interleaved. */

@@ -48,6 +48,18 @@ export function counted({ width, height, test, reference }: Pair, pixels: Pixels
   return mask;
 }
 
+/** Takes the pixels out of a mask where either picture holds no finite number; how many they were. */
+export function withoutBroken({ test, reference }: Pair, mask: Uint8Array): { finite: Uint8Array; broken: number } {
+  const finite = mask.slice();
+  let broken = 0;
+  for (let i = 0; i < mask.length; i++) {
+    if (!mask[i] || [0, 1, 2].every((c) => Number.isFinite(test[4 * i + c]) && Number.isFinite(reference[4 * i + c]))) continue;
+    finite[i] = 0;
+    broken += 1;
+  }
+  return { finite, broken };
+}
+
 export interface Measures {
   rmse: number;
   relmse: number;

@@ -7,6 +7,7 @@ import { Dock } from "./dock";
 import { button, element } from "./dom";
 import { attachDrop, openFile } from "./files";
 import { type Actions, attachKeys, helpCard } from "./keys";
+import { Busy } from "./busy";
 import { Labels } from "./labels";
 import { LightSection } from "./light_section";
 import { ModelsSection } from "./models";
@@ -76,7 +77,15 @@ export class Layout {
     this.view = new ViewSection(app, gui.addFolder("View"), (kind) => openFile(app, kind));
     this.terms = termBar(app);
     this.fault.setAttribute("role", "alert");
-    parts.stage.append(this.status, this.fault);
+    const busy = new Busy();
+    app.onBusy = (what, text) => busy.set(what, text);
+    const flaws = element("div", { class: "flaws", hidden: true });
+    flaws.setAttribute("role", "alert");
+    app.onFlaws = (text) => {
+      flaws.hidden = text === "";
+      flaws.textContent = text ? `${text} (checkered)` : "";
+    };
+    parts.stage.append(this.status, busy.host, flaws, this.fault);
     this.dock = new Dock(app);
     // Above the picture, not over it: three rows of balls fill its height.
     const top = element("div", { class: "top" }, this.terms.host, this.solo, this.terms.note);

@@ -125,7 +125,7 @@ export class LightSection {
         },
         () => [
           { value: "sampled", label: "sampled, brute force", doc: "Directions by the material's own sample() and toward what is bright, weighed by both densities, summed until it stands still. While they are few the split sum counts beside them, as far as that brings the picture nearer the truth." },
-          ...(app.data.dfg ? [{ value: "dfg", label: "split sum, table", doc: "F0 A + B for GGX (Karis 2013) times the blurred picture: what engines do. Materials with compensation, or without F, take their own albedo." }] : []),
+          ...(app.data.dfg.length ? [{ value: "dfg", label: "split sum, table", doc: "F0 A + B (Karis 2013) times the blurred picture: what engines do. Materials with compensation, or without F, take their own albedo." }] : []),
           { value: "split-sum", label: "split sum, own albedo", doc: "Albedo times the picture blurred by the lobe, both made by the material's own sample()." },
         ],
       );

@@ -26,7 +26,7 @@ export class ModelsSection {
     const shader = app.shaderOf(slot);
     const row = slots[slot];
     const perBall = shader.manifest.parameters.filter((p) => row && edits.perBall(row, p.path)).map((p) => p.path);
-    const key = JSON.stringify([app.data.revision, slot, shader.key, row?.material, slots.length, perBall, perBall.length ? selection.ball : 0]);
+    const key = JSON.stringify([app.data.revision, slot, shader.code, row?.material, slots.length, perBall, perBall.length ? selection.ball : 0]);
     if (key !== this.built) {
       this.built = key;
       this.build(slot);
@@ -63,7 +63,7 @@ export class ModelsSection {
         },
         () => [
           ...(edits.currentPreset(app, slot, material) ? [] : [{ value: "", label: "own values" }]),
-          ...material.presets.map((p) => ({ value: p.name, label: p.name })),
+          ...material.presets.map((p) => ({ value: p.name, label: p.name, disabled: !edits.possiblePreset(app, slot, p) })),
         ],
         () => material.presets.find((p) => p.name === edits.currentPreset(app, slot, material))?.f0 ?? null,
       );

@@ -1,0 +1,136 @@
+"""Materials as the command line names them, with options that all share: -p masking=schlick-direct.
+
+A shared option reaches every material that has it, also through the materials inside: what one row had and another
+silently had not would be compared as if nothing else differed. Where it is not clear which parameter is meant, the
+option changes nothing there and a note says so.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from ..catalog import notation, outside
+from ..errors import InputError, did_you_mean
+from ..material import BSDF, tree
+
+
+class Named(NamedTuple):
+    """A material, and the paths of the parameters that the user has set: "alpha", "base.alpha"."""
+
+    bsdf: BSDF
+    given: frozenset[str]
+
+
+def named(targets: Sequence[str], options: Sequence[str] = ()) -> tuple[list[Named], list[str]]:
+    """The materials, and notes on where an option was not applied.
+
+    options  "name=value" each, shared by all. A material's own parameter comes first, then those of that name inside
+             it: a choice, such as masking, goes to all of them, a number or a preset to the only one there is
+    Raises InputError for an option that reaches none.
+    """
+    shared = dict(map(notation.assignment, options))
+    classes = [notation.taken_apart(target)[0] for target in targets]
+    reached = {name for name in shared if any(_has(cls, name) for cls in classes)}
+    found = notation.several(targets, [f"{name}={value}" for name, value in shared.items() if name in reached])
+    made, notes, unclear = [], [], {}
+    for target, (cls, settings) in zip(targets, found, strict=True):
+        one = Named(outside.probe(notation.made(cls, settings)[0]), frozenset(_paths(cls, settings)))
+        own = frozenset(_paths(*notation.taken_apart(target)))
+        for name, value in shared.items():
+            places = _places(one.bsdf, name)
+            free = [place for place in places if place not in own]
+            if _has(cls, name):
+                notes += [_kept(one.bsdf, name, free)] if free else []
+            elif _clear(one.bsdf, free):
+                one = _with(one, free, value)
+            else:
+                unclear[name] = _unclear(one.bsdf, free, value)
+                notes.append(f"{unclear[name].what}: {unclear[name].hint}")
+                continue
+            reached |= {name} if places else set()
+        made.append(one)
+    for name in shared:
+        if name not in reached:
+            known = {path for one in made for path in _names(one.bsdf)}
+            what = f"unknown parameter '{name}'"
+            raise unclear.get(name) or InputError(what, f"--param {name}", did_you_mean(name, sorted(known)))
+    return made, notes
+
+
+def _has(cls: type[BSDF], name: str) -> bool:
+    return name in cls.parameters() or (name == "preset" and bool(cls.presets()))
+
+
+def _names(bsdf: BSDF) -> set[str]:
+    """What an option may be called for a material: its parameters, and the paths and names of those inside."""
+    paths = {leaf.path for leaf in tree.leaves(bsdf)}
+    return {*bsdf.parameters(), *paths, *(path.rpartition(".")[2] for path in paths)}
+
+
+def _places(bsdf: BSDF, name: str) -> list[str]:
+    """Paths inside a material of the parameters, or presets, that an option may be meant for."""
+    if "." in name:
+        return [leaf.path for leaf in tree.leaves(bsdf) if leaf.path == name]
+    return [tree.join(path, name) for path, inner in tree.walk(bsdf) if path and _has(type(inner), name)]
+
+
+def _clear(bsdf: BSDF, places: Sequence[str]) -> bool:
+    """Whether an option may be set at all of these places."""
+    leaves = {leaf.path: leaf.parameter for leaf in tree.leaves(bsdf)}
+    return len(places) < 2 or all(place in leaves and not leaves[place].numeric for place in places)
+
+
+def _kept(bsdf: BSDF, name: str, places: Sequence[str]) -> str:
+    return f"{name} is set of {type(bsdf).__name__} itself; {' and '.join(places)} stays as it is"
+
+
+def _unclear(bsdf: BSDF, places: Sequence[str], value: str) -> InputError:
+    name = places[0].rpartition(".")[2]
+    what = f"{name} sets nothing of {type(bsdf).__name__}, which has {' and '.join(places)}"
+    return InputError(what, f"--param {name}", f"give one of them, such as --param {places[0]}={value}")
+
+
+def _with(one: Named, places: Sequence[str], value: str) -> Named:
+    values: dict[str, object] = {}
+    for place in places:
+        path, _, name = place.rpartition(".")
+        inner = dict(tree.walk(one.bsdf))[path]
+        values |= {tree.join(path, key): v for key, v in _values(inner, name, value).items()}
+    return Named(tree.replace(one.bsdf, values, "--param"), one.given | values.keys()) if values else one
+
+
+def _values(inner: BSDF, name: str, value: str) -> dict[str, object]:
+    """What an option sets of a material, by name."""
+    if name in inner.parameters():
+        return {name: notation.typed(inner.parameters()[name], value)}
+    chosen = type(inner).preset(value)
+    return {key: getattr(chosen, key) for preset in inner.presets().values() for key in preset.values}
+
+
+def _paths(cls: type[BSDF], settings: Mapping[str, object]) -> set[str]:
+    """The paths that settings set, those of materials inside among them."""
+    found = set()
+    for name, value in settings.items():
+        parameter = cls.parameters().get(name)
+        if parameter is not None and parameter.inner:
+            found |= {tree.join(name, path) for path in _paths(*_inside(value))}
+        else:
+            found.add(name)
+    return found
+
+
+def _inside(value: object) -> tuple[type[BSDF], dict[str, object]]:
+    """Class and settings of a material in a material, which `notation.made` has taken before."""
+    if isinstance(value, str) and not value.lstrip().startswith("{"):
+        return notation.taken_apart(value.strip().strip('"'))
+    if isinstance(value, str):
+        value = json.loads(re.sub(r"(?<![\w.])\.(?=\d)", "0.", value))
+    assert isinstance(value, Mapping)
+    fields = dict(value)
+    return notation.class_named(str(fields.pop("type"))), fields
+
+
+__all__ = ["Named", "named"]
