@@ -16,9 +16,7 @@ from ..errors import GonioError, InputError
 from ..material import tree
 from ..material.bsdf import BSDF
 from ..material.sample import Sample
-from ..ops import ForbiddenOperator, RecordingError
-from ..owner import alone
-from .user_code import (
+from ..material.user_code import (
     PREFIX,
     files_in,
     forget,
@@ -31,6 +29,8 @@ from .user_code import (
     thing,
     with_imports,
 )
+from ..ops import ForbiddenOperator, RecordingError
+from ..owner import alone
 
 __all__ = [
     "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Never, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..catalog import user_code
 from ..errors import GonioWarning, InputError, did_you_mean
 from ..members import Family
 from ..ops import Pair, Scalar, Spectrum, backend, graph, sincos
 from ..optics import indices
+from . import user_code
 
 CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have their own number
 
