@@ -226,7 +226,7 @@ class _Stage(Transport):
             return [dr.select(hit.is_valid(), hit.t, 0), mi.Float(0), mi.Float(0)]
         u = mi.Point2f(*self.pair(key, index, 3))
         if self.stage == "rays":  # shadow rays to points uniform on the lamp's area, from the bare point of the ray
-            lamp = self.lights.rectangle
+            lamp = self.lights.lamps.rectangle
             point = lamp.corner + lamp.axis0 * (u.x * lamp.length0) + lamp.axis1 * (u.y * lamp.length1)
             origin = ray(hit.t * (1 - 1e-4))
             away = point - origin

@@ -12,7 +12,6 @@ physically what would be seen if every surface stood alone and were convex.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from types import ModuleType
 from typing import ClassVar
 
@@ -84,33 +83,25 @@ class _Transparent(Lights):
     Light sampling traces no shadow ray here, so what a sampled direction finds must not be hidden either.
     """
 
-    def last_hit(
-        self, ray: Ray, solid_angle: Float, active: Mask, weigh: Callable[[Radiance, Float], Radiance]
-    ) -> Radiance:
-        """The sum over all lights on the ray, each weighed with its own density."""
-        if self.rectangle is not None or self.count == 0:
-            return super().last_hit(ray, solid_angle, active, weigh)
+    def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
+        """All lights on the ray, each with its own density."""
+        if self.shortens_last_ray or self.count == 0:
+            return super().along(ray, solid_angle, active)
         mi, origin = self.mi, ray.o
-        found, still = mi.Spectrum(0), active
+        found, still = [], active
         for _ in self.scene.shapes():
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, still)
             still = still & si.is_valid()
-            found += self._arriving(origin, si, solid_angle, still, weigh)
+            found.append(self._arriving(origin, si, solid_angle, still))
             ray = si.spawn_ray(ray.d)
         if self.has_environment:
             beyond = dr.zeros(mi.SurfaceInteraction3f)
             beyond.t, beyond.wi, beyond.wavelengths = dr.inf, -ray.d, ray.wavelengths
-            found += self._arriving(origin, beyond, solid_angle, active, weigh)
+            found.append(self._arriving(origin, beyond, solid_angle, active))
         return found
 
     def _arriving(
-        self,
-        origin: Point,
-        si: SurfaceInteraction,
-        solid_angle: Float,
-        active: Mask,
-        weigh: Callable[[Radiance, Float], Radiance],
-    ) -> Radiance:
+        self, origin: Point, si: SurfaceInteraction, solid_angle: Float, active: Mask
+    ) -> tuple[Radiance, Float]:
         radiance = dr.select(active, self.emitted(si, active), 0)
-        pdf = self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
-        return dr.select(active, weigh(radiance, pdf), 0)
+        return radiance, self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))

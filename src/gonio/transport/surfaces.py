@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from ..bridge import engine
 from ..bridge.types import Hit, Mask, OfVariant, Ray, Scene, Shape, SurfaceInteraction, UInt, Vector
 from .fast.inline import Inline
+from .placement import placement_reader
 
 # From so many shapes of a kind on. Two spheres cost no more than one, since their code is the same; tracing 64 of them
 # takes about as long as the program around them.
@@ -32,7 +32,7 @@ class Surfaces:
 
     def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
-        shapes, read = scene.shapes(), reader(mi)
+        shapes, read = scene.shapes(), placement_reader(mi)
         self.inline = Inline.of(mi, scene, read)
         found = {kind: [shape for shape in shapes if shape.class_name() == kind] for kind in _KINDS}
         least = MANY if self.inline is None else 1
@@ -194,21 +194,3 @@ _KINDS: dict[str, tuple[Callable[[Matrices, NDArray[np.float64]], Matrices], For
     "Sphere": (_of_spheres, _sphere),
     "Rectangle": (_of_rectangles, _rectangle),
 }
-
-
-def reader(mi: ModuleType) -> Callable[[Shape], list[float]]:
-    """Reads where a shape stands, the 16 numbers of `to_world` row by row, in a fifth of `mi.traverse`'s time."""
-    base: Any = mi.TraversalCallback
-
-    class Reader(base):
-        def put(self, name: str, value: OfVariant, flags: int, kind: OfVariant = None) -> None:
-            if name == "to_world":
-                self.found = value, kind
-
-    def read(shape: Shape) -> list[float]:
-        reader = Reader()
-        shape.traverse(reader)
-        matrix = mi.get_property(*reader.found, shape).matrix
-        return [matrix[row, column][0] for row in range(4) for column in range(4)]
-
-    return read

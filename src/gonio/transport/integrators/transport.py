@@ -90,7 +90,7 @@ class Transport(Integrator):
         self.media = Media(mi, scene)
         self.context = mi.BSDFContext()
         self.context.type_mask = NESTS if self.media.known else SEPARATES
-        self.lights = Lights(mi, scene, self.surfaces, beside_lobes=self.samples_lobes)
+        self.lights = Lights(mi, scene, self.surfaces, mis_compensation=self.samples_lobes)
         depth = self.depth(settings)
         self.max_depth = dr.opaque(mi.UInt32, depth)
         self.ambient = self._ambient()
@@ -101,7 +101,7 @@ class Transport(Integrator):
         self.begun = None if eye is None else self.media.around(eye)
         # Where media dim the way to a lamp, or particles compete for it, the last ray is traced like the others; and
         # where it may meet any of several lamps, for which each vertex would have a second ray and its surface.
-        self.traces_last = self.media.known or self.merges or (depth > 2 and self.lights.rectangle is None)
+        self.traces_last = self.media.known or self.merges or (depth > 2 and not self.lights.shortens_last_ray)
         # Whether any path has a second vertex to shade.
         self.goes_on = (depth > 2 or self.traces_last) and (self.samples_lobes or self.follows_delta)
 
@@ -195,7 +195,7 @@ class Transport(Integrator):
         emitted = lights.emitted(si, active)
         if self.samples_lights and not first:
             compete = active & (path.pdf > 0) & dr.any(emitted != 0)
-            weight = lights.share(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
+            weight = lights.mis_weight(path.pdf, lights.pdf(ray.o, path.solid_angle, si, compete))
             emitted = dr.select(path.pdf > 0, emitted * weight, emitted)
         bsdf = si.bsdf(ray)
         emitted, goes_on = self.met(path, si, bsdf, emitted, active)
@@ -239,10 +239,13 @@ class Transport(Integrator):
         end = active & last
 
         def weigh(light: Radiance, light_pdf: Float) -> Radiance:
-            return dr.select(pdf > 0, light * lights.share(pdf, light_pdf), light) if self.samples_lights else light
+            if not self.samples_lights:
+                return light
+            return dr.select(pdf > 0, light * lights.mis_weight(pdf, light_pdf), light)
 
         if not self.traces_last:
-            radiance = radiance + throughput * dr.select(end, lights.last_hit(ray, solid_angle, end, weigh), 0)
+            arriving = sum(weigh(*one) for one in lights.along(ray, solid_angle, end))
+            radiance = radiance + throughput * dr.select(end, arriving, 0)
             active = active & ~last
         hit = self.surfaces.nearest(ray, active)
         if not lights.has_environment:  # else the path goes on to meet it
@@ -368,7 +371,7 @@ class Transport(Integrator):
         value, weight = self.attached(si, bsdf, toward, value, bs, weight, active)
         gathered = value * light.weight
         if self.samples_lobes:
-            gathered *= dr.select(light.delta, 1, lights.share(light.ds.pdf, pdf))
+            gathered *= dr.select(light.delta, 1, lights.mis_weight(light.ds.pdf, pdf))
         if crossing is not None:
             side = dr.select(si.wi.z * toward.z < 0.0, crossing.beyond, crossing.here)
             gathered *= self.media.transmitted(side, si, light.ds.dist) & crossing.surface

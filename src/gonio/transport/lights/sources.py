@@ -31,7 +31,9 @@ from ...bridge.types import (
     Vector,
 )
 from ...errors import InputError
-from .lights import Lights, area_density
+from .base import shadow_offset
+from .directions import area_density
+from .lights import Lights
 from .solid_angles import is_sphere
 
 SURFACE, POINT, INFINITE = 0, 1, 2
@@ -164,8 +166,10 @@ class Sources:
         if lights.count == 1:
             number, probability, emitter = mi.UInt32(0), mi.Float(1), mi.EmitterPtr(lights.emitters[0])
         else:
-            number, probability = lights.choice.sample_pmf(pick)
-            emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), dr.gather(mi.UInt32, lights.place, number))
+            number, probability = lights.by_power.sample_pmf(pick)
+            emitter = dr.gather(
+                mi.EmitterPtr, self.scene.emitters_dr(), dr.gather(mi.UInt32, lights.scene_indices, number)
+            )
         kind = dr.gather(mi.UInt32, self.kind_of, number)
         found: Particle | None = None
         for one in self.known:
@@ -192,15 +196,15 @@ class Sources:
         probability, index = mi.Float(1), mi.UInt32(0)
         if lights.count > 1:
             number = dr.reinterpret_array(mi.UInt32, emitter)
-            probability = dr.gather(mi.Float, lights.by_pointer, number, active)
-            index = dr.gather(mi.UInt32, lights.number, number, active)
+            probability = dr.gather(mi.Float, lights.probability_of_pointer, number, active)
+            index = dr.gather(mi.UInt32, lights.index_of_pointer, number, active)
         found = mi.Float(0)
         for one in self.known:
             if one == SURFACE:
                 met = active & si.is_valid()
                 ps = mi.PositionSample3f(si)
                 cosine = dr.abs(dr.dot(direction, si.n))
-                by_area = lights.of_shape(emitter, index, area_density, mi.Float(0), ps, met)
+                by_area = lights.lamps.of_shape(emitter, index, area_density, mi.Float(0), ps, met)
                 pdf = by_area * self._direction_pdf(si, -direction, met) / dr.maximum(cosine, 1e-12)
                 found = dr.select(met, pdf, found)
             if one == INFINITE:
@@ -226,7 +230,7 @@ class Sources:
         active: Mask,
     ) -> Particle:
         mi, lights = self.mi, self.lights
-        ps = lights.on_area(emitter, number, place, active)
+        ps = lights.lamps.on_area(emitter, number, place, active)
         si = mi.SurfaceInteraction3f(ps, wavelengths) if mi.is_spectral else mi.SurfaceInteraction3f(ps, [])
         two_sided = dr.gather(mi.Bool, self.two_sided, number, active)
         if self.targets is not None:
@@ -239,10 +243,11 @@ class Sources:
         cosine = dr.abs(si.wi.z)
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
-        if lights.balls is not None:  # into one that is smaller than the step off a surface: out at its other side
-            radius = dr.gather(mi.Vector4f, lights.balls, number, active).w
+        if lights.lamps.spheres is not None:
+            # into one that is smaller than the step off a surface: out at its other side
+            radius = dr.gather(mi.Vector4f, lights.lamps.spheres, number, active).w
             inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
-            shines &= ~inward | (abs(radius) > lights.off(ps.p, ps.p))
+            shines &= ~inward | (abs(radius) > shadow_offset(mi, ps.p, ps.p))
         density = ps.pdf * pdf / dr.maximum(cosine, 1e-12)
         flux = dr.select(shines, emitter.eval(si, shines) / density, 0)
         seen = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
