@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.transport.integrators import Integrator, Render, Settings, progressive, transport
+from gonio.transport.integrators import Integrator, Render, Settings, path, progressive
 from gonio.transport.integrators.base import SAMPLERS
 from gonio.transport.lights import lights
 
@@ -347,7 +347,7 @@ def test_an_interrupt_while_a_loop_is_recorded_is_one(monkeypatch: pytest.Monkey
     scene = mi.load_dict(scene_dict())
     before = picture(scene, 2)
     with monkeypatch.context() as patch:
-        patch.setattr(transport.Transport, "extend", interrupted)
+        patch.setattr(path.Path, "vertex", interrupted)
         with pytest.raises(KeyboardInterrupt):
             picture(scene, 2)
     assert np.array_equal(picture(scene, 2), before)

@@ -106,7 +106,7 @@ def test_particles_leave_a_sphere_that_is_turned_from_its_surface() -> None:
     drawn = scene({"lamp": {"type": "sphere", "to_world": turned, "emitter": AREA}}, GREY, size=8)
     render = Render(drawn, Settings("light"))
     particles = render._integrator.particles
-    left, _ = particles.leave(particles.key(mi.UInt32(0)), dr.arange(mi.UInt32, 1024), mi.Bool(True))
+    left, _ = particles.leave(particles.key(mi.UInt32(0)), dr.arange(mi.UInt32, 1024))
     outward = (np.array(left.origin).T - [1, 2, 1]) / 0.3
     assert np.sum(np.array(left.direction).T * outward, axis=1).min() > -1e-5
     # each carries the power pi L A that all have together

@@ -43,5 +43,5 @@ Whole: TypeAlias = OfVariant  # of 64 bits, with a sign
 Mask: TypeAlias = OfVariant
 Point: TypeAlias = OfVariant  # of two or three components
 Vector: TypeAlias = OfVariant
-Colour: TypeAlias = OfVariant  # linear RGB
+Color: TypeAlias = OfVariant  # linear RGB
 Radiance: TypeAlias = OfVariant  # mi.Spectrum: as many channels as the variant has, a Mueller matrix where polarized

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge import engine
-from ..bridge.types import Colour, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
+from ..bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
 Place: TypeAlias = tuple[str, ...]  # of a property, through the plugins around it
@@ -148,7 +148,7 @@ def _texture_class(mi: ModuleType) -> OfVariant:
         def is_spatially_varying(self) -> bool:
             return True
 
-        def eval(self, si: SurfaceInteraction, active: Mask = True) -> Colour:
+        def eval(self, si: SurfaceInteraction, active: Mask = True) -> Color:
             return mi.UnpolarizedSpectrum(dr.gather(mi.Color3f, self.table, self._number(si), active))
 
         def eval_1(self, si: SurfaceInteraction, active: Mask = True) -> Float:

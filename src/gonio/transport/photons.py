@@ -23,7 +23,7 @@ ROW = 4096  # cells along x that keep apart; what lies further is counted as lyi
 LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
 FACING = 0.9  # and cosine of the angle between normals: what lies around an edge is elsewhere
 VISITED = 16  # particles of a row, about
-CUBES = 1 << 16  # numbers of a Crowding
+CUBES = 1 << 16  # entries of a PhotonDensity
 FIELDS = 16  # numbers of a particle, see Photon
 
 
@@ -193,7 +193,7 @@ def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
     return order[np.argsort((key[order] >> 16).astype(np.uint16), kind="stable")]
 
 
-class Crowding:
+class PhotonDensity:
     """How many particles arrive per area, roughly: a number for each cube of space, from one map, that then stays.
 
     Weights are made of it, and any number will do for those, as long as it is the same whoever asks.
@@ -208,10 +208,10 @@ class Crowding:
         self.values = engine.own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
 
     @staticmethod
-    def nowhere(mi: ModuleType) -> Crowding:
-        """Nothing, for who has not seen a map yet; to a kernel it is like any other."""
+    def nowhere(mi: ModuleType) -> PhotonDensity:
+        """No particles, before the first map exists; to a kernel it is like any other."""
         photon = Photon.none(mi)
-        return Crowding(mi, photon, mi.Bool(False), 1.0, 1)
+        return PhotonDensity(mi, photon, mi.Bool(False), 1.0, 1)
 
     def at(self, place: Point) -> Float:
         """1/m^2, of one particle that is traced."""

@@ -16,7 +16,7 @@ from ...ops import Mode
 from ..types import (
     BSDFContext,
     BSDFSample,
-    Colour,
+    Color,
     Float,
     Mask,
     OfVariant,
@@ -177,7 +177,7 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         def eval_attribute(self, name: str, si: SurfaceInteraction, active: Mask = True) -> Radiance:
             return self._attribute(name, si, active, variant.spectrum)
 
-        def eval_attribute_3(self, name: str, si: SurfaceInteraction, active: Mask = True) -> Colour:
+        def eval_attribute_3(self, name: str, si: SurfaceInteraction, active: Mask = True) -> Color:
             return self._attribute(name, si, active, mi.Color3f)
 
         def _attribute(self, name: str, si: SurfaceInteraction, active: Mask, kind: OfVariant) -> OfVariant:

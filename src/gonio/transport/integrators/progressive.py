@@ -10,7 +10,7 @@ How it is fast:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import drjit as dr
@@ -22,9 +22,10 @@ from ...bridge.types import Float, Scene, Sensor, UInt
 from ...errors import InputError
 from ...work import garbage
 from .. import sampler
+from ..scene_data import SceneData
+from ..sums import Sums
 from ..surfaces import whole
 from .base import Integrator, Settings
-from .sums import Sums
 
 # 4 x 4 pixels fill the 16 lanes of AVX-512 and two packets of AVX2: on the five-conductor scene the same rays take
 # 0.21 s in tiles and 0.32 s in scanlines.
@@ -78,7 +79,7 @@ class Render:
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
         with dr.suspend_grad(), garbage.kept():
-            self._integrator = self._program()
+            self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
     def _nothing(self, lanes: int) -> Sums:
@@ -86,8 +87,11 @@ class Render:
         features = 6 if self.aovs else self.features
         return Sums.zeros(self.mi, lanes, 3 + self._integrator.measured, features, self._splatted)
 
-    def _program(self) -> Integrator:
-        return self.settings.program(self.mi, self.scene, self.sensor, self.settings, self.aovs)
+    def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
+        """The integrator, with what it reads of the scene."""
+        settings, program = self.settings, self.settings.program
+        parts = self.mi, self.scene, self.sensor, settings.sampler, settings.ambient
+        return program(data(*parts, mis_compensation=program.samples_lobes, aovs=self.aovs), settings)
 
     @property
     def advice(self) -> str:

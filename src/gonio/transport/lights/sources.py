@@ -52,8 +52,8 @@ class Particle:
     kind       SURFACE, POINT or INFINITE
     flux       radiance over density; of a lamp that is a point or a parallel beam, its limit
     density    1/(m^2 sr), of étendue; UNMET for those two, which no ray from elsewhere meets
-    seen       how much of it a camera that sees the lamp itself is sent: of a surface one over its density by area, of
-               infinity the radiance over its density by solid angle
+    direct_weight  of the lamp in the eyes of a camera that sees it directly: of a surface one over its density by area,
+                   of infinity the radiance over its density by solid angle
     """
 
     origin: Point
@@ -63,7 +63,7 @@ class Particle:
     kind: UInt
     flux: Radiance
     density: Float
-    seen: Radiance
+    direct_weight: Radiance
 
 
 class Targets:
@@ -173,7 +173,7 @@ class Sources:
         kind = dr.gather(mi.UInt32, self.kind_of, number)
         found: Particle | None = None
         for one in self.known:
-            make = (self._from_surface, self._from_point, self._from_afar)[one]
+            make = (self._from_surface, self._from_point, self._from_infinite)[one]
             here = kind == one
             other = make(number, emitter, place, aim, way, wavelengths, here)
             found = other if found is None else dr.select(here, other, found)
@@ -186,7 +186,7 @@ class Sources:
             kind,
             found.flux / probability,
             dr.select(found.density < UNMET, found.density * probability, UNMET),
-            found.seen / probability,
+            found.direct_weight / probability,
         )
 
     def density(self, origin: Point, si: SurfaceInteraction, direction: Vector, active: Mask) -> Float:
@@ -288,7 +288,7 @@ class Sources:
         place_ = self._nowhere(wavelengths)
         return Particle(origin, direction, emitter, place_, mi.UInt32(POINT), flux, mi.Float(UNMET), mi.Spectrum(0))
 
-    def _from_afar(
+    def _from_infinite(
         self,
         number: UInt,
         emitter: Emitter,

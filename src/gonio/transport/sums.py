@@ -11,8 +11,8 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bridge import engine
-from ...bridge.types import Float, Mask, UInt, Whole
+from ..bridge import engine
+from ..bridge.types import Float, Mask, UInt, Whole
 
 
 @dataclass
