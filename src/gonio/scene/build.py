@@ -11,19 +11,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..bridge.faults.merged_mesh_bbox import compute_boxes
 from ..bridge.types import MitsubaBSDF, Plugin, PluginDict, Scene
 from ..catalog import documents
 from ..errors import GonioWarning, InputError
 from ..material import Parameter
 from ..materials.combined.normal_map import slopes
 from ..pictures.images import RGB
+from ..transport import fast
 from . import meshes, schema, spectra, textures
 from .materials import BY_TYPE, MaterialPart, Value, numbers_in
 from .text import pointer
 from .values import BumpMap, ImageTexture, NormalMap
 
 if TYPE_CHECKING:
-    from .by_shape import Group
+    from ..transport.fast.by_shape import Group
 
 MANY = 64  # from so many materials of one structure on one stands for them
 
@@ -78,7 +80,7 @@ class _Builder:
         self.description, self.mi = description, mi
         self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
-        self.gathers = gathers and mi.variant().endswith("rgb")  # spectra are upsampled one by one
+        self.gathers = gathers and fast.enabled() and mi.variant().endswith("rgb")  # spectra are upsampled one by one
         self.gathered: dict[MaterialPart, tuple[MitsubaBSDF, Group, int]] = {}
 
     def scene(self) -> Scene:
@@ -97,14 +99,12 @@ class _Builder:
         # order of the lights, and every picture. So they are merged here, and sorted.
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
         merged = merged if isinstance(merged, list) else [merged]
-        for one in merged:
-            if one.is_mesh():
-                one.recompute_bbox()  # which Mitsuba 3.9 forgets, and then so does the scene
+        compute_boxes(merged)
         for index, one in enumerate(sorted(merged, key=_order)):
             scene[one.id() or f"merged{index}"] = one
         found = self.load(scene, "/scene", optimize=False)
         if self.gathered:
-            from . import by_shape
+            from ..transport.fast import by_shape
 
             by_shape.bind(self.mi, found, {id(group): group for _, group, _ in self.gathered.values()}.values())
         return found
@@ -241,7 +241,7 @@ class _Builder:
                 places.setdefault(shape.material, pointer("scene", "shapes", index, "material"))
         if len(places) < MANY:
             return
-        from . import by_shape
+        from ..transport.fast import by_shape
 
         groups: dict[Hashable, tuple[Group, list[MaterialPart]]] = {}
         for material, where in places.items():

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...bridge import engine
+from ...bridge.faults.merged_mesh_bbox import with_valid_bbox
 from ...bridge.types import Float, Scene, Sensor, UInt
 from ...errors import InputError
 from ...work import garbage
 from .. import sampler
 from ..scene_data import SceneData
 from ..sums import Sums
-from ..surfaces import whole
 from .base import Integrator, Settings
 
 # 4 x 4 pixels fill the 16 lanes of AVX-512 and two packets of AVX2: on the five-conductor scene the same rays take
@@ -66,7 +66,7 @@ class Render:
             raise InputError(f"variant {mi.variant()} {what}", "Render", hint)
         if sensor is None and not scene.sensors():
             raise InputError("the scene has no camera", "scene.sensors()", "add a sensor, or pass one")
-        self.scene, self.settings, self.aovs = whole(mi, scene), settings, aovs
+        self.scene, self.settings, self.aovs = with_valid_bbox(mi, scene), settings, aovs
         self.sensor = sensor if sensor is not None else scene.sensors()[0]
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0

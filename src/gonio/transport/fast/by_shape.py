@@ -16,8 +16,8 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge import engine
-from ..bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
+from ...bridge import engine
+from ...bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
 Place: TypeAlias = tuple[str, ...]  # of a property, through the plugins around it
