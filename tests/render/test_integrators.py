@@ -380,11 +380,6 @@ def test_where_numpy_puts_an_array_recompiles_nothing(monkeypatch: pytest.Monkey
     assert np.array_equal(images[2], images[1])
 
 
-def test_dr_jit_compiles_another_kernel_where_an_array_is_not_aligned() -> None:
-    aligned, odd = (kernels(lambda at=at: dr.eval(mi.UInt32(placed(at, 256)) * 7 + 3)) for at in (0, 4))
-    assert aligned != odd, "then `engine.own` is needed no more"
-
-
 def test_the_recompilation_test_would_see_a_new_kernel() -> None:
     scene = mi.load_dict(scene_dict())
     picture(scene, 1)

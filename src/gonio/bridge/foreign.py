@@ -20,6 +20,7 @@ from ..catalog import outside
 from ..errors import InputError, did_you_mean
 from ..material import number, spectrum
 from . import adapter, engine
+from .faults.exr_threads import file_threads
 from .native import Native
 from .types import MitsubaBSDF, OfVariant, PluginDict
 
@@ -110,7 +111,7 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     mi = mitsuba()
     kind = str(description.get("type", ""))
     try:
-        with engine.file_threads():
+        with file_threads():
             bsdf = mi.load_dict(description, parallel=False)
     except Exception as error:
         raise _refused(error, kind) from None

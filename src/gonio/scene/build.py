@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..bridge.faults.merged_mesh_bbox import compute_boxes
+from ..bridge.faults.shape_order import shape_key
 from ..bridge.types import MitsubaBSDF, Plugin, PluginDict, Scene
 from ..catalog import documents
 from ..errors import GonioWarning, InputError
@@ -59,16 +60,6 @@ def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = 
     return Built(builder.scene(), builder.bsdfs)
 
 
-def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:
-    """What shapes are sorted by: nothing that changes between two runs."""
-    if shape.id():  # a shape of the scene; those that were merged have lost their names
-        return shape.id(), [], 0, b""
-    box = shape.bbox()
-    corners = [float(x) for corner in (box.min, box.max) for x in np.ravel(corner)]
-    vertices = np.asarray(shape.vertex_positions_buffer()) if shape.is_mesh() else np.zeros(0)
-    return "", corners, shape.primitive_count(), vertices.tobytes()
-
-
 class _Builder:
     def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool) -> None:
         from ..bridge import adapter
@@ -100,7 +91,7 @@ class _Builder:
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
         merged = merged if isinstance(merged, list) else [merged]
         compute_boxes(merged)
-        for index, one in enumerate(sorted(merged, key=_order)):
+        for index, one in enumerate(sorted(merged, key=shape_key)):
             scene[one.id() or f"merged{index}"] = one
         found = self.load(scene, "/scene", optimize=False)
         if self.gathered:

@@ -8,7 +8,8 @@ from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
 
-from ..bridge import engine, foreign
+from ..bridge import foreign
+from ..bridge.faults.exr_threads import file_threads
 from ..bridge.native import Native
 from ..bridge.types import Scene
 from ..errors import InputError
@@ -37,7 +38,7 @@ def load(
     check_files(file, parameters, allow_outside)
     try:
         # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance
-        with engine.file_threads():
+        with file_threads():
             # In parallel a file that cannot be read ends the process: the error has a thread of its own.
             values = {key: _as_xml(value) for key, value in parameters.items()}
             scene = mi.load_file(where, parallel=False, optimize=False, **values)
@@ -63,7 +64,7 @@ def load_bsdf(path: Path) -> Native:
     mi = foreign.mitsuba()
     check_files(path, {}, allow_outside=True)
     try:
-        with engine.file_threads():
+        with file_threads():
             loaded = mi.load_file(str(path), parallel=False)
     except Exception as error:
         raise InputError(f"Mitsuba refuses it: {_mitsuba_text(error)}", str(path)) from None

@@ -15,7 +15,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge import engine
+from ..bridge.faults.borrowed_memory import own
 from ..bridge.types import Float, Mask, Point, Radiance, UInt, Vector
 from . import sampler
 
@@ -87,14 +87,14 @@ class PhotonMap:
         keys = (1 << bits) + ROW
         starts = np.zeros(keys + 1, np.uint32)
         np.cumsum(np.bincount(key, minlength=keys), out=starts[1:])
-        self.starts = engine.own(mi.UInt32, starts)
+        self.starts = own(mi.UInt32, starts)
         rank = np.zeros(len(column), np.uint32)
         rank[lie[_sorted(key)]] = np.arange(self.count, dtype=np.uint32)
         self.values = dr.empty(mi.Float, max(self.count, 1) * FIELDS)
         first = 0
         for photon, along in zip(photons, columns, strict=True):
             last = first + len(along)
-            at = engine.own(mi.UInt32, rank[first:last])
+            at = own(mi.UInt32, rank[first:last])
             dr.scatter(self.values, mi.Matrix4f(*photon.packed()), at, along < ROW)
             first = last
         dr.eval(self.values)
@@ -205,7 +205,7 @@ class PhotonDensity:
         place = self._place(photon.position)
         dr.eval(place, kept)
         counts = np.bincount(np.array(place)[np.array(kept)], minlength=CUBES)
-        self.values = engine.own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
+        self.values = own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
 
     @staticmethod
     def nowhere(mi: ModuleType) -> PhotonDensity:

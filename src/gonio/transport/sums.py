@@ -11,7 +11,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge import engine
+from ..bridge.faults.borrowed_memory import own
 from ..bridge.types import Float, Mask, UInt, Whole
 
 
@@ -62,7 +62,7 @@ class Sums:
 
         def taken(name: str) -> Float:
             kind = {"f": mi.Float64, "i": mi.Int64, "u": mi.UInt32}[arrays[name].dtype.kind]
-            return engine.own(kind, arrays[name])
+            return own(kind, arrays[name])
 
         radiance = [taken(f"radiance{i}") for i in range(len(like.radiance))]
         found = Sums(radiance, [taken(f"feature{i}") for i in range(len(like.features))], taken("invalid"))

@@ -1,7 +1,7 @@
-"""Mitsuba 3.9: `normalmap` and `bumpmap` turn the shading frame inside `eval` and `sample` and tell nobody.
+"""Mitsuba 3.9: `normalmap` and `bumpmap` shade with a frame of their own that no call of a BSDF tells.
 
     bumpy = mi.load_dict({"type": "bumpmap", ...})
-    bumpy.sh_frame(si, True)                               # the frame of the surface in versions before 3.9
+    si.bsdf(ray), si.sh_frame                              # the plugin, and the frame of the surface, not of the plugin
 
 The correction of particles at shading normals (Veach1997, sec. 5.3) needs the cosines of the frame that shades.
 

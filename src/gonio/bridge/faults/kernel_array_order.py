@@ -1,7 +1,7 @@
-"""Dr.Jit 1.5: kernels are told apart by the order in which the arrays that they read were made.
+"""Dr.Jit 1.5: kernels with loops and calls are told apart by the order in which the arrays that they read were made.
 
-    a, b = mi.Float([1, 2]), mi.Float([3, 4]); dr.eval(a - b)
-    b, a = mi.Float([3, 4]), mi.Float([1, 2]); dr.eval(a - b)      # compiles a second kernel
+Seen with the maps of `caustics`, whose kernel was compiled anew where a map was made before the sums, not after them;
+tests/render/test_transport.py counts the kernels. No short reproduction is known, hence no canary.
 
 Workaround: copy all arrays of an object, one after the other, right before a kernel reads them.
 """

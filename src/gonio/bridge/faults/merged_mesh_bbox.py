@@ -1,7 +1,7 @@
-"""Mitsuba 3.9: the mesh that is made of meshes of equal material has no bounding box.
+"""Mitsuba 3.9: the mesh that is made of rectangles of equal material has no bounding box.
 
-    merged = mi.load_dict({"type": "merge", "a": mesh, "b": other_mesh})
-    merged[0].bbox().valid()                               # False
+    wall = {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}
+    mi.load_dict({"type": "merge", "a": wall, "b": {**wall, "to_world": aside}}).bbox().valid()      # False
 
 The scene's box then leaves it out, and beyond the scene's box nothing is in the way of a sky or a beam: under a far
 roof a sky sends 0.84 in place of 0.81.
@@ -18,9 +18,9 @@ from ..types import Scene, Shape
 
 
 def compute_boxes(shapes: Iterable[Shape]) -> None:
-    """Give the meshes among shapes the boxes that they lack."""
+    """Give the meshes among shapes the boxes that they may lack."""
     for shape in shapes:
-        if shape.is_mesh() and not shape.bbox().valid():
+        if shape.is_mesh():
             shape.recompute_bbox()
 
 

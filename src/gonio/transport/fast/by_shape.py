@@ -16,7 +16,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
@@ -143,7 +143,7 @@ def _texture_class(mi: ModuleType) -> OfVariant:
 
         def bind(self, row: NDArray[np.intp]) -> None:
             """`row` of each shape, by its number in kernels."""
-            self.table = engine.own(mi.Float, self.rows[row].ravel().astype(np.float32))
+            self.table = own(mi.Float, self.rows[row].ravel().astype(np.float32))
 
         def is_spatially_varying(self) -> bool:
             return True

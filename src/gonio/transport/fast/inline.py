@@ -19,7 +19,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Float, Hit, Mask, Point, Ray, Scene, Shape, UInt
 
 # What shapes may cost together, a sphere 1. Embree, which has its own ways with triangles and calls Mitsuba for each
@@ -84,7 +84,7 @@ class Inline:
         # One array: kernels differ by the order in which the arrays that they read were made.
         numbers = [n for s in spheres for n in (*s.centre, s.radius)]
         numbers += [n for flat in flats for row in flat.rows for n in row]
-        table = engine.own(mi.Float, np.array(numbers, np.float32))
+        table = own(mi.Float, np.array(numbers, np.float32))
         read = (dr.gather(mi.Float, table, at) for at in range(len(numbers)))
         self.spheres = [(mi.Point3f(*itertools.islice(read, 3)), next(read)) for _ in spheres]
         self.flats = [(flat, [list(itertools.islice(read, 4)) for _ in range(3)]) for flat in flats]

@@ -12,7 +12,7 @@ from types import ModuleType
 import drjit as dr
 import numpy as np
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import (
     DirectionSample,
     Emitter,
@@ -56,13 +56,13 @@ class LampTable:
                     row[3, 1] = getattr(emitter, "two_sided", False)
         self.known = [bool(row[3, 0] != NONE) for row in rows[: len(emitters)]]
         self.kinds = sorted({int(row[3, 0]) for row in rows} - {NONE})
-        self.table = engine.own(mi.Float, rows.ravel().astype(np.float32))
+        self.table = own(mi.Float, rows.ravel().astype(np.float32))
         self.radiance: Float | None = None
         if mi.is_rgb and self.kinds:
             si = dr.zeros(mi.SurfaceInteraction3f, len(emitters))
             si.wi = mi.Vector3f(0, 0, 1)
             sent = np.array(pointers.eval(si, mi.Bool(self.known)), np.float32).reshape(3, -1)
-            self.radiance = engine.own(mi.Float, sent.T.ravel())
+            self.radiance = own(mi.Float, sent.T.ravel())
 
     def row(self, index: UInt, active: Mask) -> OfVariant:
         """The numbers of a lamp."""
@@ -194,7 +194,7 @@ def rectangle_of(mi: ModuleType, shape: Shape) -> Rectangle | None:
         _fill(row, "Rectangle", np.array(placement_reader(mi)(shape)).reshape(4, 4), shape.has_flipped_normals())
     if row[3, 0] != RECTANGLE:
         return None
-    table = engine.own(mi.Float, row.ravel().astype(np.float32))
+    table = own(mi.Float, row.ravel().astype(np.float32))
     return _rectangle(mi, dr.gather(mi.Matrix4f, table, mi.UInt32(0)))
 
 

@@ -12,7 +12,7 @@ from types import ModuleType
 import drjit as dr
 import numpy as np
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Mask, Point, Scene, UInt
 from ..lights.sky import Choice
 
@@ -59,7 +59,7 @@ class LightGrid:
         table[:, :count] = (1.0 - even) * table[:, :count] + even / count
         sums = np.cumsum(table, axis=1)
         sums[:, count - 1 :] = 1.0
-        self._chance = engine.own(mi.Float, table.ravel().astype(np.float32))
+        self._chance = own(mi.Float, table.ravel().astype(np.float32))
         self._choice = Choice(mi, sums)
 
     def _row(self, p: Point) -> UInt:

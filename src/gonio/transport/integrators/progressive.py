@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
+from ...bridge.faults.interrupted_recording import interruptible
 from ...bridge.faults.merged_mesh_bbox import with_valid_bbox
 from ...bridge.types import Float, Scene, Sensor, UInt
 from ...errors import InputError
@@ -71,9 +73,9 @@ class Render:
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0
         self._lanes: UInt | None = None  # samples of each lane, where some are ahead of `done`
-        self._share = None if share is None else engine.own(mi.UInt32, share)
+        self._share = None if share is None else own(mi.UInt32, share)
         self._order = tiles(self.width, self.height)
-        self._pixel = engine.own(mi.UInt32, self._order)
+        self._pixel = own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
@@ -110,7 +112,7 @@ class Render:
         mi = self.mi
         # Dr.Jit would record each loop once more, without what turns out to stay as it is: LLVM finds that by itself.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
-        with dr.suspend_grad(), garbage.kept(), engine.interruptible(), unchanged:
+        with dr.suspend_grad(), garbage.kept(), interruptible(), unchanged:
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
@@ -155,11 +157,11 @@ class Render:
         self._sums = Sums.of_arrays(self.mi, state, len(self._pixel), like=self._sums)
         self.done, self._lanes = done, None
         if LANES in state and np.any(state[LANES] != done):
-            self._lanes = engine.own(self.mi.UInt32, state[LANES])
+            self._lanes = own(self.mi.UInt32, state[LANES])
 
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
-        self._pixel = engine.own(self.mi.UInt32, self._order[lanes])
+        self._pixel = own(self.mi.UInt32, self._order[lanes])
         self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None
 

@@ -6,6 +6,7 @@ from types import ModuleType
 
 import drjit as dr
 
+from ...bridge.faults.missing_texture import emissive_texture
 from ...bridge.types import (
     DirectionSample,
     Float,
@@ -19,7 +20,6 @@ from ...bridge.types import (
     SurfaceInteraction,
     TraversalCallback,
 )
-from ...errors import InputError
 from .directions import area_density, area_sample, direction_sample, per_steradian
 from .solid_angles import Ball, Rectangle, SphericalCap, SphericalRectangle, is_rectangle, is_sphere
 
@@ -51,9 +51,7 @@ def register(mi: ModuleType) -> None:
 
         def __init__(self, properties: Properties):
             base.__init__(self, properties)
-            if "radiance" not in properties:  # Mitsuba would follow a null pointer
-                raise InputError("missing", "gonio_area.radiance", "give the radiance: a number, a colour or a texture")
-            self.radiance = properties.get_emissive_texture("radiance")
+            self.radiance = emissive_texture(properties, "radiance", "gonio_area.radiance")
             properties.get("tag", "")
             varying = mi.EmitterFlags.SpatiallyVarying if self.radiance.is_spatially_varying() else 0
             self.m_flags = mi.EmitterFlags.Surface | varying

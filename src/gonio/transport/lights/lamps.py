@@ -10,7 +10,7 @@ from typing import TypeVar
 import drjit as dr
 import numpy as np
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.faults.textured_area_light import must_sample_by_area
 from ...bridge.faults.turned_sphere_normal import with_radial_normal
 from ...bridge.types import (
@@ -149,4 +149,4 @@ class Lamps(LightSampler):
                 to_world = np.array(read(shape)).reshape(4, 4)
                 radius = np.linalg.norm(to_world[:3, 0])
                 row[:] = *to_world[:3, 3], -radius if shape.has_flipped_normals() else radius
-        return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
+        return own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None

@@ -8,6 +8,7 @@ from typing import Protocol
 import drjit as dr
 
 from ...bridge.faults.black_environment import is_black_environment
+from ...bridge.faults.shape_order import light_key
 from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Ray, Scene, SurfaceInteraction, UInt
 from .. import fast
 from ..fast.lamp_table import TabledLamps
@@ -47,8 +48,7 @@ class Lights:
         self.surfaces = Surfaces(mi, scene) if surfaces is None else surfaces
         all_ = scene.emitters()
         lit = [index for index in range(len(all_)) if not is_black_environment(mi, all_[index])]
-        # Mitsuba merges the shapes of a file in random order, and that of their lights must not follow it
-        order = sorted(lit, key=lambda index: _order(all_[index]))
+        order = sorted(lit, key=lambda index: light_key(all_[index]))
         self.emitters = [all_[index] for index in order]
         self.count = len(self.emitters)
         self.has_environment = scene.environment() is not None
@@ -213,13 +213,6 @@ class PowerChoice:
 
     def probability(self, p: Point, index: UInt, active: Mask) -> Float:
         return self._by_power.eval_pmf_normalized(index, active)  # type: ignore[attr-defined]
-
-
-def _order(emitter: Emitter) -> tuple[str, list[float]]:
-    """What lights are sorted by: nothing that changes between two runs."""
-    shape = emitter.get_shape()
-    box = [] if shape is None else [float(x) for x in (*shape.bbox().min, *shape.bbox().max)]
-    return str(emitter), box
 
 
 def fraction(x: Float) -> Float:
