@@ -125,12 +125,12 @@ def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
     import mitsuba as mi
 
     held = mi.traverse(bsdf)
-    found = {}
+    result = {}
     for name in ALBEDOS:
         if f"{name}.value" in held:
             values = np.asarray(held[f"{name}.value"], float).ravel()
-            found[name] = float(values[0]) if values.size == 1 else tuple(map(float, values))
-    return found
+            result[name] = float(values[0]) if values.size == 1 else tuple(map(float, values))
+    return result
 
 
 def _is_bsdf(value: object) -> bool:
@@ -215,10 +215,10 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
     if not path.is_file() or b"register_bsdf" not in path.read_bytes():
         return None
     mi = mitsuba()
-    register, seen = mi.register_bsdf, _registered.setdefault(path, {})
+    register, registered = mi.register_bsdf, _registered.setdefault(path, {})
 
     def noted(kind: str, make: object, *more: object) -> None:
-        seen[kind] = make
+        registered[kind] = make
         register(kind, make, *more)
 
     vars(mi)["register_bsdf"] = noted
@@ -226,7 +226,11 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
         module = outside.module_of(path, "TARGET")
     finally:
         vars(mi)["register_bsdf"] = register
-    kind = name if name in seen else next((k for k, make in seen.items() if make is vars(module).get(name)), None)
+    kind = (
+        name
+        if name in registered
+        else next((k for k, make in registered.items() if make is vars(module).get(name)), None)
+    )
     return None if kind is None else load({"type": kind, **properties})
 
 

@@ -77,9 +77,9 @@ class Retrace:
         weight = dr.select(fork & self.retracing, 2 * bs.pdf, 1)
         return after, weight, ~self.retracing | (odds > 0)
 
-    def begin(self, again: Mask, number: Float) -> Retrace:
+    def begin(self, retraced: Mask, number: Float) -> Retrace:
         """Of a path that begins; of the retrace where it is due, on lanes `again`."""
-        return replace(self, phase=dr.select(again, type(self.phase)(RETRACING), self.phase), number=number)
+        return replace(self, phase=dr.select(retraced, type(self.phase)(RETRACING), self.phase), number=number)
 
 
 def reflects_and_transmits(mi: ModuleType, flags: UInt) -> Mask:

@@ -88,17 +88,17 @@ class _Transparent(Lights):
         if self.shortens_last_ray or self.count == 0:
             return super().along(ray, solid_angle, active)
         mi, origin = self.mi, ray.o
-        found, still = [], active
+        result, still = [], active
         for _ in self.scene.shapes():
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, still)
             still = still & si.is_valid()
-            found.append(self._arriving(origin, si, solid_angle, still))
+            result.append(self._arriving(origin, si, solid_angle, still))
             ray = si.spawn_ray(ray.d)
         if self.has_environment:
             beyond = dr.zeros(mi.SurfaceInteraction3f)
             beyond.t, beyond.wi, beyond.wavelengths = dr.inf, -ray.d, ray.wavelengths
-            found.append(self._arriving(origin, beyond, solid_angle, active))
-        return found
+            result.append(self._arriving(origin, beyond, solid_angle, active))
+        return result
 
     def _arriving(
         self, origin: Point, si: SurfaceInteraction, solid_angle: Float, active: Mask

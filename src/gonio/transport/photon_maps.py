@@ -37,9 +37,9 @@ class _Trail:
     flight: Flight
     density: Float  # of étendue, where the present chain of mirrors began
     mirrored: Mask  # whether such a chain has begun
-    kept: Mask
+    landed: Mask
     first: Photon
-    kept_again: Mask
+    landed_again: Mask
     second: Photon
 
 
@@ -67,12 +67,12 @@ class PhotonMaps:
         """Make map `number` the current one."""
         if not self._is_dense:
             trail, width = self._trace(0), DENSITY_CELL * self.radius
-            self.density, self._is_dense = PhotonDensity(self.mi, trail.first, trail.kept, width, self.count), True
+            self.density, self._is_dense = PhotonDensity(self.mi, trail.first, trail.landed, width, self.count), True
         if self._current is None or self._current[0] != number:
             self._current = None  # before the next one: there is one at a time
             trail, radius = self._trace(number), self.radius * (number + 1) ** SHRINKING
-            photons, kept = [trail.first, trail.second], [trail.kept, trail.kept_again]
-            self._current = number, PhotonMap(self.mi, photons, kept, radius)
+            photons, landed = [trail.first, trail.second], [trail.landed, trail.landed_again]
+            self._current = number, PhotonMap(self.mi, photons, landed, radius)
 
     @property
     def current(self) -> PhotonMap:
@@ -155,7 +155,9 @@ class PhotonMaps:
             mode="symbolic",
             label="particles",
         )[0]
-        dr.eval(trail.kept, trail.kept_again, trail.first, trail.second)  # all, that it be one kernel for all who ask
+        dr.eval(
+            trail.landed, trail.landed_again, trail.first, trail.second
+        )  # all, that it be one kernel for all who ask
         return trail
 
     def _vertex(self, trail: _Trail, key: UInt, low: UInt, turn: UInt) -> _Trail:
@@ -178,9 +180,9 @@ class PhotonMaps:
             self.rotated(flight.flux * flight.throughput, WAVELENGTHS - turn) / self.total,
             trail.density * dr.square(flight.eta),
             flight.depth,
-            trail.kept,
+            trail.landed,
         )
-        first, second = stays & ~trail.kept, stays & trail.kept
+        first, second = stays & ~trail.landed, stays & trail.landed
         bs, weight = particles.sample_bsdf(key, low, flight, vertex)
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         # From where it has arrived it goes on once more, to a second surface behind mirrors.
@@ -192,8 +194,8 @@ class PhotonMaps:
             following,
             dr.select(first, self.etendue_density(vertex.si.p), trail.density),
             (trail.mirrored & ~first) | (active & delta),
-            trail.kept | first,
+            trail.landed | first,
             dr.select(first, photon, trail.first),
-            trail.kept_again | second,
+            trail.landed_again | second,
             dr.select(second, photon, trail.second),
         )

@@ -44,7 +44,7 @@ class Photon:
     flux: Radiance
     density: Float
     depth: UInt
-    again: Mask
+    second: Mask
 
     @staticmethod
     def none(mi: ModuleType) -> Photon:
@@ -57,19 +57,19 @@ class Photon:
         mi_float = type(self.density)
         flux = list(self.flux) + [mi_float(0)] * (4 - len(self.flux))
         first = [*self.position, *self.normal, mi_float(self.depth), self.density]
-        return [*first, *self.direction, dr.select(self.again, mi_float(1), 0), *flux]
+        return [*first, *self.direction, dr.select(self.second, mi_float(1), 0), *flux]
 
 
 class PhotonMap:
     """Particles, found by place. `radius` is data of the kernel like the particles: changed, it compiles nothing."""
 
-    def __init__(self, mi: ModuleType, photons: Sequence[Photon], kept: Sequence[Mask], radius: float):
+    def __init__(self, mi: ModuleType, photons: Sequence[Photon], landed: Sequence[Mask], radius: float):
         self.mi = mi
         self.radius = dr.opaque(mi.Float, radius)
         self.per_cell = dr.opaque(mi.Float, 0.5 / radius)
         self.low = dr.opaque(mi.Int32, -(ROW // 2))  # of cells along x, about the origin of the scene
         rows, columns = [], []
-        for photon, there in zip(photons, kept, strict=True):
+        for photon, there in zip(photons, landed, strict=True):
             cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photon.position]
             values = photon.packed()
             there = there & dr.isfinite(sum(values[1:], values[0]))
@@ -155,8 +155,8 @@ class PhotonMap:
             distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
             here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius)
             alike, came = dr.dot(normal, other), mi.Vector3f(*(record[2, i] for i in range(3)))
-            beside = dr.dot(normal, back) * dr.dot(other, came) < 0
-            here &= (alike > FACING) | ((alike < -FACING) & beside)
+            other_side = dr.dot(normal, back) * dr.dot(other, came) < 0
+            here &= (alike > FACING) | ((alike < -FACING) & other_side)
             # rows of other cells may share their memory
             here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
             here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
@@ -180,8 +180,8 @@ class PhotonMap:
 
         begin = mi.UInt32(dr.select(active, mi.UInt32(0), 4))
         state = (begin, *row(begin, active), zero, type(zero)(zero))
-        found = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
-        return found[-2], found[-1]
+        result = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
+        return result[-2], result[-1]
 
 
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
@@ -199,12 +199,12 @@ class PhotonDensity:
     Weights are made of it, and any number will do for those, as long as it is the same whoever asks.
     """
 
-    def __init__(self, mi: ModuleType, photon: Photon, kept: Mask, width: float, traced: int):
+    def __init__(self, mi: ModuleType, photon: Photon, landed: Mask, width: float, traced: int):
         self.mi = mi
         self.per_cell = dr.opaque(mi.Float, 1 / width)
         place = self._place(photon.position)
-        dr.eval(place, kept)
-        counts = np.bincount(np.array(place)[np.array(kept)], minlength=CUBES)
+        dr.eval(place, landed)
+        counts = np.bincount(np.array(place)[np.array(landed)], minlength=CUBES)
         self.values = own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
 
     @staticmethod

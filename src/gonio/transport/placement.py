@@ -16,12 +16,12 @@ def placement_reader(mi: ModuleType) -> Callable[[Shape], list[float]]:
     class Reader(base):
         def put(self, name: str, value: OfVariant, flags: int, kind: OfVariant = None) -> None:
             if name == "to_world":
-                self.found = value, kind
+                self.result = value, kind
 
     def read(shape: Shape) -> list[float]:
         reader = Reader()
         shape.traverse(reader)
-        matrix = mi.get_property(*reader.found, shape).matrix
+        matrix = mi.get_property(*reader.result, shape).matrix
         return [matrix[row, column][0] for row in range(4) for column in range(4)]
 
     return read

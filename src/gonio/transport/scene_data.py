@@ -112,7 +112,7 @@ class SceneData:
         mi = self.mi
         if not self.media.known:
             return mi.UInt32(0)
-        return self.media.around(mi.Point3f(self.sensor.world_transform() @ mi.Point3f(0.0)))
+        return self.media.containing(mi.Point3f(self.sensor.world_transform() @ mi.Point3f(0.0)))
 
     # ------------------------------------------------------------------ what integrators ask
 

@@ -33,5 +33,5 @@ def with_valid_bbox(mi: ModuleType, scene: Scene) -> Scene:
         return scene
     lights = [emitter for emitter in scene.emitters() if emitter.get_shape() is None]
     parts = {f"part{i}": part for i, part in enumerate([*scene.shapes(), *lights, *scene.sensors()])}
-    found: Scene = mi.load_dict({"type": "scene", **parts}, parallel=False, optimize=False)
-    return found
+    result: Scene = mi.load_dict({"type": "scene", **parts}, parallel=False, optimize=False)
+    return result

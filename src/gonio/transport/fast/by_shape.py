@@ -78,9 +78,9 @@ def structure(plugin: PluginDict) -> Hashable:
 def properties(plugin: PluginDict, outer: Place = ()) -> Iterator[tuple[Place, Numbers]]:
     """The numbers in which plugins of one structure may differ."""
     for name, value in plugin.items():
-        found = None if name in _WHOLE else _numbers(value)
-        if found is not None:
-            yield (*outer, name), found
+        result = None if name in _WHOLE else _numbers(value)
+        if result is not None:
+            yield (*outer, name), result
         elif isinstance(value, dict) and value["type"] != "rgb":
             yield from properties(value, (*outer, name))
 
@@ -100,16 +100,16 @@ def _numbers(value: object) -> Numbers | None:
 
 
 def _replaced(plugin: PluginDict, values: Mapping[Place, Texture], outer: Place = ()) -> PluginDict:
-    found: PluginDict = {}
+    result: PluginDict = {}
     for name, value in plugin.items():
         here = (*outer, name)
         if here in values:
-            found[name] = values[here]
+            result[name] = values[here]
         elif isinstance(value, dict) and value["type"] != "rgb":
-            found[name] = _replaced(value, values, here)
+            result[name] = _replaced(value, values, here)
         else:
-            found[name] = value
-    return found
+            result[name] = value
+    return result
 
 
 def _register(mi: ModuleType) -> None:

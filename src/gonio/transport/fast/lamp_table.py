@@ -73,13 +73,13 @@ class LampTable:
 
     def _seen(self, row: OfVariant, origin: Point) -> list[tuple[Mask, Seen]]:
         """(lanes for which it holds, the lamp as it is seen from a point) for each kind that there is."""
-        mi, found = self.mi, list[tuple[Mask, Seen]]()
+        mi, result = self.mi, list[tuple[Mask, Seen]]()
         if RECTANGLE in self.kinds:
-            found.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
+            result.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
         if BALL in self.kinds:
             place = mi.Point3f(row[0, 0], row[0, 1], row[0, 2])
-            found.append((row[3, 0] == BALL, SphericalCap(mi, Ball(place, row[1, 3], row[0, 3]), origin)))
-        return found
+            result.append((row[3, 0] == BALL, SphericalCap(mi, Ball(place, row[1, 3], row[0, 3]), origin)))
+        return result
 
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
         """A direction toward a lamp: uniform in the solid angle of a ball, on the area of a rectangle.
@@ -87,18 +87,18 @@ class LampTable:
         Rectangles by solid angle have 6 % less error beside several near lamps, and take 25 % more time: a path that
         meets a lamp has to measure it again.
         """
-        found: DirectionSample | None = None
-        for here, seen in self._seen(row, it.p):
-            ds = direction_sample(self.mi, seen, u, it)
-            found = ds if found is None else dr.select(here, ds, found)
-        return found
+        result: DirectionSample | None = None
+        for here, view in self._seen(row, it.p):
+            ds = direction_sample(self.mi, view, u, it)
+            result = ds if result is None else dr.select(here, ds, result)
+        return result
 
     def pdf(self, row: OfVariant, origin: Point, distance: Float, cosine: Float) -> Float:
         """Density (1/sr) of `sample` toward a point met at `distance` under |cosine|."""
-        found = self.mi.Float(0)
-        for here, seen in self._seen(row, origin):
-            found = dr.select(here, seen.pdf(distance, cosine), found)
-        return found
+        result = self.mi.Float(0)
+        for here, view in self._seen(row, origin):
+            result = dr.select(here, view.pdf(distance, cosine), result)
+        return result
 
     def sent(self, row: OfVariant, index: UInt, normal: Vector, direction: Vector, active: Mask) -> Radiance:
         """Radiance of a lamp in `direction`, away from its surface; of rgb variants, the others' is not in a table."""

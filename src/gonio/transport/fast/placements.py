@@ -78,8 +78,8 @@ class Placements:
         if not self.others:
             return self._finished(dr.zeros(mi.SurfaceInteraction3f), hit, ray)
         place = dr.gather(mi.UInt32, self.place, number, active)
-        found = dr.switch(place, [ask(shape) for shape in self.others], hit, ray, active)
-        return self._finished(found, hit, ray)
+        result = dr.switch(place, [ask(shape) for shape in self.others], hit, ray, active)
+        return self._finished(result, hit, ray)
 
     def _placed(self, formula: Formula, hit: Hit, ray: Ray, placement: OfVariant) -> SurfaceInteraction:
         """Ask a formula about the shape whose placement is given."""
@@ -119,9 +119,9 @@ def _sphere(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: 
     normal = dr.normalize(ray(hit.t) - centre)
     si.p = dr.fma(normal, radius, centre)  # back onto the sphere, which the rounded distance has missed
     local = mi.Vector3f(dr.dot(normal, x), dr.dot(normal, y), dr.dot(normal, z)) / radius
-    around = dr.atan2(local.y, local.x)
-    around = dr.select(around < 0, around + 2 * dr.pi, around)
-    si.uv = mi.Point2f(around / (2 * dr.pi), _angle_from_z(local) / dr.pi)
+    azimuth = dr.atan2(local.y, local.x)
+    azimuth = dr.select(azimuth < 0, azimuth + 2 * dr.pi, azimuth)
+    si.uv = mi.Point2f(azimuth / (2 * dr.pi), _angle_from_z(local) / dr.pi)
     rho = dr.hypot(local.x, local.y)
     pole = rho == 0
     cos, sin = dr.select(pole, 1, local.x / rho), dr.select(pole, 0, local.y / rho)
@@ -149,8 +149,8 @@ def _of_rectangles(to_world: Matrices, sign: NDArray[np.float64]) -> Matrices:
 def _rectangle(mi: ModuleType, si: SurfaceInteraction, hit: Hit, ray: Ray, column: list[Vector], _: OfVariant) -> None:
     """A rectangle's surface, or a parallelogram's: u and v run along its edges, in [0, 1]."""
     si.dp_du, si.dp_dv, normal, middle = column
-    met = ray(hit.t)
-    si.p = dr.fma(normal, dr.dot(middle - met, normal), met)  # back onto the plane
+    point = ray(hit.t)
+    si.p = dr.fma(normal, dr.dot(middle - point, normal), point)  # back onto the plane
     offset, across, along = si.p - middle, dr.cross(normal, si.dp_du), dr.cross(si.dp_dv, normal)
     u, v = dr.dot(along, offset) / dr.dot(along, si.dp_du), dr.dot(across, offset) / dr.dot(across, si.dp_dv)
     si.uv = mi.Point2f(u + 0.5, v + 0.5)

@@ -47,10 +47,10 @@ class RectangleLight(Lamps):
         return light
 
     def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
-        seen = SphericalRectangle(self.rectangle, si.p)
-        ds = direction_sample(self.mi, seen, u, si)
+        view = SphericalRectangle(self.rectangle, si.p)
+        ds = direction_sample(self.mi, view, u, si)
         light = with_shadow_target(self.mi, si, ds, self.sent(self.emitters[0], ds, si, active) / ds.pdf)
-        light.solid_angle = dr.select(seen.uniform, seen.solid_angle, 0)
+        light.solid_angle = dr.select(view.uniform, view.solid_angle, 0)
         return light
 
     def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:

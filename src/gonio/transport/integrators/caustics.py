@@ -120,13 +120,13 @@ class Caustics(Path):
         """Where a path has ended, its retrace or the next sample's; and lanes of the latter."""
         if not self.retraces:
             return dr.select(begins, fresh, state), begins
-        again = begins & (state.retrace.phase == delta_retrace.DUE)
+        retraced = begins & (state.retrace.phase == delta_retrace.DUE)
         number = self.data.pair(key, state.path.index, FIRST_VERTEX + ROULETTE)[0]
-        fresh.path.radiance = dr.select(again, state.path.radiance, fresh.path.radiance)
-        fresh.retrace = fresh.retrace.begin(again, number)
+        fresh.path.radiance = dr.select(retraced, state.path.radiance, fresh.path.radiance)
+        fresh.retrace = fresh.retrace.begin(retraced, number)
         if self.measured:
-            fresh.blur = dr.select(again, state.blur, fresh.blur)
-        return dr.select(begins, fresh, state), begins & ~again
+            fresh.blur = dr.select(retraced, state.blur, fresh.blur)
+        return dr.select(begins, fresh, state), begins & ~retraced
 
     def merged_vertex(self, state: CausticPath, key: UInt) -> tuple[CausticPath, list[Float]]:
         """A vertex of `path`, to which particles bring light, too."""
@@ -206,7 +206,7 @@ class Caustics(Path):
             value, pdf = vertex.bsdf.eval_pdf(self.scattering.context, si, si.to_local(photon.direction), here)
             cosine = dr.maximum(abs(dr.dot(photon.direction, si.n)), 1e-6)
             share = 1 - maps.path_weight(pdf / cosine, photon.density)
-            share *= dr.select(photon.again, 1, counts)
+            share *= dr.select(photon.second, 1, counts)
             flux = maps.rotated(photon.flux, path.index)
             return dr.select(here, value * flux * (weight * share / cosine), 0)
 

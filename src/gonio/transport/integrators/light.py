@@ -72,7 +72,7 @@ class Light(LightTransport):
         value = particles.eval_bsdf(vertex, vertex.si.to_local(ds.d), active) * importance
         value = particles.through_media(vertex, value, ds)
         value *= flight.flux * flight.throughput
-        found = camera.splat(key, low, sums, ds.uv, value, vertex.si, ds.p, active)
+        result = camera.splat(key, low, sums, ds.uv, value, vertex.si, ds.p, active)
 
         # Follow the sampled direction.
-        return particles.follow(key, low, flight, vertex, bs, weight, active), invalid + found
+        return particles.follow(key, low, flight, vertex, bs, weight, active), invalid + result

@@ -54,7 +54,7 @@ class LightSampler:
     index  the light's place in `Lights.emitters`
     """
 
-    def met(self, si: SurfaceInteraction) -> Mask:
+    def owns(self, si: SurfaceInteraction) -> Mask:
         """Whether a ray that ended at `si` may have met one of these lights."""
         raise NotImplementedError
 

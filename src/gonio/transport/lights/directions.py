@@ -10,10 +10,10 @@ from ...bridge.types import DirectionSample, Float, Interaction, Mask, Point, Po
 from .solid_angles import Seen
 
 
-def direction_sample(mi: ModuleType, seen: Seen, sample: Point, it: Interaction) -> DirectionSample:
+def direction_sample(mi: ModuleType, view: Seen, sample: Point, it: Interaction) -> DirectionSample:
     """A direction sample toward a lamp as it is seen from `it`, from two numbers in [0, 1)."""
     ps = dr.zeros(mi.PositionSample3f, dr.width(it.p))
-    point, normal, uv, pdf = seen.sample(sample.x, sample.y)
+    point, normal, uv, pdf = view.sample(sample.x, sample.y)
     ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(normal), mi.Point2f(*uv), it.time
     ds = toward(mi, ps, it)
     ds.pdf = pdf

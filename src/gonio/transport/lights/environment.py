@@ -17,7 +17,7 @@ class Environment(LightSampler):
     def __init__(self, mi: ModuleType, emitter: Emitter) -> None:
         self.mi, self.emitter = mi, emitter
 
-    def met(self, si: SurfaceInteraction) -> Mask:
+    def owns(self, si: SurfaceInteraction) -> Mask:
         return ~si.is_valid()
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:

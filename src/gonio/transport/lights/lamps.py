@@ -64,7 +64,7 @@ class Lamps(LightSampler):
         place = dr.gather(self.mi.UInt32, self.scene_indices, index, active)
         return dr.gather(self.mi.EmitterPtr, self.scene.emitters_dr(), place, active)
 
-    def met(self, si: SurfaceInteraction) -> Mask:
+    def owns(self, si: SurfaceInteraction) -> Mask:
         return si.is_valid()
 
     def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
@@ -130,8 +130,8 @@ class Lamps(LightSampler):
         def answer(shape: Shape | None) -> Callable[..., Answer]:
             return lambda *args: nothing if shape is None else ask(shape, *args)
 
-        found: Answer = dr.switch(index, [answer(one.get_shape()) for one in self.emitters], *args)
-        return found
+        result: Answer = dr.switch(index, [answer(one.get_shape()) for one in self.emitters], *args)
+        return result
 
     @cached_property
     def has_instances(self) -> bool:

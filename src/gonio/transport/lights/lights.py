@@ -131,8 +131,8 @@ class Lights:
         """Radiance that the surface (or, where the ray left the scene, the environment) at `si` sends along the ray."""
         radiance = self.mi.Spectrum(0)
         for sampler in self.samplers:
-            met = sampler.met(si)
-            radiance = dr.select(met, sampler.emitted(si, active & met), radiance)
+            owns = sampler.owns(si)
+            radiance = dr.select(owns, sampler.emitted(si, active & owns), radiance)
         return radiance
 
     def sample(self, si: SurfaceInteraction, u: Point, active: Mask) -> LightSample:
@@ -170,7 +170,7 @@ class Lights:
         density = mi.Float(0)
         index = dr.gather(mi.UInt32, self.index_of_pointer, dr.reinterpret_array(mi.UInt32, hit.ds.emitter), active)
         for sampler in self.samplers:
-            here = active & sampler.met(si)
+            here = active & sampler.owns(si)
             density = dr.select(here, sampler.pdf(hit, index, here), density)
         return density * self.choice.probability(origin, index, active)
 

@@ -66,9 +66,9 @@ class Sky:
         si.wi = -self._toward(mi.Float(index - row * wide) * across, dr.cos(mi.Float(row) * down))
         if mi.is_spectral:
             si.wavelengths = type(si.wavelengths)(*np.linspace(450.0, 620.0, len(si.wavelengths)).tolist())
-        seen = self.emitter.eval(si)
-        seen = mi.luminance(seen) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(seen))
-        points = np.array(seen, np.float32).reshape(high + 1, wide)
+        values = self.emitter.eval(si)
+        values = mi.luminance(values) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(values))
+        points = np.array(values, np.float32).reshape(high + 1, wide)
         points = np.where(np.isfinite(points), np.maximum(points, 0.0), 0.0)
         points = np.concatenate([points, points[:, :1]], axis=1)
         largest = total = np.zeros((self.height, self.width), np.float32)
@@ -151,5 +151,5 @@ class Choice:
             return dr.select(beyond, middle + 1, low), dr.select(beyond, high, middle)
 
         state = dr.gather(mi.UInt32, below, part), dr.gather(mi.UInt32, below, part + 1)
-        found = dr.while_loop(state, lambda low, high: low < high, halve, mode="symbolic", label="search")
-        return found[0]
+        result = dr.while_loop(state, lambda low, high: low < high, halve, mode="symbolic", label="search")
+        return result[0]

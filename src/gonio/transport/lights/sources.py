@@ -171,22 +171,22 @@ class Sources:
                 mi.EmitterPtr, self.scene.emitters_dr(), dr.gather(mi.UInt32, lights.scene_indices, number)
             )
         kind = dr.gather(mi.UInt32, self.kind_of, number)
-        found: Particle | None = None
+        result: Particle | None = None
         for one in self.known:
             make = (self._from_surface, self._from_point, self._from_infinite)[one]
             here = kind == one
             other = make(number, emitter, place, aim, way, wavelengths, here)
-            found = other if found is None else dr.select(here, other, found)
-        assert found is not None, "who asks has seen that there are lamps"
+            result = other if result is None else dr.select(here, other, result)
+        assert result is not None, "who asks has seen that there are lamps"
         return Particle(
-            found.origin,
-            found.direction,
+            result.origin,
+            result.direction,
             emitter,
-            found.place,
+            result.place,
             kind,
-            found.flux / probability,
-            dr.select(found.density < UNMET, found.density * probability, UNMET),
-            found.direct_weight / probability,
+            result.flux / probability,
+            dr.select(result.density < UNMET, result.density * probability, UNMET),
+            result.direct_weight / probability,
         )
 
     def density(self, origin: Point, si: SurfaceInteraction, direction: Vector, active: Mask) -> Float:
@@ -198,24 +198,24 @@ class Sources:
             number = dr.reinterpret_array(mi.UInt32, emitter)
             probability = dr.gather(mi.Float, lights.probability_of_pointer, number, active)
             index = dr.gather(mi.UInt32, lights.index_of_pointer, number, active)
-        found = mi.Float(0)
+        result = mi.Float(0)
         for one in self.known:
             if one == SURFACE:
-                met = active & si.is_valid()
+                hit = active & si.is_valid()
                 ps = mi.PositionSample3f(si)
                 cosine = dr.abs(dr.dot(direction, si.n))
-                by_area = lights.lamps.of_shape(emitter, index, area_density, mi.Float(0), ps, met)
-                pdf = by_area * self._direction_pdf(si, -direction, met) / dr.maximum(cosine, 1e-12)
-                found = dr.select(met, pdf, found)
+                by_area = lights.lamps.of_shape(emitter, index, area_density, mi.Float(0), ps, hit)
+                pdf = by_area * self._direction_pdf(si, -direction, hit) / dr.maximum(cosine, 1e-12)
+                result = dr.select(hit, pdf, result)
             if one == INFINITE:
-                met = active & ~si.is_valid()
+                hit = active & ~si.is_valid()
                 it = dr.zeros(mi.SurfaceInteraction3f)
                 it.p = self.centre
                 ds = dr.zeros(mi.DirectionSample3f)
                 ds.d, ds.emitter = direction, emitter
-                pdf = emitter.pdf_direction(it, ds, met) * self._line_pdf(origin, direction)
-                found = dr.select(met, pdf, found)
-        return found * probability
+                pdf = emitter.pdf_direction(it, ds, hit) * self._line_pdf(origin, direction)
+                result = dr.select(hit, pdf, result)
+        return result * probability
 
     # ------------------------------------------------------------------ of each kind
 
@@ -250,8 +250,8 @@ class Sources:
             shines &= ~inward | (abs(radius) > shadow_offset(mi, ps.p, ps.p))
         density = ps.pdf * pdf / dr.maximum(cosine, 1e-12)
         flux = dr.select(shines, emitter.eval(si, shines) / density, 0)
-        seen = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
-        return Particle(si.p, direction, emitter, si, mi.UInt32(SURFACE), flux, density, seen)
+        direct_weight = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
+        return Particle(si.p, direction, emitter, si, mi.UInt32(SURFACE), flux, density, direct_weight)
 
     def _direction_pdf(
         self, si: SurfaceInteraction, direction: Vector, active: Mask, two_sided: Mask | None = None
@@ -314,9 +314,9 @@ class Sources:
         density = dr.select(parallel, UNMET, ds.pdf * by_area)
         flux = dr.select(active & (by_area > 0), weight / by_area, 0)
         origin = mi.Point3f(point - direction * outside)
-        seen = dr.select(parallel, 0, weight)
+        direct_weight = dr.select(parallel, 0, weight)
         place_ = self._nowhere(wavelengths)
-        return Particle(origin, direction, emitter, place_, mi.UInt32(INFINITE), flux, density, seen)
+        return Particle(origin, direction, emitter, place_, mi.UInt32(INFINITE), flux, density, direct_weight)
 
     def _line_pdf(self, point: Point, direction: Vector) -> Float:
         if self.targets is not None:
