@@ -207,6 +207,7 @@ class LightTransport(Integrator):
 
     def ambient_light(self, vertex: Vertex, active: Mask) -> Radiance:
         """Ambient radiance times the BSDF's attribute "ambient" (0 where it has none)."""
+        assert self.ambient is not None
         si, bsdf = vertex.si, vertex.bsdf
         if self.mi.is_rgb:
             reflected = bsdf.eval_attribute_3("ambient", si, active)

@@ -12,6 +12,7 @@ from ...bridge.types import (
     Float,
     Interaction,
     Mask,
+    OfVariant,
     Plugin,
     Point,
     Properties,
@@ -40,10 +41,13 @@ def register(mi: ModuleType) -> None:
     It is sampled by solid angle on rectangles and spheres, by area on others. Not for light tracing
     (`sample_ray` is not offered).
     """
-    if mi.variant() in _registered:
-        return
-    _registered.add(mi.variant())
+    if mi.variant() not in _registered:
+        _registered.add(mi.variant())
+        mi.register_emitter("gonio_area", _light_class(mi))
 
+
+def _light_class(mi: ModuleType) -> OfVariant:
+    """The class for the variant that is set."""
     base: Plugin = mi.Emitter
 
     class TwoSidedAreaLight(base):
@@ -97,7 +101,7 @@ def register(mi: ModuleType) -> None:
         def to_string(self) -> str:
             return f"TwoSidedAreaLight[radiance = {self.radiance}]"
 
-    mi.register_emitter("gonio_area", TwoSidedAreaLight)
+    return TwoSidedAreaLight
 
 
 _registered: set[str] = set()
