@@ -15,14 +15,14 @@ import mitsuba as mi
 import numpy as np
 
 from .answers import Answer
-from .types import BSDFContext, BSDFSample, MitsubaBSDF, OfVariant, SurfaceInteraction
+from .types import BSDFContext, BSDFPlugin, BSDFSample, OfVariant, SurfaceInteraction
 
 COUNT = 4096
 SAME = 1e-4  # relative: float32, and kernels that are fused otherwise
 FEW = 0.002  # share of rows that rounding may carry over an edge
 
 
-def answers(bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
+def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
     """Every way of asking, at the given surface interaction (COUNT wide), whose wi is replaced."""
     trial = _Trial(bsdf, si, seed)
     for what, asked in (
@@ -69,7 +69,7 @@ class _Difference(NamedTuple):
 class _Trial:
     """A plugin, and what it answers at COUNT pairs of directions."""
 
-    def __init__(self, bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> None:
+    def __init__(self, bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> None:
         self.bsdf, self.si, self.ctx = bsdf, si, mi.BSDFContext()
         self.difference: _Difference | None = None
         rng = np.random.default_rng([seed, 111])

@@ -21,8 +21,8 @@ from ..errors import InputError, did_you_mean
 from ..material import number, spectrum
 from . import adapter, engine
 from .faults.exr_threads import file_threads
-from .native import Native
-from .types import MitsubaBSDF, OfVariant, PluginDict
+from .native import MitsubaBSDF
+from .types import BSDFPlugin, OfVariant, PluginDict
 
 # Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are read from the plugin as they are
 SMALLEST_ALPHA = 1e-3  # Mitsuba's pages: "smooth" below, and another plugin; its float32 code ends near here
@@ -47,7 +47,7 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
 }
 
 
-class _Described(Native):
+class _Described(MitsubaBSDF):
     """A BSDF that is built from a dictionary, and built anew where a parameter changes."""
 
     description: ClassVar[PluginDict] = {}
@@ -59,15 +59,15 @@ class _Described(Native):
         return _BY_NATURE.get(str(self.description.get("type", "")), {})
 
     @property
-    def held(self) -> dict[str, Native]:
+    def held(self) -> dict[str, MitsubaBSDF]:
         """The BSDFs inside, as materials of their own."""
         return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
 
-    def anew(self) -> Native:
+    def anew(self) -> MitsubaBSDF:
         """The plugin built once more."""
         return load(self.plugin)
 
-    def around_diffuse(self) -> Native:
+    def around_diffuse(self) -> MitsubaBSDF:
         """The same around plain diffuse ones."""
         return load({**self.description, **dict.fromkeys(self.held, _DIFFUSE)})
 
@@ -85,7 +85,7 @@ class _Described(Native):
         object.__setattr__(self, "bsdf", _built(self.plugin))
 
 
-def load(description: PluginDict) -> Native:
+def load(description: PluginDict) -> MitsubaBSDF:
     """The BSDF of a dictionary as `mi.load_dict` takes it; InputError where Mitsuba refuses it."""
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
@@ -106,7 +106,7 @@ def load(description: PluginDict) -> Native:
     return type(f"Mitsuba{kind.title()}", (_Described,), space)()
 
 
-def _built(description: PluginDict) -> MitsubaBSDF:
+def _built(description: PluginDict) -> BSDFPlugin:
     """The plugin itself."""
     mi = mitsuba()
     kind = str(description.get("type", ""))
@@ -120,7 +120,7 @@ def _built(description: PluginDict) -> MitsubaBSDF:
     return bsdf
 
 
-def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
+def _colours(bsdf: BSDFPlugin) -> dict[str, float | tuple[float, ...]]:
     """The albedos that a plugin holds as one number or colour each."""
     import mitsuba as mi
 
@@ -194,7 +194,7 @@ _BY_NATURE: dict[str, dict[str, str]] = {
 }
 
 
-def plugin(name: str, properties: Mapping[str, object]) -> Native:
+def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
     """A plugin by name with the properties given; BSDFs of BSDFs get plain ones inside."""
     more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
@@ -207,7 +207,7 @@ def plugin(name: str, properties: Mapping[str, object]) -> Native:
 _registered: dict[Path, dict[str, object]] = {}  # what the files registered that were run, by path
 
 
-def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
+def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | None:
     """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
     the file registers none of that name."""
     path = Path(target.rpartition(":")[0]).expanduser().resolve()

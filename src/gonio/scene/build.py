@@ -13,7 +13,7 @@ import numpy as np
 
 from ..bridge.faults.merged_mesh_bbox import compute_boxes
 from ..bridge.faults.shape_order import shape_key
-from ..bridge.types import MitsubaBSDF, Plugin, PluginDict, Scene
+from ..bridge.types import BSDFPlugin, Plugin, PluginDict, Scene
 from ..catalog import documents
 from ..errors import GonioWarning, InputError
 from ..material import Parameter
@@ -48,7 +48,7 @@ class Built:
     """A scene, and the BSDF that each material of its description has become."""
 
     scene: Scene
-    bsdfs: Mapping[MaterialPart, MitsubaBSDF]
+    bsdfs: Mapping[MaterialPart, BSDFPlugin]
 
 
 def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> Built:
@@ -69,10 +69,10 @@ class _Builder:
         self.adapter = adapter
         lights.register(mi)
         self.description, self.mi = description, mi
-        self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
+        self.bsdfs: dict[MaterialPart, BSDFPlugin] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
         self.gathers = gathers and fast.enabled() and mi.variant().endswith("rgb")  # spectra are upsampled one by one
-        self.gathered: dict[MaterialPart, tuple[MitsubaBSDF, Group, int]] = {}
+        self.gathered: dict[MaterialPart, tuple[BSDFPlugin, Group, int]] = {}
 
     def scene(self) -> Scene:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
@@ -216,7 +216,7 @@ class _Builder:
 
     # ------------------------------------------------------------------ materials
 
-    def bsdf(self, material: MaterialPart, where: str) -> MitsubaBSDF:
+    def bsdf(self, material: MaterialPart, where: str) -> BSDFPlugin:
         if material not in self.bsdfs:
             self.bsdfs[material] = self.load(self.plugin(material, where), where)
         return self.bsdfs[material]

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from ..bridge import foreign
 from ..bridge.faults.exr_threads import file_threads
-from ..bridge.native import Native
+from ..bridge.native import MitsubaBSDF
 from ..bridge.types import Scene
 from ..errors import InputError
 from ..pictures import formats
@@ -59,7 +59,7 @@ def load(
     return scene
 
 
-def load_bsdf(path: Path) -> Native:
+def load_bsdf(path: Path) -> MitsubaBSDF:
     """The BSDF of a Mitsuba XML file: its root, or the first in a scene. Raises InputError where there is none."""
     mi = foreign.mitsuba()
     check_files(path, {}, allow_outside=True)
@@ -69,11 +69,11 @@ def load_bsdf(path: Path) -> Native:
     except Exception as error:
         raise InputError(f"Mitsuba refuses it: {_mitsuba_text(error)}", str(path)) from None
     if isinstance(loaded, mi.BSDF):
-        return Native(loaded)
+        return MitsubaBSDF(loaded)
     if isinstance(loaded, mi.Scene):
         for shape in loaded.shapes():
             if shape.bsdf() is not None:
-                return Native(shape.bsdf())
+                return MitsubaBSDF(shape.bsdf())
     raise InputError("no BSDF in this file", str(path), "give a file whose root is <bsdf>, or a scene with one")
 
 

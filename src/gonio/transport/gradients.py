@@ -27,10 +27,10 @@ from ..bridge.adapter.material import PlacedMaterial
 from ..bridge.adapter.slots import Slot
 from ..bridge.faults.lost_derivatives import own_variable
 from ..bridge.types import (
+    BSDFPlugin,
     BSDFSample,
     Float,
     Mask,
-    MitsubaBSDF,
     Point,
     Radiance,
     Scene,
@@ -56,7 +56,7 @@ class Along:
     channel  0 to 2; None: all channels together, and both widths of a pair
     """
 
-    plugin: MitsubaBSDF
+    plugin: BSDFPlugin
     path: str
     channel: int | None = None
 
@@ -192,7 +192,7 @@ class _AttachedScattering(Scattering):
     def __init__(self, mi: ModuleType, media: Media, along: Sequence[Along]) -> None:
         super().__init__(mi, media)
         self.media = media
-        self.plugins: list[MitsubaBSDF] = []
+        self.plugins: list[BSDFPlugin] = []
         for one in along:
             if not any(one.plugin is other for other in self.plugins):
                 self.plugins.append(one.plugin)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from ..bridge.types import Float, Mask, MitsubaBSDF, Point, Radiance, Scene, SurfaceInteraction, UInt
+from ..bridge.types import BSDFPlugin, Float, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
 from ..errors import InputError
 from ..material.bsdf import Interior
 
@@ -77,7 +77,7 @@ class Media:
         packed = sum(min(count, 15) << (4 * number) for number, count in enumerate(inside))
         return dr.opaque(mi.UInt32, packed)
 
-    def crossing(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, inside: UInt, active: Mask) -> Crossing:
+    def crossing(self, si: SurfaceInteraction, bsdf: BSDFPlugin, inside: UInt, active: Mask) -> Crossing:
         """What it means to meet a surface while inside of these media."""
         mi = self.mi
         number = self._number(bsdf, active)
@@ -118,12 +118,12 @@ class Media:
             assert interior is not None, "only materials that have one are kept"
             yield here, interior
 
-    def _number(self, bsdf: MitsubaBSDF, active: Mask = True) -> UInt:
+    def _number(self, bsdf: BSDFPlugin, active: Mask = True) -> UInt:
         """The place of a surface's material in the order of priorities, MOST for one without an inside."""
         return dr.gather(self.mi.UInt32, self.place, dr.reinterpret_array(self.mi.UInt32, bsdf), active)
 
 
-def _interiors(scene: Scene) -> Iterator[MitsubaBSDF]:
+def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
     """The plugins of Gonio's that light enters, each once, in the order of the scene."""
     visited: set[int] = set()
     for shape in scene.shapes():

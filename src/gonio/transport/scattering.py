@@ -8,7 +8,7 @@ from types import ModuleType
 import drjit as dr
 
 from ..bridge.adapter.variant import NESTS, SEPARATES
-from ..bridge.types import BSDFSample, Float, Mask, MitsubaBSDF, Point, Radiance, SurfaceInteraction, UInt, Vector
+from ..bridge.types import BSDFPlugin, BSDFSample, Float, Mask, Point, Radiance, SurfaceInteraction, UInt, Vector
 from .media import Crossing, Media
 
 
@@ -20,7 +20,7 @@ class Vertex:
     """
 
     si: SurfaceInteraction
-    bsdf: MitsubaBSDF
+    bsdf: BSDFPlugin
     crossing: Crossing | None = None
 
     def side(self, direction: Vector) -> UInt:
