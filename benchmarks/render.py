@@ -27,7 +27,7 @@ from rich.table import Table
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
-from gonio.transport.integrators import Render, Settings, Transport  # noqa: E402
+from gonio.transport.integrators import LightTransport, Render, Settings  # noqa: E402
 
 WIDTH, HEIGHT, SPP = 1000, 300, 64
 ETA, K = [0.15494, 0.11648, 0.13809], [4.81810, 3.11562, 2.14240]
@@ -214,19 +214,18 @@ def verdict(what: str, ratio: float, bar: float, at_most: bool = False) -> None:
 BY_EMBREE = "rays, by Embree"  # as Mitsuba traces them, and as Gonio did before it met simple shapes in the kernel
 
 
-class _Stage(Transport):
+class _Stage(LightTransport):
     """directSampleLight cut short, to see where its time goes. The stages keep the rays and add work."""
 
     stage = "rays"
 
     def sample(self, pixel: Any, key: Any, index: Any) -> Any:
-        ray, _ = self.camera_ray(pixel, key, index)
-        hit = self.surfaces.nearest(ray, coherent=True)
+        ray, _, hit = self.first_hit(pixel, key, index)
         if self.stage == "camera rays":
             return [dr.select(hit.is_valid(), hit.t, 0), mi.Float(0), mi.Float(0)]
         u = mi.Point2f(*self.pair(key, index, 3))
         if self.stage == "rays":  # shadow rays to points uniform on the lamp's area, from the bare point of the ray
-            lamp = self.lights.rectangle
+            lamp = self.lights.lamps.rectangle
             point = lamp.corner + lamp.axis0 * (u.x * lamp.length0) + lamp.axis1 * (u.y * lamp.length1)
             origin = ray(hit.t * (1 - 1e-4))
             away = point - origin
@@ -247,9 +246,7 @@ def stages(bsdf: Any, rounds: int, clock: Callable[[], float]) -> None:
         def draw(seed: int) -> np.ndarray:
             render = Render(drawn, Settings("directSampleLight", seed=seed))
             stage = "rays" if name == BY_EMBREE else name
-            render._integrator = type("Cut", (_Stage,), {"stage": stage})(
-                mi, drawn, render.sensor, render.settings, False
-            )
+            render._integrator = type("Cut", (_Stage,), {"stage": stage})(render._integrator.data, render.settings)
             if name == BY_EMBREE:
                 render._integrator.surfaces.inline = None
             render.advance(SPP)

@@ -41,8 +41,8 @@ from scipy import stats
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
 from gonio.render.request import UNTIL_MOST  # noqa: E402
-from gonio.transport import until  # noqa: E402
-from gonio.transport.integrators import Render, Settings, caustics  # noqa: E402
+from gonio.transport import photon_maps, until  # noqa: E402
+from gonio.transport.integrators import Render, Settings  # noqa: E402
 
 from scenes import SCENES, Scene  # noqa: E402
 
@@ -145,8 +145,8 @@ def of_paths(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
 
 
 def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
-    before = caustics.FOOTPRINT
-    caustics.FOOTPRINT = 0.75 * before
+    before = photon_maps.FOOTPRINT
+    photon_maps.FOOTPRINT = 0.75 * before
     try:
         one = ours(scene, 8 * EACH, "caustics")()
         if (seen := reached(scene)).any() and (whole := blocks(seen[None, ..., None]) == 1)[0].any():
@@ -156,7 +156,7 @@ def of_caustics(scene: Scene, seconds: float) -> tuple[np.ndarray, float]:
             found, other = many_of([one, ours(scene, 8 * EACH)()], 3 * seconds)
             apart = sigmas(found.mean((1, 2, 3)), other.mean((1, 2, 3)))
     finally:
-        caustics.FOOTPRINT = before
+        photon_maps.FOOTPRINT = before
     return found.mean(0), float(np.max(apart))
 
 

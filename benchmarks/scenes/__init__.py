@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gonio.transport.surfaces import whole
+from gonio.bridge.faults.merged_mesh_bbox import with_valid_bbox
 
 Dict = dict[str, Any]
 
@@ -43,7 +43,7 @@ class Scene:
             "film": {**film, "pixel_format": "rgb", "component_format": "float32"},
             "sampler": {"type": sampler, "sample_count": spp or self.spp},
         }
-        return whole(mi, mi.load_dict({"type": "scene", "sensor": sensor, **self.make(mi)}))
+        return with_valid_bbox(mi, mi.load_dict({"type": "scene", "sensor": sensor, **self.make(mi)}))
 
 
 SCENES: dict[str, Scene] = {}

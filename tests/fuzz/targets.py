@@ -307,10 +307,11 @@ def _pictures(*kinds: str) -> tuple[bytes, ...]:
     import tempfile
 
     from gonio.bridge import engine
+    from gonio.bridge.faults.exr_threads import file_threads
     from gonio.pictures import images
 
     mi, rng, found = engine.load("cpu"), np.random.default_rng(3), []
-    with tempfile.TemporaryDirectory() as name, engine.file_threads():
+    with tempfile.TemporaryDirectory() as name, file_threads():
         path = Path(name)
         for kind in kinds:
             for channels, mode in ((3, "RGB"), (1, "Y"), (4, "RGBA")):

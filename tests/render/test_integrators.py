@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError
-from gonio.transport.integrators import Integrator, Render, Settings, progressive, transport
+from gonio.transport.integrators import Integrator, Render, Settings, path, progressive
 from gonio.transport.integrators.base import SAMPLERS
 from gonio.transport.lights import lights
 
@@ -347,7 +347,7 @@ def test_an_interrupt_while_a_loop_is_recorded_is_one(monkeypatch: pytest.Monkey
     scene = mi.load_dict(scene_dict())
     before = picture(scene, 2)
     with monkeypatch.context() as patch:
-        patch.setattr(transport.Transport, "extend", interrupted)
+        patch.setattr(path.Path, "vertex", interrupted)
         with pytest.raises(KeyboardInterrupt):
             picture(scene, 2)
     assert np.array_equal(picture(scene, 2), before)
@@ -378,11 +378,6 @@ def test_where_numpy_puts_an_array_recompiles_nothing(monkeypatch: pytest.Monkey
         found.append(kernels(lambda: images.append(picture(scene, 2))))
     assert found[2] == found[1]
     assert np.array_equal(images[2], images[1])
-
-
-def test_dr_jit_compiles_another_kernel_where_an_array_is_not_aligned() -> None:
-    aligned, odd = (kernels(lambda at=at: dr.eval(mi.UInt32(placed(at, 256)) * 7 + 3)) for at in (0, 4))
-    assert aligned != odd, "then `engine.own` is needed no more"
 
 
 def test_the_recompilation_test_would_see_a_new_kernel() -> None:

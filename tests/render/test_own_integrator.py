@@ -22,7 +22,7 @@ mi = engine.load()
 
 OCCLUSION = '''
 import drjit as dr
-from gonio.transport.integrators import Integrator, Transport
+from gonio.transport.integrators import Integrator, Path
 from gonio.transport.integrators.base import FIRST_FREE
 
 
@@ -37,7 +37,7 @@ class Occlusion(Integrator):
         return self.mi.Color3f(dr.select(hidden, 0.0, 1.0))
 
 
-class Shallow(Transport):
+class Shallow(Path):
     """Paths that end at a third surface, whatever they carry."""
 
     name = "shallow"
@@ -106,14 +106,20 @@ def test_an_integrator_that_is_not_there_is_one_clear_error(scene: Path) -> None
         _picture(scene, integrator="whited")
 
 
+def test_the_base_class_is_found_by_its_old_name() -> None:
+    with pytest.warns(DeprecationWarning, match="Transport is called Path now"):
+        old = integrators.Transport
+    assert issubclass(old, integrators.Path) and old.depth(integrators.Settings("path")) == 2
+
+
 def test_names_are_taken_once(registered: dict[str, type]) -> None:
-    class Path(integrators.Transport):
+    class Another(integrators.Path):
         """Another one."""
 
         name = "path"
 
     with pytest.raises(InputError, match="the integrator 'path' is there already"):
-        integrators.Integrator.family.add(Path)
+        integrators.Integrator.family.add(Another)
 
 
 def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_path: Path) -> None:

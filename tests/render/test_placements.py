@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gonio.bridge import engine
 from gonio.transport import surfaces
+from gonio.transport.fast import placements
 
 
 def _placed(mi, rng, *scale):
@@ -22,7 +23,7 @@ def met():
     """What 50,000 rays find in a heap of spheres, rectangles, a cube and a disk: by Mitsuba, and by Gonio."""
     mi, rng = engine.load(), np.random.default_rng(5)
     scene = {"type": "scene", "cube": {"type": "cube"}, "disk": {"type": "disk", "to_world": _placed(mi, rng, 2.0)}}
-    for index in range(surfaces.MANY):
+    for index in range(placements.MANY):
         flip = {"flip_normals": index % 3 == 0}
         size = rng.uniform(0.2, 0.8)
         scene[f"sphere{index}"] = {"type": "sphere", **flip, "to_world": _placed(mi, rng, size)}
@@ -33,7 +34,8 @@ def met():
     ray = mi.Ray3f(mi.Point3f(start), dr.normalize(mi.Vector3f(end - start)))
     hit = scene.ray_intersect_preliminary(ray)
     ours = surfaces.Surfaces(mi, scene)
-    assert ours.kinds == ["Sphere", "Rectangle"] and len(ours.others) == 2
+    table = ours.placements
+    assert table is not None and table.kinds == ["Sphere", "Rectangle"] and len(table.others) == 2
     found = hit.compute_surface_interaction(ray), ours.interaction(hit, ray)
     dr.eval(found)
     yield found

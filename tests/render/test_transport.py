@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from gonio.bridge import engine
 from gonio.errors import InputError
+from gonio.transport import delta_retrace
 from gonio.transport.integrators import Render, Settings
-from gonio.transport.integrators.caustics import Caustics
 from gonio.transport.lights import lights
 from gonio.transport.photons import Photon, PhotonMap
 
@@ -106,7 +106,7 @@ def test_particles_leave_a_sphere_that_is_turned_from_its_surface() -> None:
     drawn = scene({"lamp": {"type": "sphere", "to_world": turned, "emitter": AREA}}, GREY, size=8)
     render = Render(drawn, Settings("light"))
     particles = render._integrator.particles
-    left, _ = particles.leave(particles.key(mi.UInt32(0)), dr.arange(mi.UInt32, 1024), mi.Bool(True))
+    left, _ = particles.leave(particles.key(mi.UInt32(0)), dr.arange(mi.UInt32, 1024))
     outward = (np.array(left.origin).T - [1, 2, 1]) / 0.3
     assert np.sum(np.array(left.direction).T * outward, axis=1).min() > -1e-5
     # each carries the power pi L A that all have together
@@ -374,7 +374,7 @@ MATERIALS = {
 @pytest.mark.parametrize(
     "name", [n if k < 3 else pytest.param(n, marks=pytest.mark.slow) for k, n in enumerate(MATERIALS)]
 )
-def test_second_trips_take_nothing_and_add_nothing(name: str) -> None:
+def test_the_retrace_takes_nothing_and_adds_nothing(name: str) -> None:
     drawn = before_a_wall(MATERIALS[name], 0.5)
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
 
@@ -388,22 +388,22 @@ def test_light_from_a_mirror_is_seen_through_a_rough_surface(name: str) -> None:
     agree(pictures(drawn, "caustics", 64, 6, 8), pictures(drawn, "path", 512, 6, 8))
 
 
-def test_second_trips_find_what_first_ones_hardly_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_retrace_finds_light_that_first_traces_hardly_find(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = before_a_wall(GLASS, 0.3, wall=None)
     with_them = pictures(drawn, "caustics", 64, 12, 8)
-    monkeypatch.setattr(Caustics, "_both_ends", lambda self: False)
+    monkeypatch.setattr(delta_retrace, "is_possible", lambda *_: False)
     without = pictures(drawn, "caustics", 64, 12, 8)
     assert with_them.var(0, ddof=1).mean() < 0.5 * without.var(0, ddof=1).mean()
 
 
-def test_second_trips_end_where_light_is_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_retrace_ends_where_light_is_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = before_a_wall(GLASS, 0.5, wall=COATED)
     with_them = pictures(drawn, "caustics", 256, 6, 8)
-    monkeypatch.setattr(Caustics, "_both_ends", lambda self: False)
+    monkeypatch.setattr(delta_retrace, "is_possible", lambda *_: False)
     agree(with_them, pictures(drawn, "caustics", 256, 6, 8))
 
 
-def test_features_are_of_first_trips() -> None:
+def test_features_are_those_of_first_traces() -> None:
     drawn = before_a_wall(GLASS, 0.5)
     path, caustics = (Render(drawn, Settings(name, 8), aovs=True) for name in ("path", "caustics"))
     for render in (path, caustics):

@@ -178,7 +178,7 @@ def test_one_that_began_anew_goes_on_to_the_same_bits(tmp_path: Path) -> None:
 
 def test_differences_are_those_of_pictures_with_less_blur_by_maps_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Seen through a dark pane, whose second trips bring nothing; against half the radius, where that is less noisy."""
-    monkeypatch.setattr(caustics, "SHARPER", 0.5)
+    monkeypatch.setattr(caustics, "INNER", 0.5)
     t = engine.load().ScalarTransform4f
     dark = {"type": "thindielectric", "specular_transmittance": {"type": "rgb", "value": 0.3}}
     place = t().translate([0, 0.45, 0]).rotate([1, 0, 0], -90).scale(0.6)

@@ -15,14 +15,14 @@ import mitsuba as mi
 import numpy as np
 
 from .answers import Answer
-from .types import BSDFContext, BSDFSample, MitsubaBSDF, OfVariant, SurfaceInteraction
+from .types import BSDFContext, BSDFPlugin, BSDFSample, OfVariant, SurfaceInteraction
 
 COUNT = 4096
 SAME = 1e-4  # relative: float32, and kernels that are fused otherwise
 FEW = 0.002  # share of rows that rounding may carry over an edge
 
 
-def answers(bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
+def answers(bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> Iterator[Answer]:
     """Every way of asking, at the given surface interaction (COUNT wide), whose wi is replaced."""
     trial = _Trial(bsdf, si, seed)
     for what, asked in (
@@ -53,23 +53,23 @@ class _Difference(NamedTuple):
     name: str
     other: str
     got: np.ndarray
-    whole: np.ndarray
+    expected: np.ndarray
     wo: np.ndarray
     wi: np.ndarray
 
     def answer(self, what: str, wrong: str) -> Answer:
-        total = float(np.sum(np.abs(self.whole)))
-        off = np.nan_to_num(np.abs(self.got - self.whole), nan=0.0)
+        total = float(np.sum(np.abs(self.expected)))
+        off = np.nan_to_num(np.abs(self.got - self.expected), nan=0.0)
         share = float(np.sum(off)) / total if total > 0.0 else 1.0
-        worst = float(np.max(off / np.maximum(np.abs(self.whole), 1e-3 * np.abs(self.whole).max()), initial=0.0))
+        worst = float(np.max(off / np.maximum(np.abs(self.expected), 1e-3 * np.abs(self.expected).max()), initial=0.0))
         # Mitsuba's wi is where light goes to
-        return Answer(what, wrong, share, worst, (self.name, self.other, self.wi, self.wo, self.got, self.whole))
+        return Answer(what, wrong, share, worst, (self.name, self.other, self.wi, self.wo, self.got, self.expected))
 
 
 class _Trial:
     """A plugin, and what it answers at COUNT pairs of directions."""
 
-    def __init__(self, bsdf: MitsubaBSDF, si: SurfaceInteraction, seed: int) -> None:
+    def __init__(self, bsdf: BSDFPlugin, si: SurfaceInteraction, seed: int) -> None:
         self.bsdf, self.si, self.ctx = bsdf, si, mi.BSDFContext()
         self.difference: _Difference | None = None
         rng = np.random.default_rng([seed, 111])
@@ -128,11 +128,11 @@ class _Trial:
             "eval_pdf's pdf": (_rows(both[1]), self.pdf),
             "sample's weight": (self.color(weight), self.weight),
         }
-        for name, (got, whole) in asked.items():
+        for name, (got, expected) in asked.items():
             # many of Mitsuba's own leave pdf and weight as they are in lanes that are off: integrators drop them
             if name.startswith("eval") and "pdf's pdf" not in name and np.any(got[~live] != 0.0):
                 return f"{name} of lanes that are switched off is {np.abs(got[~live]).max():.4g}, 0 expected"
-            wrong = self.unlike(f"{name} of the other lanes", "what it is with all lanes on", got[live], whole[live])
+            wrong = self.unlike(f"{name} of the other lanes", "what it is with all lanes on", got[live], expected[live])
             if wrong:
                 return wrong
         return ""
@@ -174,8 +174,8 @@ class _Trial:
             where = "goes through" if beyond[row] else "stays on its side"
             return f"a sample of type {_names(int(sampled[row]))} {where}"
         smooth = self.lit & ~self.delta
-        found = self.bsdf.pdf(self.ctx, self.si, self.drawn.wo)
-        if smooth.sum() > 20 and np.mean(_rows(found)[smooth] > 0.0) < 0.5:
+        result = self.bsdf.pdf(self.ctx, self.si, self.drawn.wo)
+        if smooth.sum() > 20 and np.mean(_rows(result)[smooth] > 0.0) < 0.5:
             return "samples whose type is no delta, where pdf is 0"
         if self.delta.any() and (self.delta & self.lit).sum() > 20 and not all_ & (int(flags.Delta) | int(flags.Null)):
             return "delta samples, and no flag says so"
@@ -268,22 +268,22 @@ class _Trial:
                 return self.unlike("it", "pi times the diffuse lobe", value[front], f)
         return ""
 
-    def unlike(self, name: str, other: str, got: np.ndarray, whole: np.ndarray) -> str:
+    def unlike(self, name: str, other: str, got: np.ndarray, expected: np.ndarray) -> str:
         """The worst difference in words, "" where there is none."""
         if self.noisy:
             return ""
-        got, whole = np.broadcast_arrays(got, whole)
-        fine = np.isfinite(whole).all(-1)
-        least = 1e-6 * float(np.max(np.abs(whole[fine]), initial=0.0))
-        size = np.maximum(np.maximum(np.abs(got), np.abs(whole)), max(least, 1e-12))
-        off = np.where(fine[:, None], np.abs(got - whole) / size, 0.0)
+        got, expected = np.broadcast_arrays(got, expected)
+        fine = np.isfinite(expected).all(-1)
+        least = 1e-6 * float(np.max(np.abs(expected[fine]), initial=0.0))
+        size = np.maximum(np.maximum(np.abs(got), np.abs(expected)), max(least, 1e-12))
+        off = np.where(fine[:, None], np.abs(got - expected) / size, 0.0)
         off = np.where(np.isnan(off), np.inf, off).max(-1)
         wrong = off > SAME
         if wrong.mean() <= FEW if len(wrong) else True:
             return ""
         if len(got) == COUNT:
-            self.difference = _Difference(name, other, got, whole, _rows(self.wo), _rows(self.si.wi))
-        ratio = got[wrong].sum() / max(whole[wrong].sum(), 1e-30)
+            self.difference = _Difference(name, other, got, expected, _rows(self.wo), _rows(self.si.wi))
+        ratio = got[wrong].sum() / max(expected[wrong].sum(), 1e-30)
         return f"{name} is not {other}: {ratio:.4g} times as much where they differ, in {wrong.mean():.1%} of the pairs"
 
 

@@ -8,17 +8,11 @@ import functools
 import sys
 from collections.abc import Iterator
 from types import ModuleType
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from .. import llvm
 from ..errors import InputError, MachineError
-from ..ops import backend
 from ..owner import COMPUTING, alone
 from . import plugin_search
-from .types import OfVariant
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -57,7 +51,7 @@ def variant_for(device: str = "cpu", spectral: bool = False) -> str:
 
 
 def polarized(variant: str) -> str:
-    """The variant that knows polarization, and colours, on the device of another."""
+    """The variant that knows polarization, and color, on the device of another."""
     return "_".join([*variant.split("_")[:2], "spectral_polarized"])
 
 
@@ -132,62 +126,3 @@ def put_back() -> Iterator[None]:
         now = mi and mi.variant()
         if mi and now and now != before and "spectral" in now:
             mi.set_variant(before or "_".join([*now.split("_")[:2], "rgb"]))
-
-
-@contextlib.contextmanager
-def file_threads() -> Iterator[None]:
-    """Whatever Mitsuba reads or writes is read or written in here.
-
-    Its OpenEXR hands blocks to Dr.Jit's threads and waits for them, for ever where there is none beside the one that
-    waits: with one CPU, or `threads=1`, there is a second one meanwhile.
-    """
-    import drjit as dr
-
-    count = dr.thread_count()
-    if count >= 2:
-        yield
-        return
-    dr.set_thread_count(2)
-    try:
-        yield
-    finally:
-        dr.set_thread_count(count)
-
-
-@contextlib.contextmanager
-def interruptible() -> Iterator[None]:
-    """Inside, Ctrl-C stays a KeyboardInterrupt: Dr.Jit makes a RuntimeError of it where it is recording a loop."""
-    try:
-        yield
-    except RuntimeError as error:
-        cause: BaseException | None = error
-        while cause is not None and not isinstance(cause, KeyboardInterrupt):
-            cause = cause.__cause__ or cause.__context__
-        if cause is None:
-            raise
-        raise KeyboardInterrupt from error
-
-
-def own(kind: OfVariant, values: NDArray[Any]) -> OfVariant:
-    """An array of Dr.Jit's with these values, in memory of its own.
-
-    It would take NumPy's as it is, and compile another kernel where that is not aligned (which chance decides). Times
-    one, which keeps every bit, also the sign of a zero.
-    """
-    import drjit as dr
-
-    if isinstance(values, np.ndarray):
-        values = backend.aligned(values, values.dtype.type)
-    copied = kind(values) * dr.opaque(kind, 1)
-    dr.eval(copied)
-    dr.sync_thread()  # while NumPy's memory is there
-    return copied
-
-
-def renew(thing: object) -> None:
-    """Copy every array that an object has: kernels are told apart by the order too in which what they read was made."""
-    import drjit as dr
-
-    for name, value in vars(thing).items():
-        if dr.is_array_v(value):
-            setattr(thing, name, own(type(value), value))

@@ -20,8 +20,9 @@ from ..catalog import outside
 from ..errors import InputError, did_you_mean
 from ..material import number, spectrum
 from . import adapter, engine, plugin_search
-from .native import Native
-from .types import MitsubaBSDF, OfVariant, PluginDict
+from .faults.exr_threads import file_threads
+from .native import MitsubaBSDF
+from .types import BSDFPlugin, OfVariant, PluginDict
 
 # Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are read from the plugin as they are
 SMALLEST_ALPHA = 1e-3  # Mitsuba's pages: "smooth" below, and another plugin; its float32 code ends near here
@@ -46,7 +47,7 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
 }
 
 
-class _Described(Native):
+class _Described(MitsubaBSDF):
     """A BSDF that is built from a dictionary, and built anew where a parameter changes."""
 
     description: ClassVar[PluginDict] = {}
@@ -58,15 +59,15 @@ class _Described(Native):
         return _BY_NATURE.get(str(self.description.get("type", "")), {})
 
     @property
-    def held(self) -> dict[str, Native]:
+    def held(self) -> dict[str, MitsubaBSDF]:
         """The BSDFs inside, as materials of their own."""
         return {name: load(inner) for name, inner in self.description.items() if _is_bsdf(inner)}
 
-    def anew(self) -> Native:
+    def anew(self) -> MitsubaBSDF:
         """The plugin built once more."""
         return load(self.plugin)
 
-    def around_diffuse(self) -> Native:
+    def around_diffuse(self) -> MitsubaBSDF:
         """The same around plain diffuse ones."""
         return load({**self.description, **dict.fromkeys(self.held, _DIFFUSE)})
 
@@ -84,7 +85,7 @@ class _Described(Native):
         object.__setattr__(self, "bsdf", _built(self.plugin))
 
 
-def load(description: PluginDict) -> Native:
+def load(description: PluginDict) -> MitsubaBSDF:
     """The BSDF of a dictionary as `mi.load_dict` takes it; InputError where Mitsuba refuses it."""
     kind = str(description.get("type", ""))
     fields: dict[str, OfVariant] = {}
@@ -105,13 +106,13 @@ def load(description: PluginDict) -> Native:
     return type(f"Mitsuba{kind.title()}", (_Described,), space)()
 
 
-def _built(description: PluginDict) -> MitsubaBSDF:
+def _built(description: PluginDict) -> BSDFPlugin:
     """The plugin itself."""
     mi = mitsuba()
     kind = str(description.get("type", ""))
     _check_plugins(description, f"mitsuba:{kind}")
     try:
-        with engine.file_threads():
+        with file_threads():
             bsdf = mi.load_dict(description, parallel=False)
     except Exception as error:
         raise refused(error, kind) from None
@@ -132,17 +133,17 @@ def _check_plugins(description: Mapping[str, object], location: str) -> None:
             _check_plugins(value, location)
 
 
-def _colours(bsdf: MitsubaBSDF) -> dict[str, float | tuple[float, ...]]:
+def _colours(bsdf: BSDFPlugin) -> dict[str, float | tuple[float, ...]]:
     """The albedos that a plugin holds as one number or colour each."""
     import mitsuba as mi
 
     held = mi.traverse(bsdf)
-    found = {}
+    result = {}
     for name in ALBEDOS:
         if f"{name}.value" in held:
             values = np.asarray(held[f"{name}.value"], float).ravel()
-            found[name] = float(values[0]) if values.size == 1 else tuple(map(float, values))
-    return found
+            result[name] = float(values[0]) if values.size == 1 else tuple(map(float, values))
+    return result
 
 
 def _is_bsdf(value: object) -> bool:
@@ -206,7 +207,7 @@ _BY_NATURE: dict[str, dict[str, str]] = {
 }
 
 
-def plugin(name: str, properties: Mapping[str, object]) -> Native:
+def plugin(name: str, properties: Mapping[str, object]) -> MitsubaBSDF:
     """A plugin by name with the properties given; BSDFs of BSDFs get plain ones inside."""
     more: PluginDict = {}
     if name == "bumpmap" and "texture" not in properties:
@@ -219,7 +220,7 @@ def plugin(name: str, properties: Mapping[str, object]) -> Native:
 _registered: dict[Path, dict[str, object]] = {}  # what the files registered that were run, by path
 
 
-def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
+def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | None:
     """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
     the file registers none of that name."""
     path = Path(target.rpartition(":")[0]).expanduser().resolve()
@@ -227,10 +228,10 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
     if not path.is_file() or b"register_bsdf" not in path.read_bytes():
         return None
     mi = mitsuba()
-    register, seen = mi.register_bsdf, _registered.setdefault(path, {})
+    register, registered = mi.register_bsdf, _registered.setdefault(path, {})
 
     def noted(kind: str, make: object, *more: object) -> None:
-        seen[kind] = make
+        registered[kind] = make
         register(kind, make, *more)
 
     vars(mi)["register_bsdf"] = noted
@@ -238,7 +239,11 @@ def plugin_in(target: str, properties: Mapping[str, object]) -> Native | None:
         module = outside.module_of(path, "TARGET")
     finally:
         vars(mi)["register_bsdf"] = register
-    kind = name if name in seen else next((k for k, make in seen.items() if make is vars(module).get(name)), None)
+    kind = (
+        name
+        if name in registered
+        else next((k for k, make in registered.items() if make is vars(module).get(name)), None)
+    )
     return None if kind is None else load({"type": kind, **properties})
 
 

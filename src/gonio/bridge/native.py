@@ -20,22 +20,22 @@ from ..material.bsdf import Delta
 from ..ops import Direction, Mode, Scalar, Spectrum, backend
 from . import calls
 from .answers import Answer
-from .types import BSDFContext, Mask, MitsubaBSDF, SurfaceInteraction
+from .types import BSDFContext, BSDFPlugin, Mask, SurfaceInteraction
 
 
-class Native(BSDF):
+class MitsubaBSDF(BSDF):
     """A BSDF of Mitsuba's."""
 
     precisions: ClassVar[tuple[str, ...]] = ("float32",)
     black_fails: ClassVar[bool] = True
-    bsdf: ClassVar[MitsubaBSDF]  # of an instance, but no parameter
+    bsdf: ClassVar[BSDFPlugin]  # of an instance, but no parameter
     _si: ClassVar[SurfaceInteraction | None] = None  # where it is asked, on a copy that `at` bound
     _active: ClassVar[Mask] = True
 
-    def __init__(self, bsdf: MitsubaBSDF) -> None:
+    def __init__(self, bsdf: BSDFPlugin) -> None:
         object.__setattr__(self, "bsdf", bsdf)
 
-    def at(self, si: SurfaceInteraction, active: Mask) -> Native:
+    def at(self, si: SurfaceInteraction, active: Mask) -> MitsubaBSDF:
         """The copy that answers at a surface interaction."""
         return binding.bound_copy(self, {"_si": si, "_active": active})
 

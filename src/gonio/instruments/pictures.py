@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .. import files, scene
 from ..bridge import engine
-from ..bridge.types import MitsubaBSDF
+from ..bridge.types import BSDFPlugin
 from ..catalog import notation
 from ..errors import InputError, did_you_mean
 from ..fitting.fit import NORMAL_95, moving_of, notes_on
@@ -177,7 +177,7 @@ class Target:
     """A material of the scene whose numbers move."""
 
     path: str
-    plugin: MitsubaBSDF
+    plugin: BSDFPlugin
     material: BSDF
     moving: list[Free]
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge import engine
+from ..bridge.faults.exr_threads import file_threads
 
 # DEFLATE, the densest coding here, makes at most 1032 bytes of one. A file that claims more is not allocated.
 DENSEST = 1032
@@ -87,7 +88,7 @@ def decode(path: Path, content: bytes, kind: str) -> Decoded:
     mi = engine.load()
     try:
         # The file again, not its content as a stream: Mitsuba's streams in memory read on behind their end.
-        with engine.file_threads():
+        with file_threads():
             values = np.array(mi.Bitmap(mitsuba_path(path), getattr(mi.Bitmap.FileFormat, kind)))
     except (RuntimeError, ValueError) as error:  # UnicodeDecodeError among them
         raise Unreadable(_reason(error)) from None

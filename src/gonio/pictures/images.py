@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from .. import archives, files
 from ..bridge import engine
+from ..bridge.faults.exr_threads import file_threads
 from ..catalog.operands import PICTURE_SUFFIXES
 from ..errors import InputError, did_you_mean
 from ..owner import alone
@@ -159,7 +160,7 @@ def _bitmap_bytes(picture: RGB, metadata: Metadata, file_format: str) -> bytes:
     for key, value in metadata.items():
         bitmap.metadata()[_PREFIX + key] = value
     stream = mi.MemoryStream()
-    with engine.file_threads():
+    with file_threads():
         bitmap.write(stream, getattr(mi.Bitmap.FileFormat, file_format))
     return stream.raw_buffer()
 

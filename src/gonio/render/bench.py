@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from types import ModuleType
 
 from ..bridge import engine
-from ..bridge.types import MitsubaBSDF, PluginDict, Scene
+from ..bridge.types import BSDFPlugin, PluginDict, Scene
 
 LANES = {"llvm": 1 << 20, "cuda": 1 << 25}  # a GPU is done with a million before Python has launched the next
 SIZE, SPP = {"llvm": 256, "cuda": 1024}, 16
@@ -63,10 +63,10 @@ def measure(device: str = "cpu") -> tuple[str, list[Row]]:
     both = [scene.shapes()[0].bsdf() for scene in (ours, theirs)]
     context = mi.BSDFContext()
 
-    def evaluated(bsdf: MitsubaBSDF) -> Callable[[], None]:
+    def evaluated(bsdf: BSDFPlugin) -> Callable[[], None]:
         return lambda: dr.eval(bsdf.eval(context, si, wo))
 
-    def sampled(bsdf: MitsubaBSDF) -> Callable[[], None]:
+    def sampled(bsdf: BSDFPlugin) -> Callable[[], None]:
         return lambda: dr.eval(bsdf.sample(context, si, u, mi.Point2f(u, v))[1])
 
     rows.append(Row("eval", *_best(dr, lanes, *map(evaluated, both))))

@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..bridge.types import MitsubaBSDF, Plugin, PluginDict, Scene
+from ..bridge.faults.merged_mesh_bbox import compute_boxes
+from ..bridge.faults.shape_order import shape_key
+from ..bridge.types import BSDFPlugin, Plugin, PluginDict, Scene
 from ..catalog import documents
 from ..errors import GonioWarning, InputError
 from ..material import Parameter
 from ..materials.combined.normal_map import slopes
 from ..pictures.images import RGB
+from ..transport import fast
 from . import meshes, schema, spectra, textures
 from .materials import BY_TYPE, MaterialPart, Value, numbers_in
 from .text import pointer
 from .values import BumpMap, ImageTexture, NormalMap
 
 if TYPE_CHECKING:
-    from .by_shape import Group
+    from ..transport.fast.by_shape import Group
 
 MANY = 64  # from so many materials of one structure on one stands for them
 
@@ -45,7 +48,7 @@ class Built:
     """A scene, and the BSDF that each material of its description has become."""
 
     scene: Scene
-    bsdfs: Mapping[MaterialPart, MitsubaBSDF]
+    bsdfs: Mapping[MaterialPart, BSDFPlugin]
 
 
 def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = False) -> Built:
@@ -57,16 +60,6 @@ def built(description: schema.SceneDescription, mi: ModuleType, gathers: bool = 
     return Built(builder.scene(), builder.bsdfs)
 
 
-def _order(shape: Plugin) -> tuple[str, list[float], int, bytes]:
-    """What shapes are sorted by: nothing that changes between two runs."""
-    if shape.id():  # a shape of the scene; those that were merged have lost their names
-        return shape.id(), [], 0, b""
-    box = shape.bbox()
-    corners = [float(x) for corner in (box.min, box.max) for x in np.ravel(corner)]
-    vertices = np.asarray(shape.vertex_positions_buffer()) if shape.is_mesh() else np.zeros(0)
-    return "", corners, shape.primitive_count(), vertices.tobytes()
-
-
 class _Builder:
     def __init__(self, description: schema.SceneDescription, mi: ModuleType, gathers: bool) -> None:
         from ..bridge import adapter
@@ -76,10 +69,10 @@ class _Builder:
         self.adapter = adapter
         lights.register(mi)
         self.description, self.mi = description, mi
-        self.bsdfs: dict[MaterialPart, MitsubaBSDF] = {}
+        self.bsdfs: dict[MaterialPart, BSDFPlugin] = {}
         self.images: dict[tuple[Path, str, str | None, bool], RGB] = {}
-        self.gathers = gathers and mi.variant().endswith("rgb")  # spectra are upsampled one by one
-        self.gathered: dict[MaterialPart, tuple[MitsubaBSDF, Group, int]] = {}
+        self.gathers = gathers and fast.enabled() and mi.variant().endswith("rgb")  # spectra are upsampled one by one
+        self.gathered: dict[MaterialPart, tuple[BSDFPlugin, Group, int]] = {}
 
     def scene(self) -> Scene:
         scene: PluginDict = {"type": "scene", "sensor": self.sensor()}
@@ -97,14 +90,12 @@ class _Builder:
         # order of the lights, and every picture. So they are merged here, and sorted.
         merged = self.load(shapes, "/scene") if len(shapes) > 1 else []
         merged = merged if isinstance(merged, list) else [merged]
-        for one in merged:
-            if one.is_mesh():
-                one.recompute_bbox()  # which Mitsuba 3.9 forgets, and then so does the scene
-        for index, one in enumerate(sorted(merged, key=_order)):
+        compute_boxes(merged)
+        for index, one in enumerate(sorted(merged, key=shape_key)):
             scene[one.id() or f"merged{index}"] = one
         found = self.load(scene, "/scene", optimize=False)
         if self.gathered:
-            from . import by_shape
+            from ..transport.fast import by_shape
 
             by_shape.bind(self.mi, found, {id(group): group for _, group, _ in self.gathered.values()}.values())
         return found
@@ -228,7 +219,7 @@ class _Builder:
 
     # ------------------------------------------------------------------ materials
 
-    def bsdf(self, material: MaterialPart, where: str) -> MitsubaBSDF:
+    def bsdf(self, material: MaterialPart, where: str) -> BSDFPlugin:
         if material not in self.bsdfs:
             self.bsdfs[material] = self.load(self.plugin(material, where), where)
         return self.bsdfs[material]
@@ -244,7 +235,7 @@ class _Builder:
                 places.setdefault(shape.material, pointer("scene", "shapes", index, "material"))
         if len(places) < MANY:
             return
-        from . import by_shape
+        from ..transport.fast import by_shape
 
         groups: dict[Hashable, tuple[Group, list[MaterialPart]]] = {}
         for material, where in places.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..bridge.types import MitsubaBSDF
+from ..bridge.types import BSDFPlugin
 from ..errors import InputError, did_you_mean
 from ..material import BSDF, tree
 from ..transport.gradients import Along
@@ -20,7 +20,7 @@ def place_of(path: str, where: str) -> tuple[str, str]:
     return ".".join(steps[:3]), ".".join(steps[3:])
 
 
-def material_at(description: SceneDescription, built: Built, place: str, where: str) -> MitsubaBSDF:
+def material_at(description: SceneDescription, built: Built, place: str, where: str) -> BSDFPlugin:
     """The plugin that a material of the scene has become. Raises InputError where it is none of Gonio's."""
     index = int(place.split(".")[1])
     if index >= len(description.shapes):

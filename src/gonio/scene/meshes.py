@@ -18,7 +18,7 @@ from typing import NoReturn, Protocol, TypeAlias
 
 import numpy as np
 
-from ..bridge.types import Emitter, MitsubaBSDF, Shape
+from ..bridge.types import BSDFPlugin, Emitter, Shape
 from ..errors import InputError
 
 PlyProperties: TypeAlias = list[tuple[str, ...]]  # (type, name), or ("list", type of the count, type, name)
@@ -50,7 +50,7 @@ class Triangles:
             normals=normals,
         )
 
-    def to_mitsuba(self, mi: ModuleType, name: str, bsdf: MitsubaBSDF, emitter: Emitter | None = None) -> Shape:
+    def to_mitsuba(self, mi: ModuleType, name: str, bsdf: BSDFPlugin, emitter: Emitter | None = None) -> Shape:
         """A `mi.Mesh` with that BSDF and, where given, that emitter."""
         properties = mi.Properties()
         properties["bsdf"] = bsdf

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 
-from ..bridge import engine, foreign, plugin_search
-from ..bridge.native import Native
+from ..bridge import foreign, plugin_search
+from ..bridge.faults.exr_threads import file_threads
+from ..bridge.native import MitsubaBSDF
 from ..bridge.types import Plugin, PluginDict, Scene
 from ..errors import InputError
 from . import mitsuba_xml
@@ -62,7 +63,7 @@ def load(
     return scene
 
 
-def load_bsdf(path: Path) -> Native:
+def load_bsdf(path: Path) -> MitsubaBSDF:
     """The BSDF of a Mitsuba XML file: its root, or the first in a scene. It may read what lies in the file's folder.
 
     Raises InputError where there is none.
@@ -75,11 +76,11 @@ def load_bsdf(path: Path) -> Native:
     except Exception as error:
         raise foreign.refused(error, path.name) from None
     if isinstance(loaded, mi.BSDF):
-        return Native(loaded)
+        return MitsubaBSDF(loaded)
     if isinstance(loaded, mi.Scene):
         for shape in loaded.shapes():
             if shape.bsdf() is not None:
-                return Native(shape.bsdf())
+                return MitsubaBSDF(shape.bsdf())
     raise InputError("no BSDF in this file", str(path), "give a file whose root is <bsdf>, or a scene with one")
 
 
@@ -114,7 +115,7 @@ def instantiated(text: SceneText, folder: Path, mi: ModuleType) -> Plugin:
     allowed = [folder.resolve()] if text.runs_code else []
     # one after the other, and none merged: else the order of shapes, and with it the last bit, is left to chance;
     # and in parallel a file that cannot be read ends the process: the error has a thread of its own
-    with engine.file_threads(), plugin_search.searching(mi, *allowed):
+    with file_threads(), plugin_search.searching(mi, *allowed):
         return mi.load_string(text.text, parallel=False, optimize=False)
 
 

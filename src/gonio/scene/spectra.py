@@ -66,7 +66,7 @@ def _relative(light: LightSpectrum) -> Floats:
 
 def _observer() -> Floats:
     """The CIE 1931 curves as Mitsuba has them, (3, N), such that the flat radiance of Mitsuba's white has Y = 1."""
-    from ..transport.integrators.base import CIE_Y_INTEGRAL
+    from ..transport.scene_data import CIE_Y_INTEGRAL
 
     mi = engine.load()
     found = mi.cie1931_xyz(mi.Float(GRID.astype(np.float32)))

@@ -11,20 +11,19 @@ physically what would be seen if every surface stood alone and were convex.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
-from types import ModuleType
-from typing import ClassVar
+from functools import cached_property, partial
+from typing import Any
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge.types import Float, Mask, Point, Radiance, Ray, Scene, Sensor, SurfaceInteraction, UInt
+from ..bridge.types import Float, Hit, Mask, Point, Radiance, Ray, Scene, Sensor, SurfaceInteraction
 from ..errors import InputError
-from .integrators import Integrator, Render, Settings, Transport
-from .integrators.transport import PathState
+from .integrators import Integrator, LightTransport, Render, Settings
 from .lights.lights import Lights
+from .scene_data import SceneData
 
 
 class Foreground(Render):
@@ -38,44 +37,44 @@ class Foreground(Render):
 
     def __init__(self, scene: Scene, settings: Settings, sensor: Sensor | None = None, lights: Scene | None = None):
         program = settings.program
-        if not issubclass(program, Transport):
+        if not issubclass(program, LightTransport):
             raise InputError(f"'{settings.integrator}' shows no light", "integrator", "give one that does")
         if lights is not None and program.depth(settings) > 2:
             raise InputError("paths meet other surfaces", "integrator", "give direct, or put the lights in the scene")
-        self._surfaces = type("Surfaces", (_Surfaces, program), {"apart": lights})
+        self._lights = lights
         super().__init__(scene, settings, sensor)
 
-    def _program(self) -> Integrator:
-        return self._surfaces(self.mi, self.scene, self.sensor, self.settings, aovs=False)
+    def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
+        return super()._integrator_of(_SurfacesOnly if self._lights is None else partial(_LightsApart, self._lights))
 
     def image(self) -> NDArray[np.float32]:
         """(height, width, 4) float32: linear RGB, averaged over the whole pixel, and coverage; row 0 on top."""
         return self._mean([*self._sums.radiance, *self._sums.features])
 
 
-class _Surfaces(Transport):
-    """What `Foreground` changes in an integrator; `apart` is the scene of the lights, where they have their own."""
+class _SurfacesOnly(SceneData):
+    """A scene of which paths begin at surfaces only; the feature is 1 where there is one."""
 
-    apart: ClassVar[Scene | None] = None
+    def begins_path(self, hit: Hit) -> Mask:
+        return hit.is_valid()
 
-    def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
-        super().__init__(mi, scene, sensor, settings, aovs)
-        if self.apart is not None:
-            self.lights = _Transparent(mi, self.apart)
+    def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:
+        return [dr.select(alive, self.mi.Float(1), 0)]
 
-    def first(self, pixel: UInt, key: UInt, index: UInt, begins: Mask = True) -> PathState:
-        """As the base's, for lanes that meet a surface."""
-        path = super().first(pixel, key, index, begins)
-        return dataclasses.replace(path, active=path.hit.is_valid())
 
-    def extend(self, path: PathState, key: UInt, first: bool = False) -> tuple[PathState, list[Float]]:
-        """As the base's; the feature is 1 where there is a surface."""
-        following, _ = super().extend(path, key, first)
-        return following, [dr.select(path.active, self.mi.Float(1), 0)]
+class _LightsApart(_SurfacesOnly):
+    """The same under the lights of another scene, `apart`, with nothing in between."""
 
-    def unoccluded(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
-        """All lights are in sight where they stand apart."""
-        return active if self.apart is not None else super().unoccluded(si, point, active)
+    def __init__(self, apart: Scene, *parts: Any, **options: Any) -> None:
+        super().__init__(*parts, **options)
+        self.apart = apart
+
+    @cached_property
+    def lights(self) -> Lights:
+        return _Transparent(self.mi, self.apart)
+
+    def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
+        return active
 
 
 class _Transparent(Lights):
@@ -84,33 +83,25 @@ class _Transparent(Lights):
     Light sampling traces no shadow ray here, so what a sampled direction finds must not be hidden either.
     """
 
-    def last_hit(
-        self, ray: Ray, solid_angle: Float, active: Mask, weigh: Callable[[Radiance, Float], Radiance]
-    ) -> Radiance:
-        """The sum over all lights on the ray, each weighed with its own density."""
-        if self.rectangle is not None or self.count == 0:
-            return super().last_hit(ray, solid_angle, active, weigh)
+    def along(self, ray: Ray, solid_angle: Float, active: Mask) -> list[tuple[Radiance, Float]]:
+        """All lights on the ray, each with its own density."""
+        if self.shortens_last_ray or self.count == 0:
+            return super().along(ray, solid_angle, active)
         mi, origin = self.mi, ray.o
-        found, still = mi.Spectrum(0), active
+        result, still = [], active
         for _ in self.scene.shapes():
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, False, still)
             still = still & si.is_valid()
-            found += self._arriving(origin, si, solid_angle, still, weigh)
+            result.append(self._arriving(origin, si, solid_angle, still))
             ray = si.spawn_ray(ray.d)
         if self.has_environment:
             beyond = dr.zeros(mi.SurfaceInteraction3f)
             beyond.t, beyond.wi, beyond.wavelengths = dr.inf, -ray.d, ray.wavelengths
-            found += self._arriving(origin, beyond, solid_angle, active, weigh)
-        return found
+            result.append(self._arriving(origin, beyond, solid_angle, active))
+        return result
 
     def _arriving(
-        self,
-        origin: Point,
-        si: SurfaceInteraction,
-        solid_angle: Float,
-        active: Mask,
-        weigh: Callable[[Radiance, Float], Radiance],
-    ) -> Radiance:
+        self, origin: Point, si: SurfaceInteraction, solid_angle: Float, active: Mask
+    ) -> tuple[Radiance, Float]:
         radiance = dr.select(active, self.emitted(si, active), 0)
-        pdf = self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))
-        return dr.select(active, weigh(radiance, pdf), 0)
+        return radiance, self.pdf(origin, solid_angle, si, active & dr.any(radiance != 0))

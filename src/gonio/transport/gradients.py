@@ -2,7 +2,7 @@
 
     render = Gradients(scene, settings, [Along(plugin, "alpha")])
     render.advance(64)
-    render.image(), render.slopes()         # (H, W, 3), and one of these for each
+    render.image(), render.slopes()         # (H, W, 3), and one of these for each value
 
 The samples are those of the integrator itself: where a path goes, and with which density, stays as it is while a value
 moves (detached sampling), and what its materials send along it is differentiated (attached evaluation). That is without
@@ -12,10 +12,12 @@ path with its throughput, so that one walk gives the picture and all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from types import ModuleType
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -23,23 +25,26 @@ from numpy.typing import NDArray
 
 from ..bridge.adapter.material import PlacedMaterial
 from ..bridge.adapter.slots import Slot
+from ..bridge.faults.lost_derivatives import own_variable
 from ..bridge.types import (
+    BSDFPlugin,
     BSDFSample,
     Float,
     Mask,
-    MitsubaBSDF,
+    Point,
     Radiance,
     Scene,
     Sensor,
-    SurfaceInteraction,
     UInt,
     Vector,
 )
 from ..errors import InputError
 from ..material.parameters import IndexParameter
-from .integrators import Integrator, Render, Settings, Transport
-from .integrators.sums import Sums
-from .integrators.transport import PathState
+from .integrators import Integrator, LightTransport, Path, Render, Settings
+from .integrators.light_transport import PathState
+from .media import Media
+from .scattering import Scattering, Vertex
+from .scene_data import SceneData
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class Along:
     channel  0 to 2; None: all channels together, and both widths of a pair
     """
 
-    plugin: MitsubaBSDF
+    plugin: BSDFPlugin
     path: str
     channel: int | None = None
 
@@ -75,24 +80,25 @@ class Gradients(Render):
     def __init__(self, scene: Scene, settings: Settings, along: Sequence[Along], sensor: Sensor | None = None):
         program = settings.program
         where = "gradient"
-        if not issubclass(program, Transport) or program.splats or program.merges:
+        if not issubclass(program, LightTransport) or program.splats or program.blurs:
             raise InputError(f"{settings.integrator} has no derivatives", where, "use path or direct")
         self.along = list(along)
         self.features = 3 * len(self.along)
-        self._carrying = type("Carrying", (_Carrying, program), {"along": self.along})
         super().__init__(scene, settings, sensor)
         if not self.mi.is_rgb:
             raise InputError(f"variant {self.mi.variant()}, and derivatives are of RGB", where, "leave out spectral")
         index = any(isinstance(one.slot.parameter, IndexParameter) for one in self.along)
-        assert isinstance(self._integrator, Transport)
-        if index and self._integrator.media.known:
+        assert isinstance(self._integrator, _ForwardDerivatives)
+        if index and self._integrator.walked.media.known:
             what = "an index in a scene of nested or absorbing media, whose neighbours depend on it"
             raise InputError(what, where, "leave priority and absorption out, or name another value")
-        if self._integrator.ambient is not None:
+        if self._integrator.walked.ambient is not None:
             raise InputError("ambient light has no derivative", where, "leave ambient out")
 
-    def _program(self) -> Integrator:
-        return self._carrying(self.mi, self.scene, self.sensor, self.settings, aovs=False)
+    def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
+        walked = super()._integrator_of(partial(_AttachedData, self.along))
+        assert isinstance(walked, LightTransport)
+        return _ForwardDerivatives(walked, self.along)
 
     def slopes(self) -> list[NDArray[np.float32]]:
         """The picture's derivative along each, (height, width, 3)."""
@@ -100,96 +106,131 @@ class Gradients(Render):
 
 
 @dataclass
-class _Carried:
-    """A path, and along each value the derivatives of its throughput and of what it has found."""
+class _Derivatives:
+    """A path, and along each value the derivatives of its throughput and of its radiance."""
 
     path: PathState
     throughput: list[Radiance]
     radiance: list[Radiance]
 
 
-class _Carrying(Transport):
-    """What `Gradients` changes in an integrator."""
+class _ForwardDerivatives(Integrator):
+    """The paths of another integrator, vertex by vertex, with derivatives along each value.
 
-    along: Sequence[Along] = ()
+    walked  the integrator whose paths they are
+    """
 
-    def __init__(self, mi: ModuleType, scene: Scene, sensor: Sensor, settings: Settings, aovs: bool):
-        super().__init__(mi, scene, sensor, settings, aovs)
-        self.plugins: list[MitsubaBSDF] = []
-        for one in self.along:
-            if not any(one.plugin is other for other in self.plugins):
-                self.plugins.append(one.plugin)
-        self.slots = list({id(one.slot): one.slot for one in self.along}.values())
-        self._values: dict[Slot, dict[str, Float]] = {}
+    def __init__(self, walked: LightTransport, along: Sequence[Along]):
+        super().__init__(walked.data, walked.settings)
+        self.walked, self.along = walked, along
+        scattering = walked.scattering
+        assert isinstance(scattering, _AttachedScattering)
+        self.attached = scattering
 
     def sample(self, pixel: UInt, key: UInt, index: UInt) -> list[Float]:
+        """[r, g, b] of a sample, and of its derivative along each value."""
         mi = self.mi
-        none = [mi.Spectrum(0) for _ in self.along]
-        state = _Carried(self.first(pixel, key, index), none, list(none))
-        state = self.step(state, key, first=True)
-        if self.goes_on:
+        zeros = [mi.Spectrum(0) for _ in self.along]
+        state = _Derivatives(self.walked.camera_path(pixel, key, index), zeros, list(zeros))
+        state = self.vertex(state, key)
+        if isinstance(self.walked, Path) and not self.walked.one_vertex:
             state = dr.while_loop(
                 (state,),
                 lambda s: s.path.active,
-                lambda s: (self.step(s, key),),
+                lambda s: (self.vertex(s, key),),
                 mode="symbolic",
                 label="vertices",
             )[0]
-        found = [*self.rgb(state.path.radiance, state.path.ray.wavelengths)]
+        values = [*self.data.rgb(state.path.radiance, state.path.ray.wavelengths)]
         for slope in state.radiance:
-            found += [*slope]
-        return found
+            values += [*slope]
+        return values
 
-    def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
-        return Integrator.accumulate(self, pixel, key, first, last, sums)
-
-    def step(self, state: _Carried, key: UInt, first: bool = False) -> _Carried:
-        """One vertex, by the integrator's own `extend`, with derivatives."""
+    def vertex(self, state: _Derivatives, key: UInt) -> _Derivatives:
+        """One vertex of the path, and what the chain rule makes of the derivatives."""
         path, mi = state.path, self.mi
         with dr.resume_grad():
             throughput, radiance = mi.Spectrum(path.throughput), mi.Spectrum(path.radiance)
-            self._values = {one: {key: type(v)(v) for key, v in one.values.items()} for one in self.slots}
-            leaves = [throughput, radiance, *(v for values in self._values.values() for v in values.values())]
+            values = self.attached.fresh_values()
+            leaves = [throughput, radiance, *(v for named in values.values() for v in named.values())]
             dr.enable_grad(leaves)
-            moved = replace(path, throughput=throughput, radiance=radiance)
-            following, _ = self.extend(moved, key, first)
-            # a value of its own: Dr.Jit forgets derivatives of what others are made from
-            outgoing = [dr.select(following.active, following.throughput, 0), following.radiance]
-            found = []
+            following, _ = self.walked.vertex(replace(path, throughput=throughput, radiance=radiance), key)
+            outgoing = [own_variable(following.throughput, following.active), following.radiance]
+            slopes = []
             for one, before in zip(self.along, zip(state.throughput, state.radiance, strict=True), strict=True):
                 dr.clear_grad([*leaves, *outgoing])
                 dr.set_grad(throughput, before[0])
                 dr.set_grad(radiance, before[1])
-                for value in self._values[one.slot].values():
+                for value in values[one.slot].values():
                     if one.channel is None:
                         dr.set_grad(value, 1)
                     else:
                         dr.set_grad(value, mi.Color3f(*(float(i == one.channel) for i in range(3))))
                 dr.enqueue(dr.ADMode.Forward, leaves)
                 dr.traverse(dr.ADMode.Forward, flags=dr.ADFlag.ClearInterior)
-                found.append([mi.Spectrum(dr.grad(x)) for x in outgoing])
+                slopes.append([mi.Spectrum(dr.grad(x)) for x in outgoing])
         throughput, radiance = (dr.detach(x) for x in outgoing)
         following = replace(following, throughput=throughput, radiance=radiance)
-        return _Carried(following, [t for t, _ in found], [r for _, r in found])
+        return _Derivatives(following, [t for t, _ in slopes], [r for _, r in slopes])
 
-    def attached(
-        self,
-        si: SurfaceInteraction,
-        bsdf: MitsubaBSDF,
-        toward: Vector,
-        value: Radiance,
-        bs: BSDFSample,
-        weight: Radiance,
-        active: Mask,
+
+class _AttachedData(SceneData):
+    """A scene whose materials are differentiated along some values."""
+
+    def __init__(self, along: Sequence[Along], *parts: Any, **options: Any) -> None:
+        super().__init__(*parts, **options)
+        self.along = along
+
+    @cached_property
+    def scattering(self) -> Scattering:
+        return _AttachedScattering(self.mi, self.media, self.along)
+
+
+class _AttachedScattering(Scattering):
+    """BSDFs whose values and weights have derivatives; where they sample, and with which density, has none."""
+
+    def __init__(self, mi: ModuleType, media: Media, along: Sequence[Along]) -> None:
+        super().__init__(mi, media)
+        self.media = media
+        self.plugins: list[BSDFPlugin] = []
+        for one in along:
+            if not any(one.plugin is other for other in self.plugins):
+                self.plugins.append(one.plugin)
+        self.slots = list({id(one.slot): one.slot for one in along}.values())
+        self._values: dict[Slot, dict[str, Float]] = {}
+
+    def fresh_values(self) -> dict[Slot, dict[str, Float]]:
+        """Copies of the values that are differentiated, which the materials have from now on."""
+        self._values = {one: {key: type(v)(v) for key, v in one.values.items()} for one in self.slots}
+        return self._values
+
+    def eval(self, vertex: Vertex, toward: Vector, active: Mask) -> Radiance:
+        value = super().eval(vertex, toward, active)
+        bs, weight = dr.zeros(self.mi.BSDFSample3f), self.mi.Spectrum(0)
+        return self._attach(vertex, toward, value, bs, weight, active)[0]
+
+    def sample(self, vertex: Vertex, lobe: Float, u: Point, active: Mask) -> tuple[BSDFSample, Radiance]:
+        bs, weight = super().sample(vertex, lobe, u, active)
+        return bs, self._attach(vertex, bs.wo, self.mi.Spectrum(0), bs, weight, active)[1]
+
+    def eval_pdf_sample(
+        self, vertex: Vertex, toward: Vector, lobe: Float, u: Point, active: Mask
+    ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
+        value, pdf, bs, weight = super().eval_pdf_sample(vertex, toward, lobe, u, active)
+        value, weight = self._attach(vertex, toward, value, bs, weight, active)
+        return value, pdf, bs, weight
+
+    def _attach(
+        self, vertex: Vertex, toward: Vector, value: Radiance, bs: BSDFSample, weight: Radiance, active: Mask
     ) -> tuple[Radiance, Radiance]:
-        """The same value and weight, with derivatives where the material is one of those that move."""
-        mi = self.mi
+        """The same value toward a light and weight of a sample, with derivatives where a material moves."""
+        mi, si = self.mi, vertex.si
         outer = 1.0 + si.duv_dx.x if self.media.known else None
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
         density = dr.select(delta | (bs.pdf <= 0), 0, dr.rcp(bs.pdf))
         with self._moved():
             for plugin in self.plugins:
-                here = active & (bsdf == mi.BSDFPtr(plugin))
+                here = active & (vertex.bsdf == mi.BSDFPtr(plugin))
                 model = plugin.placed.at(si, here, outer=outer)
                 toward_light, sampled = (mi.Spectrum(model.eval(si.wi, w)) for w in (toward, bs.wo))
                 value = value + dr.select(here, toward_light - dr.detach(toward_light), 0)
@@ -200,7 +241,7 @@ class _Carrying(Transport):
     def _moved(self) -> Iterator[None]:
         """Inside, the materials have values that are differentiated, and derive what follows from them anew."""
         before = [(slot, slot.values) for slot in self.slots]
-        derived = [(placed, placed.derived) for plugin in self.plugins for placed in _all(plugin.placed)]
+        derived = [(placed, placed.derived) for plugin in self.plugins for placed in _with_inner(plugin.placed)]
         try:
             for slot, _ in before:
                 slot.values = {**slot.values, **self._values[slot]}
@@ -214,9 +255,9 @@ class _Carrying(Transport):
                 placed.derived = value
 
 
-def _all(placed: PlacedMaterial) -> Iterator[PlacedMaterial]:
+def _with_inner(placed: PlacedMaterial) -> Iterator[PlacedMaterial]:
     """A placed material and those inside it."""
     yield placed
     for _, held in placed.inner.values():
         if isinstance(held, PlacedMaterial):
-            yield from _all(held)
+            yield from _with_inner(held)

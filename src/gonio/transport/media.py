@@ -17,7 +17,7 @@ from typing import NamedTuple
 import drjit as dr
 import numpy as np
 
-from ..bridge.types import Float, Mask, MitsubaBSDF, Point, Radiance, Scene, SurfaceInteraction, UInt
+from ..bridge.types import BSDFPlugin, Float, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
 from ..errors import InputError
 from ..material.bsdf import Interior
 
@@ -45,23 +45,23 @@ class Media:
 
     def __init__(self, mi: ModuleType, scene: Scene):
         self.mi, self.scene = mi, scene
-        found = list(_interiors(scene))
-        plain = [(bsdf, bsdf.placed.model.interior) for bsdf in found]
+        result = list(_interiors(scene))
+        plain = [(bsdf, bsdf.placed.model.interior) for bsdf in result]
         self.known = any(np.any(np.asarray(i.absorption) > 0) or np.any(np.asarray(i.priority) != 0) for _, i in plain)
         if not self.known:
             return
-        if len(found) > MOST:
-            what = f"{len(found)} transparent materials, {MOST} at most where one absorbs or has a priority"
+        if len(result) > MOST:
+            what = f"{len(result)} transparent materials, {MOST} at most where one absorbs or has a priority"
             raise InputError(what, "absorption, priority", "give shapes the same material")
-        order = sorted(range(len(found)), key=lambda i: (float(np.max(np.asarray(plain[i][1].priority))), -i))
-        self.bsdfs = [found[i] for i in order]
+        order = sorted(range(len(result)), key=lambda i: (float(np.max(np.asarray(plain[i][1].priority))), -i))
+        self.bsdfs = [result[i] for i in order]
         numbers = [int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0]) for bsdf in self.bsdfs]
         place = np.full(max([*numbers, *_pointers(mi, scene)]) + 1, MOST, np.uint32)
         place[numbers] = np.arange(len(numbers))
         self.place = mi.UInt32(place)
         dr.make_opaque(self.place)
 
-    def around(self, point: Point) -> UInt:
+    def containing(self, point: Point) -> UInt:
         """The media that a point lies in, found by what a ray from there leaves without having entered it."""
         mi, depth, inside = self.mi, [0] * MOST, [0] * MOST
         ray = mi.Ray3f(point, dr.normalize(mi.Vector3f(0.29, 0.83, 0.47)))
@@ -77,7 +77,7 @@ class Media:
         packed = sum(min(count, 15) << (4 * number) for number, count in enumerate(inside))
         return dr.opaque(mi.UInt32, packed)
 
-    def crossing(self, si: SurfaceInteraction, bsdf: MitsubaBSDF, inside: UInt, active: Mask) -> Crossing:
+    def crossing(self, si: SurfaceInteraction, bsdf: BSDFPlugin, inside: UInt, active: Mask) -> Crossing:
         """What it means to meet a surface while inside of these media."""
         mi = self.mi
         number = self._number(bsdf, active)
@@ -118,20 +118,20 @@ class Media:
             assert interior is not None, "only materials that have one are kept"
             yield here, interior
 
-    def _number(self, bsdf: MitsubaBSDF, active: Mask = True) -> UInt:
+    def _number(self, bsdf: BSDFPlugin, active: Mask = True) -> UInt:
         """The place of a surface's material in the order of priorities, MOST for one without an inside."""
         return dr.gather(self.mi.UInt32, self.place, dr.reinterpret_array(self.mi.UInt32, bsdf), active)
 
 
-def _interiors(scene: Scene) -> Iterator[MitsubaBSDF]:
+def _interiors(scene: Scene) -> Iterator[BSDFPlugin]:
     """The plugins of Gonio's that light enters, each once, in the order of the scene."""
-    seen: set[int] = set()
+    visited: set[int] = set()
     for shape in scene.shapes():
         bsdf = shape.bsdf()
         placed = getattr(bsdf, "placed", None)
-        if placed is None or id(bsdf) in seen:
+        if placed is None or id(bsdf) in visited:
             continue
-        seen.add(id(bsdf))
+        visited.add(id(bsdf))
         if placed.model.transmits and placed.model.interior is not None:
             yield bsdf
 

@@ -46,12 +46,12 @@ class MitsubaRender:
     def advance(self, count: int) -> None:
         seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
         picture = self._render(self._integrator, count, seed)
-        taken = int(self._sensor.sampler().sample_count())
+        samples = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
-        weighted = picture.astype(np.float64) * taken
+        weighted = picture.astype(np.float64) * samples
         self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
-        self.done += taken
+        self.done += samples
 
     def state(self) -> dict[str, NDArray[Any]]:
         """The sum so far, and which passes it is of."""

@@ -15,7 +15,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge import engine
+from ..bridge.faults.borrowed_memory import own
 from ..bridge.types import Float, Mask, Point, Radiance, UInt, Vector
 from . import sampler
 
@@ -23,7 +23,7 @@ ROW = 4096  # cells along x that keep apart; what lies further is counted as lyi
 LEVEL = 0.25  # of the radius: how far from the plane of a place a particle may lie,
 FACING = 0.9  # and cosine of the angle between normals: what lies around an edge is elsewhere
 VISITED = 16  # particles of a row, about
-CUBES = 1 << 16  # numbers of a Crowding
+CUBES = 1 << 16  # entries of a PhotonDensity
 FIELDS = 16  # numbers of a particle, see Photon
 
 
@@ -44,7 +44,7 @@ class Photon:
     flux: Radiance
     density: Float
     depth: UInt
-    again: Mask
+    second: Mask
 
     @staticmethod
     def none(mi: ModuleType) -> Photon:
@@ -57,19 +57,19 @@ class Photon:
         mi_float = type(self.density)
         flux = list(self.flux) + [mi_float(0)] * (4 - len(self.flux))
         first = [*self.position, *self.normal, mi_float(self.depth), self.density]
-        return [*first, *self.direction, dr.select(self.again, mi_float(1), 0), *flux]
+        return [*first, *self.direction, dr.select(self.second, mi_float(1), 0), *flux]
 
 
 class PhotonMap:
     """Particles, found by place. `radius` is data of the kernel like the particles: changed, it compiles nothing."""
 
-    def __init__(self, mi: ModuleType, photons: Sequence[Photon], kept: Sequence[Mask], radius: float):
+    def __init__(self, mi: ModuleType, photons: Sequence[Photon], landed: Sequence[Mask], radius: float):
         self.mi = mi
         self.radius = dr.opaque(mi.Float, radius)
         self.per_cell = dr.opaque(mi.Float, 0.5 / radius)
         self.low = dr.opaque(mi.Int32, -(ROW // 2))  # of cells along x, about the origin of the scene
         rows, columns = [], []
-        for photon, there in zip(photons, kept, strict=True):
+        for photon, there in zip(photons, landed, strict=True):
             cell = [mi.Int32(dr.floor(x * self.per_cell)) for x in photon.position]
             values = photon.packed()
             there = there & dr.isfinite(sum(values[1:], values[0]))
@@ -87,14 +87,14 @@ class PhotonMap:
         keys = (1 << bits) + ROW
         starts = np.zeros(keys + 1, np.uint32)
         np.cumsum(np.bincount(key, minlength=keys), out=starts[1:])
-        self.starts = engine.own(mi.UInt32, starts)
+        self.starts = own(mi.UInt32, starts)
         rank = np.zeros(len(column), np.uint32)
         rank[lie[_sorted(key)]] = np.arange(self.count, dtype=np.uint32)
         self.values = dr.empty(mi.Float, max(self.count, 1) * FIELDS)
         first = 0
         for photon, along in zip(photons, columns, strict=True):
             last = first + len(along)
-            at = engine.own(mi.UInt32, rank[first:last])
+            at = own(mi.UInt32, rank[first:last])
             dr.scatter(self.values, mi.Matrix4f(*photon.packed()), at, along < ROW)
             first = last
         dr.eval(self.values)
@@ -155,8 +155,8 @@ class PhotonMap:
             distance2, height = dr.squared_norm(offset), dr.dot(offset, normal)
             here &= (distance2 < radius2) & (abs(height) < LEVEL * self.radius)
             alike, came = dr.dot(normal, other), mi.Vector3f(*(record[2, i] for i in range(3)))
-            beside = dr.dot(normal, back) * dr.dot(other, came) < 0
-            here &= (alike > FACING) | ((alike < -FACING) & beside)
+            other_side = dr.dot(normal, back) * dr.dot(other, came) < 0
+            here &= (alike > FACING) | ((alike < -FACING) & other_side)
             # rows of other cells may share their memory
             here &= mi.Int32(dr.floor(position.y * self.per_cell)) == y
             here &= mi.Int32(dr.floor(position.z * self.per_cell)) == z
@@ -180,8 +180,8 @@ class PhotonMap:
 
         begin = mi.UInt32(dr.select(active, mi.UInt32(0), 4))
         state = (begin, *row(begin, active), zero, type(zero)(zero))
-        found = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
-        return found[-2], found[-1]
+        result = dr.while_loop(state, lambda number, *_: number < 4, step, mode="symbolic", label="photons")
+        return result[-2], result[-1]
 
 
 def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
@@ -193,25 +193,25 @@ def _sorted(key: NDArray[np.uint32]) -> NDArray[np.intp]:
     return order[np.argsort((key[order] >> 16).astype(np.uint16), kind="stable")]
 
 
-class Crowding:
+class PhotonDensity:
     """How many particles arrive per area, roughly: a number for each cube of space, from one map, that then stays.
 
     Weights are made of it, and any number will do for those, as long as it is the same whoever asks.
     """
 
-    def __init__(self, mi: ModuleType, photon: Photon, kept: Mask, width: float, traced: int):
+    def __init__(self, mi: ModuleType, photon: Photon, landed: Mask, width: float, traced: int):
         self.mi = mi
         self.per_cell = dr.opaque(mi.Float, 1 / width)
         place = self._place(photon.position)
-        dr.eval(place, kept)
-        counts = np.bincount(np.array(place)[np.array(kept)], minlength=CUBES)
-        self.values = engine.own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
+        dr.eval(place, landed)
+        counts = np.bincount(np.array(place)[np.array(landed)], minlength=CUBES)
+        self.values = own(mi.Float, (counts / (traced * width**2)).astype(np.float32))
 
     @staticmethod
-    def nowhere(mi: ModuleType) -> Crowding:
-        """Nothing, for who has not seen a map yet; to a kernel it is like any other."""
+    def nowhere(mi: ModuleType) -> PhotonDensity:
+        """No particles, before the first map exists; to a kernel it is like any other."""
         photon = Photon.none(mi)
-        return Crowding(mi, photon, mi.Bool(False), 1.0, 1)
+        return PhotonDensity(mi, photon, mi.Bool(False), 1.0, 1)
 
     def at(self, place: Point) -> Float:
         """1/m^2, of one particle that is traced."""

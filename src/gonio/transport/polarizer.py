@@ -42,8 +42,8 @@ class PolarizedRender(MitsubaRender):
 
     def image(self) -> NDArray[np.float32]:
         intensity, Q, U = (self.stokes[..., part, :] for part in range(3))
-        seen = 0.5 * (intensity + np.cos(2.0 * self._angle) * Q + np.sin(2.0 * self._angle) * U)
-        return seen.astype(np.float32)
+        transmitted = 0.5 * (intensity + np.cos(2.0 * self._angle) * Q + np.sin(2.0 * self._angle) * U)
+        return transmitted.astype(np.float32)
 
     @property
     def stokes(self) -> NDArray[np.float64]:

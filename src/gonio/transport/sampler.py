@@ -27,6 +27,7 @@ import drjit as dr
 from ..bridge.types import Float, UInt
 
 Pair: TypeAlias = tuple[Float, Float]
+PairFunction: TypeAlias = Callable[[UInt, UInt, UInt], Pair]  # of (key, index, dimension)
 
 SAMPLERS: dict[str, str] = {
     "sobol": "Owen-scrambled Sobol pairs, shuffled per pixel and dimension; any number of samples",
@@ -113,7 +114,7 @@ def lattice_pair(key: UInt, index: UInt, dimension: UInt) -> Pair:
 
 
 #: The pair function of each sampler: (key, index, dimension) -> (x, y) in [0, 1)^2.
-PAIRS: dict[str, Callable[[UInt, UInt, UInt], Pair]] = {
+PAIRS: dict[str, PairFunction] = {
     "sobol": sobol_pair,
     "lattice": lattice_pair,
     "independent": independent_pair,

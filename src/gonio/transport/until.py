@@ -53,8 +53,8 @@ AROUND = 3 * TILE  # pixels: a tile's noise is that of itself and of its neighbo
 def squares(a: Picture, b: Picture) -> NDArray[np.float64]:
     """What each pixel adds to the relMSE of the mean of two pictures whose noise is independent: (height, width)."""
     true, floor = _agreed(a, b)
-    found: NDArray[np.float64] = np.mean(0.25 * (a.astype(np.float64) - b) ** 2 / (true**2 + floor), axis=-1)
-    return found
+    result: NDArray[np.float64] = np.mean(0.25 * (a.astype(np.float64) - b) ** 2 / (true**2 + floor), axis=-1)
+    return result
 
 
 def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
@@ -70,8 +70,8 @@ def blur_error(a: Picture, b: Picture, blurs: Sequence[Picture]) -> Estimate:
     def product(i: int, j: int) -> NDArray[np.float64]:
         p, q = {0, 1, 2, 3} - {i, j}
         true = np.clip(mean - 0.5 * (d[p] + d[q]), DARKEST * mean, mean)
-        found: NDArray[np.float64] = BLUR * np.mean(d[i] * d[j] / (true**2 + floor), axis=-1)
-        return found
+        result: NDArray[np.float64] = BLUR * np.mean(d[i] * d[j] / (true**2 + floor), axis=-1)
+        return result
 
     pairs = (product(0, 2), product(1, 3)), (product(0, 3), product(1, 2))
     variance = sum(float(np.sum((one - other) ** 2)) / 8.0 for one, other in pairs)
@@ -292,16 +292,16 @@ class Until:
     # ------------------------------------------------------------------ checkpoints
 
     def state(self) -> dict[str, NDArray[Any]]:
-        found: dict[str, NDArray[Any]] = {"goal": np.array([self._goal, *self._counts], np.int64)}
+        result: dict[str, NDArray[Any]] = {"goal": np.array([self._goal, *self._counts], np.int64)}
         if (wide := self._wide) is not None:
             counts = [half.done for half in wide.halves]
             known = [wide.error, wide.blur.value, wide.blur.deviation, wide.width, wide.radius]
-            found["narrowed"] = np.array([*counts, self._lost, self._narrowed, self._settings.radius, *known])
-            found |= _sums("wide", wide.halves)
+            result["narrowed"] = np.array([*counts, self._lost, self._narrowed, self._settings.radius, *known])
+            result |= _sums("wide", wide.halves)
         if self._share is not None and self._pilot is not None:
-            found |= {"share": self._share, "gain": np.array([self._gain])}
-            found |= {f"pilot{i}": picture for i, picture in enumerate(self._pilot)}
-        return found | _sums("half", self._halves)
+            result |= {"share": self._share, "gain": np.array([self._gain])}
+            result |= {f"pilot{i}": picture for i, picture in enumerate(self._pilot)}
+        return result | _sums("half", self._halves)
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on to the same bits. Raises ValueError or KeyError for sums of another film."""
@@ -355,9 +355,11 @@ def shares(noise: NDArray[np.float64]) -> tuple[Share, float]:
     wanted = np.sqrt(variance)
     scale = 1.0
     for _ in range(20):  # until what is cut off above and below is made up for
-        found = np.clip(np.rint(scale * SHARE * wanted / max(float(np.mean(wanted)), 1e-300)), LOW, HIGH)
-        scale *= SHARE / float(np.average(found, weights=sizes))
+        result = np.clip(np.rint(scale * SHARE * wanted / max(float(np.mean(wanted)), 1e-300)), LOW, HIGH)
+        scale *= SHARE / float(np.average(result, weights=sizes))
     total = float(np.average(variance, weights=sizes))
-    left = float(np.average(variance * SHARE / found, weights=sizes)) * float(np.average(found, weights=sizes)) / SHARE
+    left = (
+        float(np.average(variance * SHARE / result, weights=sizes)) * float(np.average(result, weights=sizes)) / SHARE
+    )
     gain = left / total if total > 0.0 else 1.0
-    return np.repeat(found.astype(np.uint32), sizes), gain
+    return np.repeat(result.astype(np.uint32), sizes), gain

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge import adapter, engine
-from ..bridge.types import MitsubaBSDF, OfVariant, Plugin, PluginDict, Scene, Sensor, Shape
+from ..bridge.types import BSDFPlugin, OfVariant, Plugin, PluginDict, Scene, Sensor, Shape
 from ..errors import InputError
 from ..material import BSDF, tree
 from ..scene import textures
@@ -199,7 +199,7 @@ class _Balls:
             parameters.update()
         return self._scene
 
-    def _ball(self, place: Sequence[float], bsdf: MitsubaBSDF) -> Shape:
+    def _ball(self, place: Sequence[float], bsdf: BSDFPlugin) -> Shape:
         to_world = np.eye(4)
         to_world[:3, :3], to_world[:3, 3] = SPHERE_AXES, place
         return self.mi.load_dict({"type": "sphere", "to_world": self.mi.ScalarTransform4f(to_world), "bsdf": bsdf})

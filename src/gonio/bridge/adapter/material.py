@@ -9,8 +9,8 @@ import drjit as dr
 from ...errors import InputError, did_you_mean
 from ...material import BSDF, binding, guide_search, tree
 from ...materials.combined.two_sided import TwoSided
-from ..native import Native
-from ..types import Float, Mask, MitsubaBSDF, OfVariant, Properties, SurfaceInteraction, TraversalCallback
+from ..native import MitsubaBSDF
+from ..types import BSDFPlugin, Float, Mask, OfVariant, Properties, SurfaceInteraction, TraversalCallback
 from .slots import NamedPreset, Slot
 from .variant import Variant
 
@@ -37,7 +37,7 @@ class PlacedMaterial:
         if not isinstance(sides, bool):
             raise InputError(f"'{sides}' given, true or false expected", f"{self.name}.two_sided")
         self.slots: dict[str, Slot] = {}
-        self.inner: dict[str, tuple[MitsubaBSDF, PlacedMaterial | Native]] = {}
+        self.inner: dict[str, tuple[BSDFPlugin, PlacedMaterial | MitsubaBSDF]] = {}
         values: dict[str, OfVariant] = {}
         for name, parameter in model.parameters().items():
             where = f"{self.name}.{name}"
@@ -68,11 +68,11 @@ class PlacedMaterial:
         self.derived: OfVariant = None
         self.derive()
 
-    def _child(self, props: Properties, name: str) -> tuple[MitsubaBSDF, PlacedMaterial | Native]:
+    def _child(self, props: Properties, name: str) -> tuple[BSDFPlugin, PlacedMaterial | MitsubaBSDF]:
         child = props.get(name, None)
         if not isinstance(child, self.variant.mi.BSDF):
             raise InputError(f"no material '{name}' given", self.name)
-        return child, getattr(child, "placed", None) or Native(child)
+        return child, getattr(child, "placed", None) or MitsubaBSDF(child)
 
     def derive(self) -> None:
         """Find once what the model derives from values that are the same at every hit."""
@@ -91,7 +91,7 @@ class PlacedMaterial:
         return (
             self._by_wavelength
             or any(slot.textures or slot.curves for slot in self.slots.values())
-            or any(isinstance(held, Native) or held.varies for _, held in self.inner.values())
+            or any(isinstance(held, MitsubaBSDF) or held.varies for _, held in self.inner.values())
         )
 
     @property
@@ -123,7 +123,7 @@ class PlacedMaterial:
         values = {name: slot.at(si, active, separates, outer) for name, slot in self.slots.items()}
         for name, (_, held) in self.inner.items():
             values[name] = (
-                held.at(si, active) if isinstance(held, Native) else held.at(si, active, separates, outer, True)
+                held.at(si, active) if isinstance(held, MitsubaBSDF) else held.at(si, active, separates, outer, True)
             )
         if self._by_wavelength:
             values["wavelengths"] = self.variant.spectrum(si.wavelengths)

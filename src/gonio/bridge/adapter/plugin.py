@@ -16,7 +16,7 @@ from ...ops import Mode
 from ..types import (
     BSDFContext,
     BSDFSample,
-    Colour,
+    Color,
     Float,
     Mask,
     OfVariant,
@@ -50,14 +50,14 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         return active & ((same & reflect) | (~same & transmit))
 
     def mueller(
-        model: BSDF, ctx: BSDFContext, wo: Vector, wi: Vector, value: Radiance, whole: Radiance, delta: Mask
+        model: BSDF, ctx: BSDFContext, wo: Vector, wi: Vector, value: Radiance, total: Radiance, delta: Mask
     ) -> Radiance:
         """The value as a Mueller matrix. In importance mode light goes the other way, from Gonio's wo to wi."""
         mode = mode_of(ctx)
         parts = model.polarized(wo, wi, delta, mode)
-        whole = dr.select(delta, sum((part.value for part in parts), dr.zeros(variant.spectrum)), whole)
+        total = dr.select(delta, sum((part.value for part in parts), dr.zeros(variant.spectrum)), total)
         toward, away = (wi, wo) if mode == "radiance" else (wo, wi)
-        return variant.mueller(value, whole, parts, toward, away)
+        return variant.mueller(value, total, parts, toward, away)
 
     def separates(ctx: BSDFContext) -> bool:
         """Whether who asks goes on with one wavelength where they part."""
@@ -162,8 +162,8 @@ def plugin_class(mi: ModuleType) -> OfVariant:
             bs.sampled_component = mi.UInt32(0)
             weight = s.weight
             if mi.is_polarized:
-                whole = model.eval(si.wi, bs.wo, mode_of(ctx))
-                weight = mueller(model, ctx, si.wi, bs.wo, weight, whole, s.delta)
+                total = model.eval(si.wi, bs.wo, mode_of(ctx))
+                weight = mueller(model, ctx, si.wi, bs.wo, weight, total, s.delta)
             return bs, dr.select(active, variant.handed_out(weight), 0.0)
 
         # -------------------------------------------------------------- colours
@@ -177,7 +177,7 @@ def plugin_class(mi: ModuleType) -> OfVariant:
         def eval_attribute(self, name: str, si: SurfaceInteraction, active: Mask = True) -> Radiance:
             return self._attribute(name, si, active, variant.spectrum)
 
-        def eval_attribute_3(self, name: str, si: SurfaceInteraction, active: Mask = True) -> Colour:
+        def eval_attribute_3(self, name: str, si: SurfaceInteraction, active: Mask = True) -> Color:
             return self._attribute(name, si, active, mi.Color3f)
 
         def _attribute(self, name: str, si: SurfaceInteraction, active: Mask, kind: OfVariant) -> OfVariant:

@@ -126,15 +126,15 @@ class Slot:
         outer      what an index is divided by
         """
         kind = self.parameter.kind
-        found = dict(self.values)
+        result = dict(self.values)
         for name, curve in self.curves.items() if separates else ():
-            found[name] = self.variant.looked_up(curve, si.wavelengths[0], active)
+            result[name] = self.variant.looked_up(curve, si.wavelengths[0], active)
         for name, texture in self.textures.items():
-            found[name] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
+            result[name] = texture.eval(si, active) if kind == "spectrum" else texture.eval_1(si, active)
         if outer is not None and isinstance(self.parameter, IndexParameter):
-            return found[self.parameter.name] / outer
+            return result[self.parameter.name] / outer
         if kind == "alpha":
-            return ops.vec2(found[self.names[0]], found[self.names[-1]])
+            return ops.vec2(result[self.names[0]], result[self.names[-1]])
         if kind == "angle":
-            return ops.vec2(*reversed(ops.sincos(*found.values()))) if found else None
-        return found[self.parameter.name]
+            return ops.vec2(*reversed(ops.sincos(*result.values()))) if result else None
+        return result[self.parameter.name]

@@ -51,12 +51,12 @@ class Variant:
         return self.mi.Spectrum(value)
 
     def mueller(
-        self, value: Radiance, whole: Radiance, parts: Sequence[Polarized], toward: Vector, away: Vector
+        self, value: Radiance, total: Radiance, parts: Sequence[Polarized], toward: Vector, away: Vector
     ) -> Radiance:
         """A material's value as a Mueller matrix: of each part as its facets have it, and what is left unpolarized.
 
         value   what unpolarized light gives
-        whole   what the parts are parts of
+        total   what the parts are parts of
         toward  from where light arrives, and
         away    where it goes to; both away from the surface. As in Mitsuba the matrix is one from the Stokes basis of
                 the one ray to that of the other (`mi.mueller.stokes_basis`)
@@ -64,7 +64,7 @@ class Variant:
         mi = self.mi
         matrix, rest = dr.zeros(mi.Spectrum), self.spectrum(value)
         for part in parts:
-            size = dr.select(whole != 0.0, value * part.value / whole, 0.0)
+            size = dr.select(total != 0.0, value * part.value / total, 0.0)
             rest -= size
             d, c, s = (size * self.spectrum(x) for x in part.matrix)
             zero = dr.zeros(self.spectrum)

@@ -19,7 +19,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Float, Hit, Mask, Point, Ray, Scene, Shape, UInt
 
 # What shapes may cost together, a sphere 1. Embree, which has its own ways with triangles and calls Mitsuba for each
@@ -84,7 +84,7 @@ class Inline:
         # One array: kernels differ by the order in which the arrays that they read were made.
         numbers = [n for s in spheres for n in (*s.centre, s.radius)]
         numbers += [n for flat in flats for row in flat.rows for n in row]
-        table = engine.own(mi.Float, np.array(numbers, np.float32))
+        table = own(mi.Float, np.array(numbers, np.float32))
         read = (dr.gather(mi.Float, table, at) for at in range(len(numbers)))
         self.spheres = [(mi.Point3f(*itertools.islice(read, 3)), next(read)) for _ in spheres]
         self.flats = [(flat, [list(itertools.islice(read, 4)) for _ in range(3)]) for flat in flats]
@@ -124,12 +124,12 @@ class Inline:
         count = len(self.flats) + len(self.spheres)
         part, face, place = mi.UInt32(count), mi.UInt32(0), mi.Point2f(0)
         for number, (flat, rows) in enumerate(self.flats):
-            t, x, y, met = self._on_flat(flat, rows, ray, best)
-            best, part = dr.select(met, t, best), dr.select(met, number, part)
-            face, place = self._placed(flat, x, y, met, face, place)
+            t, x, y, hits = self._on_flat(flat, rows, ray, best)
+            best, part = dr.select(hits, t, best), dr.select(hits, number, part)
+            face, place = self._placed(flat, x, y, hits, face, place)
         for number, (centre, radius) in enumerate(self.spheres, start=len(self.flats)):
-            t, met = self._on_sphere(centre, radius, ray, best)
-            best, part = dr.select(met, t, best), dr.select(met, number, part)
+            t, hits = self._on_sphere(centre, radius, ray, best)
+            best, part = dr.select(hits, t, best), dr.select(hits, number, part)
         hit = dr.zeros(mi.PreliminaryIntersection3f)
         hit.valid = part < count
         hit.t = dr.select(hit.valid, best, dr.inf)
@@ -141,12 +141,12 @@ class Inline:
         """Whether the ray meets anything."""
         mi = self.mi
         most = dr.select(active, mi.Float(ray.maxt), 0)
-        met = mi.Bool(False)
+        hits = mi.Bool(False)
         for flat, rows in self.flats:
-            met |= self._on_flat(flat, rows, ray, most)[3]
+            hits |= self._on_flat(flat, rows, ray, most)[3]
         for centre, radius in self.spheres:
-            met |= self._on_sphere(centre, radius, ray, most)[1]
-        return met
+            hits |= self._on_sphere(centre, radius, ray, most)[1]
+        return hits
 
     def _on_sphere(self, centre: Point, radius: Float, ray: Ray, most: Float) -> tuple[Float, Mask]:
         """(distance, whether it is between 0 and `most`).
@@ -156,12 +156,12 @@ class Inline:
         """
         away, square = centre - ray.o, dr.square(radius)
         along = dr.dot(away, ray.d)
-        beside = square - dr.squared_norm(dr.fma(-ray.d, along, away))
-        far = along + dr.mulsign(dr.sqrt(dr.maximum(beside, 0)), along)
+        discriminant = square - dr.squared_norm(dr.fma(-ray.d, along, away))
+        far = along + dr.mulsign(dr.sqrt(dr.maximum(discriminant, 0)), along)
         near = (dr.squared_norm(away) - square) / far
         first, second = dr.minimum(near, far), dr.maximum(near, far)
         t = dr.select(first > 0, first, second)
-        return t, (beside >= 0) & (t > 0) & (t < most)
+        return t, (discriminant >= 0) & (t > 0) & (t < most)
 
     def _on_flat(self, flat: Flat, rows: list[Row], ray: Ray, most: Float) -> tuple[Float, Float, Float, Mask]:
         """(distance, place there x, y, whether it is inside and between 0 and `most`)."""
@@ -171,15 +171,15 @@ class Inline:
         x, y = _at(across, point), _at(along, point)
         return t, x, y, _INSIDE[flat.kind](x, y) & (t > 0) & (t < most)
 
-    def _placed(self, flat: Flat, x: Float, y: Float, met: Mask, face: UInt, place: Point) -> tuple[UInt, Point]:
+    def _placed(self, flat: Flat, x: Float, y: Float, hits: Mask, face: UInt, place: Point) -> tuple[UInt, Point]:
         """Face and place on it as Mitsuba tells them of meshes, weights of the second and third corner; of disks x, y.
 
         Those of other shapes follow from the point (`Surfaces`).
         """
         mi = self.mi
         if flat.kind == "disk":
-            return face, dr.select(met, mi.Point2f(x, y), place)
-        for (number, weights), here in zip(flat.faces, (met, met & (x + y > 1)), strict=False):
+            return face, dr.select(hits, mi.Point2f(x, y), place)
+        for (number, weights), here in zip(flat.faces, (hits, hits & (x + y > 1)), strict=False):
             weighed = mi.Point2f(*(a + b * x + c * y for a, b, c in weights))
             face, place = dr.select(here, number, face), dr.select(here, weighed, place)
         return face, place
@@ -202,8 +202,8 @@ def _flat(shape: int, kind: str, frame: Matrix, faces: Faces = ()) -> Flat | Non
     normal = np.cross(across, along)
     if not (size := float(np.linalg.norm(normal))) > 0.0:
         return None
-    leans = abs(up @ normal) <= (1.0 - FLAT) * np.linalg.norm(up) * size
-    if kind == "disk" and (leans or abs(across @ along) > FLAT * size):
+    oblique = abs(up @ normal) <= (1.0 - FLAT) * np.linalg.norm(up) * size
+    if kind == "disk" and (oblique or abs(across @ along) > FLAT * size):
         return None  # Mitsuba has its own view of a disk whose axes are not perpendicular
     frame = frame.copy()
     frame[:3, 2] = normal / np.sqrt(size)  # of a length like that of the others; where its own points does not matter
@@ -227,14 +227,14 @@ def _of_mesh(shape: int, mesh: Shape) -> Iterator[Flat]:
         frame = np.eye(4)
         frame[:3, 0], frame[:3, 1], frame[:3, 3] = corners[b] - corners[a], corners[c] - corners[a], corners[a]
         weight = {a: (1, -1, -1), b: (0, 1, 0), c: (0, 0, 1)}
-        found = [(first, tuple(weight[int(v)] for v in faces[first][1:]))]
+        result = [(first, tuple(weight[int(v)] for v in faces[first][1:]))]
         if pair is not None:
             second, _, fourth = pair
             left.remove(second)
             weight = {fourth: (-1, 1, 1), b: (1, 0, -1), c: (1, -1, 0)}
-            found.append((second, tuple(weight[int(v)] for v in faces[second][1:])))
+            result.append((second, tuple(weight[int(v)] for v in faces[second][1:])))
         kind = "triangle" if pair is None else "parallelogram"
-        if (flat := _flat(shape, kind, frame, tuple(found))) is not None:
+        if (flat := _flat(shape, kind, frame, tuple(result))) is not None:
             yield flat
 
 

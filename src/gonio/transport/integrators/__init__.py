@@ -6,13 +6,35 @@
     >>> picture = render.image()        # (height, width, 3) float32, row 0 on top
 
 An integrator is one file in this folder, an entry point of the group "gonio.integrators", or a class that a program
-registers: see `Integrator`.
+registers: see `Integrator`. Read `direct.py` first, then `path.py`; their steps are in `light_transport.py`.
 """
 
 from __future__ import annotations
 
-from .base import Integrator, Settings
-from .progressive import Render
-from .transport import Transport
+import warnings
 
-__all__ = ["Integrator", "Render", "Settings", "Transport"]
+from .base import Integrator, Settings
+from .light_transport import LightTransport
+from .path import Path
+from .progressive import Render
+
+__all__ = ["Integrator", "LightTransport", "Path", "Render", "Settings"]
+
+
+def __getattr__(name: str) -> object:
+    if name != "Transport":
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    warnings.warn("Transport is called Path now: derive from that", DeprecationWarning, stacklevel=2)
+    return _Transport
+
+
+class _Transport(Path):
+    """The base class of integrators that follow light, as it was called once: paths to `depth`, without roulette."""
+
+    name = ""
+    takes_depth = False
+    plays_roulette = False
+
+    @classmethod
+    def depth(cls, settings: Settings) -> int:
+        return 2

@@ -2,10 +2,51 @@
 
 from __future__ import annotations
 
-from .transport import Transport
+from dataclasses import replace
+
+import drjit as dr
+
+from ...bridge.types import Float, Mask, UInt
+from ..sums import Sums
+from .light_transport import LightTransport, PathState
 
 
-class Direct(Transport):
+class Direct(LightTransport):
     """Direct light: light and BSDF sampling combined (multiple importance sampling)."""
 
     name = "direct"
+
+    def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
+        """Add samples [first, last) of every pixel to the sums."""
+
+        def step(index: UInt, sums: Sums) -> tuple[UInt, Sums]:
+            path, features = self.vertex(self.camera_path(pixel, key, index), key)
+            every: Mask = self.mi.Bool(True)
+            sums = sums.add([*self.data.rgb(path.radiance, path.ray.wavelengths)], every, features, every)
+            return index + 1, sums
+
+        state = (first + dr.zeros(self.mi.UInt32, dr.width(pixel)), sums)
+        return dr.while_loop(state, lambda index, _: index < last, step, mode="symbolic", label="samples")[1]
+
+    def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
+        """The light of the surface that the camera ray has met, and the light that this surface reflects."""
+        vertex, throughput = self.intersect(path)
+        radiance = path.radiance + throughput * self.emitted(path, vertex)
+        active = path.active & vertex.si.is_valid()
+        throughput, hero_only = self.keep_hero(path, vertex, throughput, active)
+
+        # Light sampling; the same call of the BSDF samples a direction.
+        u = self.numbers(path, key)
+        light = self.sample_light(vertex, u, active) if self.samples_lights else None
+        value, pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        radiance = radiance + throughput * self.direct_light(vertex, light, value, pdf, active)
+        if self.ambient is not None:
+            radiance = radiance + throughput * self.ambient_light(vertex, active)
+
+        # BSDF sampling: the light that the sampled direction meets.
+        throughput = throughput * weight
+        features = self.data.features(throughput, vertex.si, path.active, active)
+        path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)
+        path = self.spawn(path, vertex, bs, light, active)
+        radiance = path.radiance + self.light_along(path, path.active)
+        return replace(path, radiance=radiance, active=self.mi.Bool(False)), features

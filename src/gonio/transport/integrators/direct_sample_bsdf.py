@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from .transport import Transport
+from .direct import Direct
 
 
-class DirectSampleBSDF(Transport):
+class DirectSampleBSDF(Direct):
     """Direct light, by sampling the BSDF only."""
 
     name = "directSampleBSDF"

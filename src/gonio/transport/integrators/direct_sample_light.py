@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from .transport import Transport
+from .direct import Direct
 
 
-class DirectSampleLight(Transport):
+class DirectSampleLight(Direct):
     """Direct light, by sampling the lights only (mirrors and smooth glass are followed)."""
 
     name = "directSampleLight"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...bridge.types import Colour, SurfaceInteraction, UInt
+from ...bridge.types import Color, SurfaceInteraction, UInt
 from .base import Integrator
 
 
@@ -11,5 +11,5 @@ class Normal(Integrator):
 
     name = "normal"
 
-    def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Colour:
+    def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Color:
         return (si.sh_frame.n + 1) * 0.5

@@ -2,49 +2,85 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from typing import ClassVar
 
-from ..lights.solid_angles import is_sphere
+import drjit as dr
+
+from ...bridge.types import Float, UInt
+from .. import advice
+from ..scene_data import SceneData
+from ..sums import Sums
 from .base import Settings
-from .transport import Transport
-
-# A lamp that mirrors and smooth glass see under less than so many steradians is seldom met by chance behind them: in
-# examples/glass-caustic it is .008.
-SMALL = 0.03
+from .light_transport import LightTransport, PathState
 
 
-class Path(Transport):
+class Path(LightTransport):
     """Path tracing: light and BSDF sampling combined at every vertex (max_depth - 1 shaded vertices)."""
 
     name = "path"
     takes_depth = True
-    plays_roulette = True
+    plays_roulette: ClassVar[bool] = True
+
+    def __init__(self, data: SceneData, settings: Settings) -> None:
+        super().__init__(data, settings)
+        depth = self.depth(settings)
+        # The last ray can only find light. It is traced like the others where media dim it, and where it may meet any
+        # of several lights, for which each vertex would have a second ray and its surface.
+        self.last_ray_apart = not self.media.known and (depth <= 2 or self.lights.shortens_last_ray)
+        self.one_vertex = (depth <= 2 and self.last_ray_apart) or not (self.samples_lobes or self.smooth)
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
         return settings.max_depth
 
     def advice(self) -> str:
-        """A word where the light that mirrors or smooth glass throw will hardly be found."""
-        if self.merges or self.settings.max_depth <= 2 or not self.smooth:
-            return ""
-        mi, flags = self.mi, self.mi.EmitterFlags
-        around = np.array([shape.bbox().center() for shape in self.smooth[:64]], float).reshape(-1, 3)
-        for emitter in self.lights.emitters:
-            shape = emitter.get_shape() if mi.has_flag(emitter.flags(), flags.Surface) else None
-            if shape is not None:
-                place = np.array(shape.bbox().center(), float).ravel()
-                nearest = float(np.min(np.sum((around - place) ** 2, axis=1)))
-                # seen from far, a ball shows a quarter of its area
-                seen = float(np.max(np.array(shape.surface_area()))) * (0.25 if is_sphere(mi, shape) else 1.0)
-                small = seen < SMALL * nearest
-            else:
-                small = mi.has_flag(emitter.flags(), flags.DeltaPosition) or mi.has_flag(
-                    emitter.flags(), flags.DeltaDirection
-                )
-            if small:
-                return (
-                    "a small lamp and mirrors or smooth glass: path hardly finds the light that they throw, "
-                    "--integrator caustics does"
-                )
-        return ""
+        return advice.on_small_lights(self.data) if self.settings.max_depth > 2 else ""
+
+    def accumulate(self, pixel: UInt, key: UInt, first: UInt, last: UInt, sums: Sums) -> Sums:
+        """Add samples [first, last) of every pixel to the sums: one flat loop over the vertices of all of them.
+
+        A lane whose path has ended begins its next one at once, instead of idling until the longest of its 16
+        neighbors' has ended.
+        """
+        if self.one_vertex:
+            return super().accumulate(pixel, key, first, last, sums)
+
+        def step(index: UInt, path: PathState, sums: Sums) -> tuple[UInt, PathState, Sums]:
+            begins = ~path.active
+            path = dr.select(begins, self.camera_path(pixel, key, index, begins), path)
+            path, features = self.vertex(path, key)
+            ended = ~path.active
+            sums = sums.add([*self.data.rgb(path.radiance, path.ray.wavelengths)], ended, features, begins)
+            return index + dr.select(ended, self.mi.UInt32(1), 0), path, sums
+
+        state = (first + dr.zeros(self.mi.UInt32, dr.width(pixel)), self.idle_path(), sums)
+        return dr.while_loop(state, lambda index, *_: index < last, step, mode="symbolic", label="vertices")[2]
+
+    def vertex(self, path: PathState, key: UInt) -> tuple[PathState, list[Float]]:
+        """Take the light of the surface that the path's ray has met, gather light there, and trace the next ray."""
+        vertex, throughput = self.intersect(path)
+        radiance = path.radiance + throughput * self.emitted(path, vertex)
+        active = path.active & vertex.si.is_valid() & (path.depth + 1 < self.max_depth)
+        throughput, hero_only = self.keep_hero(path, vertex, throughput, active)
+
+        # Light sampling; the same call of the BSDF samples the next direction.
+        u = self.numbers(path, key)
+        light = self.sample_light(vertex, u, active)
+        value, pdf, bs, weight = self.sample_bsdf(vertex, light, u, active)
+        radiance = radiance + throughput * self.direct_light(vertex, light, value, pdf, active)
+        if self.ambient is not None:
+            radiance = radiance + throughput * self.ambient_light(vertex, active)
+
+        # BSDF sampling: the next ray, whose light the next vertex adds.
+        throughput = throughput * weight
+        features = self.data.features(throughput, vertex.si, path.active, active)
+        path = replace(path, throughput=throughput, radiance=radiance, hero_only=hero_only)
+        path = self.spawn(path, vertex, bs, light, active)
+        if self.plays_roulette:
+            path = self.roulette(path, u)
+        if self.last_ray_apart:
+            last = path.depth + 1 >= self.max_depth
+            radiance = path.radiance + self.light_along(path, path.active & last)
+            path = replace(path, radiance=radiance, active=path.active & ~last)
+        return self.trace(path), features

@@ -10,7 +10,7 @@ How it is fast:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import drjit as dr
@@ -18,13 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
+from ...bridge.faults.interrupted_recording import interruptible
+from ...bridge.faults.merged_mesh_bbox import with_valid_bbox
 from ...bridge.types import Float, Scene, Sensor, UInt
 from ...errors import InputError
 from ...work import garbage
 from .. import sampler
-from ..surfaces import whole
+from ..scene_data import SceneData
+from ..sums import Sums
 from .base import Integrator, Settings
-from .sums import Sums
 
 # 4 x 4 pixels fill the 16 lanes of AVX-512 and two packets of AVX2: on the five-conductor scene the same rays take
 # 0.21 s in tiles and 0.32 s in scanlines.
@@ -65,20 +68,20 @@ class Render:
             raise InputError(f"variant {mi.variant()} {what}", "Render", hint)
         if sensor is None and not scene.sensors():
             raise InputError("the scene has no camera", "scene.sensors()", "add a sensor, or pass one")
-        self.scene, self.settings, self.aovs = whole(mi, scene), settings, aovs
+        self.scene, self.settings, self.aovs = with_valid_bbox(mi, scene), settings, aovs
         self.sensor = sensor if sensor is not None else scene.sensors()[0]
         self.width, self.height = (int(n) for n in self.sensor.film().crop_size())
         self.done = 0
         self._lanes: UInt | None = None  # samples of each lane, where some are ahead of `done`
-        self._share = None if share is None else engine.own(mi.UInt32, share)
+        self._share = None if share is None else own(mi.UInt32, share)
         self._order = tiles(self.width, self.height)
-        self._pixel = engine.own(mi.UInt32, self._order)
+        self._pixel = own(mi.UInt32, self._order)
         self._splatted = self.width * self.height if settings.program.splats else 0
         # A camera that was just loaded and one that was moved hold the same numbers in another order, which would make
         # two kernels; this puts both in the second state.
         self.sensor.parameters_changed()
         with dr.suspend_grad(), garbage.kept():
-            self._integrator = self._program()
+            self._integrator = self._integrator_of()
         self._sums = self._nothing(NOTHING)
 
     def _nothing(self, lanes: int) -> Sums:
@@ -86,8 +89,11 @@ class Render:
         features = 6 if self.aovs else self.features
         return Sums.zeros(self.mi, lanes, 3 + self._integrator.measured, features, self._splatted)
 
-    def _program(self) -> Integrator:
-        return self.settings.program(self.mi, self.scene, self.sensor, self.settings, self.aovs)
+    def _integrator_of(self, data: Callable[..., SceneData] = SceneData) -> Integrator:
+        """The integrator, with what it reads of the scene."""
+        settings, program = self.settings, self.settings.program
+        parts = self.mi, self.scene, self.sensor, settings.sampler, settings.ambient
+        return program(data(*parts, mis_compensation=program.samples_lobes, aovs=self.aovs), settings)
 
     @property
     def advice(self) -> str:
@@ -106,7 +112,7 @@ class Render:
         mi = self.mi
         # Dr.Jit would record each loop once more, without what turns out to stay as it is: LLVM finds that by itself.
         unchanged = dr.scoped_set_flag(dr.JitFlag.OptimizeLoops, False)
-        with dr.suspend_grad(), garbage.kept(), engine.interruptible(), unchanged:
+        with dr.suspend_grad(), garbage.kept(), interruptible(), unchanged:
             key = sampler.pixel_key(self._pixel, dr.opaque(mi.UInt32, self.settings.seed))
             sums, begun = self._sums, self._begun
             lowest, highest = self.done, self.done + count
@@ -151,11 +157,11 @@ class Render:
         self._sums = Sums.of_arrays(self.mi, state, len(self._pixel), like=self._sums)
         self.done, self._lanes = done, None
         if LANES in state and np.any(state[LANES] != done):
-            self._lanes = engine.own(self.mi.UInt32, state[LANES])
+            self._lanes = own(self.mi.UInt32, state[LANES])
 
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from their beginning: a part of the picture, for who puts it together."""
-        self._pixel = engine.own(self.mi.UInt32, self._order[lanes])
+        self._pixel = own(self.mi.UInt32, self._order[lanes])
         self._sums = self._nothing(NOTHING)
         self.done, self._lanes = 0, None
 

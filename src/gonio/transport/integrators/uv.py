@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...bridge.types import Colour, SurfaceInteraction, UInt
+from ...bridge.types import Color, SurfaceInteraction, UInt
 from .base import Integrator
 
 
@@ -11,5 +11,5 @@ class UV(Integrator):
 
     name = "uv"
 
-    def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Colour:
+    def show(self, si: SurfaceInteraction, key: UInt, index: UInt) -> Color:
         return self.mi.Color3f(si.uv.x, si.uv.y, 0)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from .base import Settings
-from .transport import Transport
+from .path import Path
 
 DEPTH = 10
 
 
-class Whitted(Transport):
+class Whitted(Path):
     """Mirrors and smooth glass followed to depth 10, everything else lit by light sampling only."""
 
     name = "whitted"
+    takes_depth = False
     samples_lobes = False
+    plays_roulette = False
 
     @classmethod
     def depth(cls, settings: Settings) -> int:
         return DEPTH
+
+    def advice(self) -> str:
+        return ""

@@ -13,7 +13,7 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt, Vector
 
 NARROWEST, WIDEST = 64, 1024  # cells around, twice as many as from pole to pole: as fine as the map, up to .35 degrees
@@ -53,7 +53,7 @@ class Sky:
         self._far = dr.opaque(mi.Float, max(4.0 * reach, 1e-3))
 
     def _held(self, values: NDArray[np.float64]) -> Float:
-        return engine.own(self.mi.Float, np.ascontiguousarray(values.ravel(), np.float32))
+        return own(self.mi.Float, np.ascontiguousarray(values.ravel(), np.float32))
 
     def _seen(self, steps: int) -> NDArray[np.float64]:
         """Luminance of each cell, from points so many steps apart on its edges and inside: between mean and largest, so
@@ -66,9 +66,9 @@ class Sky:
         si.wi = -self._toward(mi.Float(index - row * wide) * across, dr.cos(mi.Float(row) * down))
         if mi.is_spectral:
             si.wavelengths = type(si.wavelengths)(*np.linspace(450.0, 620.0, len(si.wavelengths)).tolist())
-        seen = self.emitter.eval(si)
-        seen = mi.luminance(seen) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(seen))
-        points = np.array(seen, np.float32).reshape(high + 1, wide)
+        values = self.emitter.eval(si)
+        values = mi.luminance(values) if mi.is_rgb else dr.mean(mi.unpolarized_spectrum(values))
+        points = np.array(values, np.float32).reshape(high + 1, wide)
         points = np.where(np.isfinite(points), np.maximum(points, 0.0), 0.0)
         points = np.concatenate([points, points[:, :1]], axis=1)
         largest = total = np.zeros((self.height, self.width), np.float32)
@@ -118,13 +118,13 @@ class Choice:
     def __init__(self, mi: ModuleType, sums: NDArray[np.float64]) -> None:
         rows, self.count = sums.shape  # a power of two
         self.mi, sums = mi, sums.astype(np.float32)
-        self.sums = engine.own(mi.Float, sums.ravel())
+        self.sums = own(mi.Float, sums.ravel())
         self.below: UInt | None = None
         if self.count > SHORT:
             # how many sums of its row are at most k / count, for k up to count
             at = np.ceil(sums * self.count).astype(np.int64) + np.arange(rows)[:, None] * (self.count + 1)
             below = np.bincount(at.ravel(), minlength=rows * (self.count + 1)).reshape(rows, -1).cumsum(axis=1)
-            self.below = engine.own(mi.UInt32, np.minimum(below, self.count - 1).astype(np.uint32).ravel())
+            self.below = own(mi.UInt32, np.minimum(below, self.count - 1).astype(np.uint32).ravel())
 
     def of(self, row: UInt, u: Float) -> tuple[UInt, Float]:
         """(the step of a row in which u in [0, 1] lies, how far into it)."""
@@ -151,5 +151,5 @@ class Choice:
             return dr.select(beyond, middle + 1, low), dr.select(beyond, high, middle)
 
         state = dr.gather(mi.UInt32, below, part), dr.gather(mi.UInt32, below, part + 1)
-        found = dr.while_loop(state, lambda low, high: low < high, halve, mode="symbolic", label="search")
-        return found[0]
+        result = dr.while_loop(state, lambda low, high: low < high, halve, mode="symbolic", label="search")
+        return result[0]

@@ -186,8 +186,8 @@ class Ball:
         if not self.axes:
             return type(self.radius)(0), type(self.radius)(0)
         x, y, z = (dr.dot(outward, axis) for axis in self.axes)
-        around = dr.atan2(y, x) * (0.5 * dr.inv_pi)
-        return dr.select(around < 0, around + 1, around), dr.safe_acos(z) * dr.inv_pi
+        azimuth = dr.atan2(y, x) * (0.5 * dr.inv_pi)
+        return dr.select(azimuth < 0, azimuth + 1, azimuth), dr.safe_acos(z) * dr.inv_pi
 
 
 class SphericalCap:

@@ -31,7 +31,9 @@ from ...bridge.types import (
     Vector,
 )
 from ...errors import InputError
-from .lights import Lights, area_density
+from .base import shadow_offset
+from .directions import area_density
+from .lights import Lights
 from .solid_angles import is_sphere
 
 SURFACE, POINT, INFINITE = 0, 1, 2
@@ -50,8 +52,8 @@ class Particle:
     kind       SURFACE, POINT or INFINITE
     flux       radiance over density; of a lamp that is a point or a parallel beam, its limit
     density    1/(m^2 sr), of étendue; UNMET for those two, which no ray from elsewhere meets
-    seen       how much of it a camera that sees the lamp itself is sent: of a surface one over its density by area, of
-               infinity the radiance over its density by solid angle
+    direct_weight  of the lamp in the eyes of a camera that sees it directly: of a surface one over its density by area,
+                   of infinity the radiance over its density by solid angle
     """
 
     origin: Point
@@ -61,7 +63,7 @@ class Particle:
     kind: UInt
     flux: Radiance
     density: Float
-    seen: Radiance
+    direct_weight: Radiance
 
 
 class Targets:
@@ -164,25 +166,27 @@ class Sources:
         if lights.count == 1:
             number, probability, emitter = mi.UInt32(0), mi.Float(1), mi.EmitterPtr(lights.emitters[0])
         else:
-            number, probability = lights.choice.sample_pmf(pick)
-            emitter = dr.gather(mi.EmitterPtr, self.scene.emitters_dr(), dr.gather(mi.UInt32, lights.place, number))
+            number, probability = lights.by_power.sample_pmf(pick)
+            emitter = dr.gather(
+                mi.EmitterPtr, self.scene.emitters_dr(), dr.gather(mi.UInt32, lights.scene_indices, number)
+            )
         kind = dr.gather(mi.UInt32, self.kind_of, number)
-        found: Particle | None = None
+        result: Particle | None = None
         for one in self.known:
-            make = (self._from_surface, self._from_point, self._from_afar)[one]
+            make = (self._from_surface, self._from_point, self._from_infinite)[one]
             here = kind == one
             other = make(number, emitter, place, aim, way, wavelengths, here)
-            found = other if found is None else dr.select(here, other, found)
-        assert found is not None, "who asks has seen that there are lamps"
+            result = other if result is None else dr.select(here, other, result)
+        assert result is not None, "who asks has seen that there are lamps"
         return Particle(
-            found.origin,
-            found.direction,
+            result.origin,
+            result.direction,
             emitter,
-            found.place,
+            result.place,
             kind,
-            found.flux / probability,
-            dr.select(found.density < UNMET, found.density * probability, UNMET),
-            found.seen / probability,
+            result.flux / probability,
+            dr.select(result.density < UNMET, result.density * probability, UNMET),
+            result.direct_weight / probability,
         )
 
     def density(self, origin: Point, si: SurfaceInteraction, direction: Vector, active: Mask) -> Float:
@@ -192,26 +196,26 @@ class Sources:
         probability, index = mi.Float(1), mi.UInt32(0)
         if lights.count > 1:
             number = dr.reinterpret_array(mi.UInt32, emitter)
-            probability = dr.gather(mi.Float, lights.by_pointer, number, active)
-            index = dr.gather(mi.UInt32, lights.number, number, active)
-        found = mi.Float(0)
+            probability = dr.gather(mi.Float, lights.probability_of_pointer, number, active)
+            index = dr.gather(mi.UInt32, lights.index_of_pointer, number, active)
+        result = mi.Float(0)
         for one in self.known:
             if one == SURFACE:
-                met = active & si.is_valid()
+                hit = active & si.is_valid()
                 ps = mi.PositionSample3f(si)
                 cosine = dr.abs(dr.dot(direction, si.n))
-                by_area = lights.of_shape(emitter, index, area_density, mi.Float(0), ps, met)
-                pdf = by_area * self._direction_pdf(si, -direction, met) / dr.maximum(cosine, 1e-12)
-                found = dr.select(met, pdf, found)
+                by_area = lights.lamps.of_shape(emitter, index, area_density, mi.Float(0), ps, hit)
+                pdf = by_area * self._direction_pdf(si, -direction, hit) / dr.maximum(cosine, 1e-12)
+                result = dr.select(hit, pdf, result)
             if one == INFINITE:
-                met = active & ~si.is_valid()
+                hit = active & ~si.is_valid()
                 it = dr.zeros(mi.SurfaceInteraction3f)
                 it.p = self.centre
                 ds = dr.zeros(mi.DirectionSample3f)
                 ds.d, ds.emitter = direction, emitter
-                pdf = emitter.pdf_direction(it, ds, met) * self._line_pdf(origin, direction)
-                found = dr.select(met, pdf, found)
-        return found * probability
+                pdf = emitter.pdf_direction(it, ds, hit) * self._line_pdf(origin, direction)
+                result = dr.select(hit, pdf, result)
+        return result * probability
 
     # ------------------------------------------------------------------ of each kind
 
@@ -226,7 +230,7 @@ class Sources:
         active: Mask,
     ) -> Particle:
         mi, lights = self.mi, self.lights
-        ps = lights.on_area(emitter, number, place, active)
+        ps = lights.lamps.on_area(emitter, number, place, active)
         si = mi.SurfaceInteraction3f(ps, wavelengths) if mi.is_spectral else mi.SurfaceInteraction3f(ps, [])
         two_sided = dr.gather(mi.Bool, self.two_sided, number, active)
         if self.targets is not None:
@@ -239,14 +243,15 @@ class Sources:
         cosine = dr.abs(si.wi.z)
         pdf = self._direction_pdf(si, direction, active, two_sided)
         shines = active & (two_sided | (si.wi.z > 0)) & (pdf > 0)
-        if lights.balls is not None:  # into one that is smaller than the step off a surface: out at its other side
-            radius = dr.gather(mi.Vector4f, lights.balls, number, active).w
+        if lights.lamps.spheres is not None:
+            # into one that is smaller than the step off a surface: out at its other side
+            radius = dr.gather(mi.Vector4f, lights.lamps.spheres, number, active).w
             inward = (radius != 0.0) & (si.wi.z * radius < 0.0)
-            shines &= ~inward | (abs(radius) > lights.off(ps.p, ps.p))
+            shines &= ~inward | (abs(radius) > shadow_offset(mi, ps.p, ps.p))
         density = ps.pdf * pdf / dr.maximum(cosine, 1e-12)
         flux = dr.select(shines, emitter.eval(si, shines) / density, 0)
-        seen = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
-        return Particle(si.p, direction, emitter, si, mi.UInt32(SURFACE), flux, density, seen)
+        direct_weight = mi.Spectrum(dr.select(ps.pdf > 0, dr.rcp(ps.pdf), 0))
+        return Particle(si.p, direction, emitter, si, mi.UInt32(SURFACE), flux, density, direct_weight)
 
     def _direction_pdf(
         self, si: SurfaceInteraction, direction: Vector, active: Mask, two_sided: Mask | None = None
@@ -283,7 +288,7 @@ class Sources:
         place_ = self._nowhere(wavelengths)
         return Particle(origin, direction, emitter, place_, mi.UInt32(POINT), flux, mi.Float(UNMET), mi.Spectrum(0))
 
-    def _from_afar(
+    def _from_infinite(
         self,
         number: UInt,
         emitter: Emitter,
@@ -309,9 +314,9 @@ class Sources:
         density = dr.select(parallel, UNMET, ds.pdf * by_area)
         flux = dr.select(active & (by_area > 0), weight / by_area, 0)
         origin = mi.Point3f(point - direction * outside)
-        seen = dr.select(parallel, 0, weight)
+        direct_weight = dr.select(parallel, 0, weight)
         place_ = self._nowhere(wavelengths)
-        return Particle(origin, direction, emitter, place_, mi.UInt32(INFINITE), flux, density, seen)
+        return Particle(origin, direction, emitter, place_, mi.UInt32(INFINITE), flux, density, direct_weight)
 
     def _line_pdf(self, point: Point, direction: Vector) -> Float:
         if self.targets is not None:

@@ -11,8 +11,8 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bridge import engine
-from ...bridge.types import Float, Mask, UInt, Whole
+from ..bridge.faults.borrowed_memory import own
+from ..bridge.types import Float, Mask, UInt, Whole
 
 
 @dataclass
@@ -33,23 +33,23 @@ class Sums:
     @staticmethod
     def zeros(mi: ModuleType, lanes: int, radiance: int, features: int, pixels: int = 0) -> Sums:
         """Of so many numbers each; `pixels`: of a picture that is splatted, else 0."""
-        found, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (radiance, features))
+        totals, more = ([dr.zeros(mi.Float64, lanes) for _ in range(count)] for count in (radiance, features))
         splats = [dr.zeros(mi.Int64, pixels) for _ in range(3 if pixels else 0)]
-        sums = Sums(found, more, dr.zeros(mi.UInt32, lanes), splats)
+        sums = Sums(totals, more, dr.zeros(mi.UInt32, lanes), splats)
         dr.make_opaque(sums)  # zeros as data: else the first pass would be a kernel of its own
         return sums
 
     def at(self, lane: UInt) -> Sums:
         """Those of the lanes with these numbers."""
-        found, more = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.radiance, self.features))
-        return Sums(found, more, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
+        totals, more = ([dr.gather(type(s), s, lane) for s in sums] for sums in (self.radiance, self.features))
+        return Sums(totals, more, dr.gather(type(self.invalid), self.invalid, lane), self.splats)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Each sum by its name; a view where the device is the CPU, but for splats, which are added to in place."""
-        found = {f"radiance{i}": np.asarray(values) for i, values in enumerate(self.radiance)}
-        found |= {f"feature{i}": np.asarray(values) for i, values in enumerate(self.features)}
-        found |= {f"splat{i}": np.array(values) for i, values in enumerate(self.splats)}
-        return {**found, "invalid": np.asarray(self.invalid)}
+        totals = {f"radiance{i}": np.asarray(values) for i, values in enumerate(self.radiance)}
+        totals |= {f"feature{i}": np.asarray(values) for i, values in enumerate(self.features)}
+        totals |= {f"splat{i}": np.array(values) for i, values in enumerate(self.splats)}
+        return {**totals, "invalid": np.asarray(self.invalid)}
 
     @staticmethod
     def of_arrays(mi: ModuleType, arrays: Mapping[str, NDArray[Any]], lanes: int, like: Sums) -> Sums:
@@ -60,21 +60,21 @@ class Sums:
             if name not in arrays or arrays[name].shape != (entries,) or arrays[name].dtype != values.dtype:
                 raise ValueError(f"no sums '{name}' of {lanes} lanes")
 
-        def taken(name: str) -> Float:
+        def restored(name: str) -> Float:
             kind = {"f": mi.Float64, "i": mi.Int64, "u": mi.UInt32}[arrays[name].dtype.kind]
-            return engine.own(kind, arrays[name])
+            return own(kind, arrays[name])
 
-        radiance = [taken(f"radiance{i}") for i in range(len(like.radiance))]
-        found = Sums(radiance, [taken(f"feature{i}") for i in range(len(like.features))], taken("invalid"))
-        found.splats = [taken(f"splat{i}") for i in range(len(like.splats))]
-        return found
+        radiance = [restored(f"radiance{i}") for i in range(len(like.radiance))]
+        totals = Sums(radiance, [restored(f"feature{i}") for i in range(len(like.features))], restored("invalid"))
+        totals.splats = [restored(f"splat{i}") for i in range(len(like.splats))]
+        return totals
 
     def add(self, radiance: Sequence[Float], ended: Mask, features: Sequence[Float], begun: Mask) -> Sums:
         """With the radiance of samples that have ended, and the features of those that have begun."""
-        found, lost = self._add(self.radiance, radiance, ended)
+        totals, lost = self._add(self.radiance, radiance, ended)
         more, lost_too = self._add(self.features, features, begun)
         lost = lost if lost_too is None else lost | lost_too
-        return Sums(found, more, self.invalid + dr.select(lost, type(self.invalid)(1), 0), self.splats)
+        return Sums(totals, more, self.invalid + dr.select(lost, type(self.invalid)(1), 0), self.splats)
 
     def _add(self, sums: list[Float], values: Sequence[Float], active: Mask) -> tuple[list[Float], Mask]:
         """(sums, lanes of values that are not finite); none of these where there are no sums."""

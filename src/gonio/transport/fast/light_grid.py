@@ -12,24 +12,24 @@ from types import ModuleType
 import drjit as dr
 import numpy as np
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import Emitter, Float, Mask, Point, Scene, UInt
 from ..lights.sky import Choice
 
 CELLS = 8  # a side, at most
-MOST = 1 << 21  # numbers of a table
+MAX_ENTRIES = 1 << 21  # of a table
 POINTS = 4  # of a cell, at which lamps are looked at
 EVEN = 0.25  # of the choice, or one over their number: of a lamp and a sky each gets a quarter of the samples at least
 
 
-class Nearby:
-    """Probabilities of lamps, cell by cell."""
+class LightGrid:
+    """Probabilities of the lights, cell by cell."""
 
     def __init__(self, mi: ModuleType, scene: Scene, emitters: Sequence[Emitter]) -> None:
         self.mi, count = mi, len(emitters)
         self.columns = 1 << (count - 1).bit_length()
         self.cells = CELLS
-        while self.cells > 1 and self.cells**3 * self.columns > MOST:
+        while self.cells > 1 and self.cells**3 * self.columns > MAX_ENTRIES:
             self.cells //= 2
         box = scene.bbox()
         low, size = (
@@ -59,7 +59,7 @@ class Nearby:
         table[:, :count] = (1.0 - even) * table[:, :count] + even / count
         sums = np.cumsum(table, axis=1)
         sums[:, count - 1 :] = 1.0
-        self._chance = engine.own(mi.Float, table.ravel().astype(np.float32))
+        self._chance = own(mi.Float, table.ravel().astype(np.float32))
         self._choice = Choice(mi, sums)
 
     def _row(self, p: Point) -> UInt:

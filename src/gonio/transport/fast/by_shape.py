@@ -16,8 +16,9 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bridge import engine, plugin_search
-from ..bridge.types import Colour, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
+from ...bridge import plugin_search
+from ...bridge.faults.borrowed_memory import own
+from ...bridge.types import Color, Float, Mask, OfVariant, PluginDict, Properties, Scene, SurfaceInteraction, Texture
 
 Numbers: TypeAlias = tuple[float, ...]  # a number, or red, green and blue
 Place: TypeAlias = tuple[str, ...]  # of a property, through the plugins around it
@@ -78,9 +79,9 @@ def structure(plugin: PluginDict) -> Hashable:
 def properties(plugin: PluginDict, outer: Place = ()) -> Iterator[tuple[Place, Numbers]]:
     """The numbers in which plugins of one structure may differ."""
     for name, value in plugin.items():
-        found = None if name in _WHOLE else _numbers(value)
-        if found is not None:
-            yield (*outer, name), found
+        result = None if name in _WHOLE else _numbers(value)
+        if result is not None:
+            yield (*outer, name), result
         elif isinstance(value, dict) and value["type"] != "rgb":
             yield from properties(value, (*outer, name))
 
@@ -100,16 +101,16 @@ def _numbers(value: object) -> Numbers | None:
 
 
 def _replaced(plugin: PluginDict, values: Mapping[Place, Texture], outer: Place = ()) -> PluginDict:
-    found: PluginDict = {}
+    result: PluginDict = {}
     for name, value in plugin.items():
         here = (*outer, name)
         if here in values:
-            found[name] = values[here]
+            result[name] = values[here]
         elif isinstance(value, dict) and value["type"] != "rgb":
-            found[name] = _replaced(value, values, here)
+            result[name] = _replaced(value, values, here)
         else:
-            found[name] = value
-    return found
+            result[name] = value
+    return result
 
 
 def _register(mi: ModuleType) -> None:
@@ -143,12 +144,12 @@ def _texture_class(mi: ModuleType) -> OfVariant:
 
         def bind(self, row: NDArray[np.intp]) -> None:
             """`row` of each shape, by its number in kernels."""
-            self.table = engine.own(mi.Float, self.rows[row].ravel().astype(np.float32))
+            self.table = own(mi.Float, self.rows[row].ravel().astype(np.float32))
 
         def is_spatially_varying(self) -> bool:
             return True
 
-        def eval(self, si: SurfaceInteraction, active: Mask = True) -> Colour:
+        def eval(self, si: SurfaceInteraction, active: Mask = True) -> Color:
             return mi.UnpolarizedSpectrum(dr.gather(mi.Color3f, self.table, self._number(si), active))
 
         def eval_1(self, si: SurfaceInteraction, active: Mask = True) -> Float:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gonio.bridge import engine
-from gonio.transport.fast import nearby
+from gonio.transport.fast import light_grid
 from gonio.transport.integrators import Render, Settings
 
 mi = engine.load()
@@ -35,7 +35,7 @@ def scene() -> Any:
 
 
 def test_lamps_are_chosen_as_often_as_it_says(scene: Any) -> None:
-    found = nearby.Nearby(mi, scene, scene.emitters())
+    found = light_grid.LightGrid(mi, scene, scene.emitters())
     n = 1 << 14
     u = (dr.arange(mi.Float, n) + 0.5) / n
     for place in ([-2.0, 0.0, -2.0], [0.3, 0.0, 0.9], [50.0, 0.0, 0.0]):  # the last lies outside of the scene
@@ -43,7 +43,7 @@ def test_lamps_are_chosen_as_often_as_it_says(scene: Any) -> None:
         index, left, chance = found.choose(p, u)
         often = np.bincount(np.array(index), minlength=9) / n
         told = np.array([found.probability(p, mi.UInt32(i), mi.Bool(True))[0] for i in range(9)])
-        assert told.sum() == pytest.approx(1, abs=1e-5) and told.min() >= nearby.EVEN / 9 - 1e-6
+        assert told.sum() == pytest.approx(1, abs=1e-5) and told.min() >= light_grid.EVEN / 9 - 1e-6
         np.testing.assert_allclose(often, told, atol=2e-4)
         np.testing.assert_allclose(np.array(chance), told[np.array(index)], rtol=1e-6)
         assert np.array(left).min() >= 0 and np.array(left).max() <= 1

@@ -12,7 +12,7 @@ from types import ModuleType
 import drjit as dr
 import numpy as np
 
-from ...bridge import engine
+from ...bridge.faults.borrowed_memory import own
 from ...bridge.types import (
     DirectionSample,
     Emitter,
@@ -22,27 +22,31 @@ from ...bridge.types import (
     OfVariant,
     Point,
     Radiance,
-    Record,
+    Scene,
     Shape,
+    SurfaceInteraction,
     UInt,
     Vector,
 )
-from ..lights.solid_angles import STRAIGHT, Ball, Rectangle, RectangularArea, Seen, SphericalCap, is_sphere
-from ..surfaces import reader
+from ..lights.base import LightHit, LightSample, with_shadow_target
+from ..lights.directions import direction_sample
+from ..lights.lamps import Lamps
+from ..lights.solid_angles import STRAIGHT, Ball, Rectangle, RectangularArea, Seen, SphericalCap
+from ..placement import placement_reader
 
 NONE, RECTANGLE, BALL = 0, 1, 2
 
 
-class Lamps:
-    """The lamps among `emitters` that are known here; the others are for who asks.
+class LampTable:
+    """A row per emitter: rectangles and balls of even radiance; the others are not known here.
 
-    known    which of `emitters`, a list of bool
+    known  which of `emitters` are, a list of bool
     """
 
     def __init__(self, mi: ModuleType, emitters: Sequence[Emitter], pointers: OfVariant):
         self.mi = mi
         rows = np.zeros((max(len(emitters), 1), 4, 4))
-        read = reader(mi)
+        read = placement_reader(mi)
         for row, emitter in zip(rows, emitters, strict=False):
             if shines_evenly(mi, emitter):
                 shape = emitter.get_shape()
@@ -52,13 +56,13 @@ class Lamps:
                     row[3, 1] = getattr(emitter, "two_sided", False)
         self.known = [bool(row[3, 0] != NONE) for row in rows[: len(emitters)]]
         self.kinds = sorted({int(row[3, 0]) for row in rows} - {NONE})
-        self.table = engine.own(mi.Float, rows.ravel().astype(np.float32))
+        self.table = own(mi.Float, rows.ravel().astype(np.float32))
         self.radiance: Float | None = None
         if mi.is_rgb and self.kinds:
             si = dr.zeros(mi.SurfaceInteraction3f, len(emitters))
             si.wi = mi.Vector3f(0, 0, 1)
             sent = np.array(pointers.eval(si, mi.Bool(self.known)), np.float32).reshape(3, -1)
-            self.radiance = engine.own(mi.Float, sent.T.ravel())
+            self.radiance = own(mi.Float, sent.T.ravel())
 
     def row(self, index: UInt, active: Mask) -> OfVariant:
         """The numbers of a lamp."""
@@ -69,13 +73,13 @@ class Lamps:
 
     def _seen(self, row: OfVariant, origin: Point) -> list[tuple[Mask, Seen]]:
         """(lanes for which it holds, the lamp as it is seen from a point) for each kind that there is."""
-        mi, found = self.mi, list[tuple[Mask, Seen]]()
+        mi, result = self.mi, list[tuple[Mask, Seen]]()
         if RECTANGLE in self.kinds:
-            found.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
+            result.append((row[3, 0] == RECTANGLE, RectangularArea(_rectangle(mi, row), origin)))
         if BALL in self.kinds:
             place = mi.Point3f(row[0, 0], row[0, 1], row[0, 2])
-            found.append((row[3, 0] == BALL, SphericalCap(mi, Ball(place, row[1, 3], row[0, 3]), origin)))
-        return found
+            result.append((row[3, 0] == BALL, SphericalCap(mi, Ball(place, row[1, 3], row[0, 3]), origin)))
+        return result
 
     def sample(self, row: OfVariant, it: Interaction, u: Point) -> DirectionSample:
         """A direction toward a lamp: uniform in the solid angle of a ball, on the area of a rectangle.
@@ -83,24 +87,93 @@ class Lamps:
         Rectangles by solid angle have 6 % less error beside several near lamps, and take 25 % more time: a path that
         meets a lamp has to measure it again.
         """
-        found: DirectionSample | None = None
-        for here, seen in self._seen(row, it.p):
-            ds = direction_sample(self.mi, seen, u, it)
-            found = ds if found is None else dr.select(here, ds, found)
-        return found
+        result: DirectionSample | None = None
+        for here, view in self._seen(row, it.p):
+            ds = direction_sample(self.mi, view, u, it)
+            result = ds if result is None else dr.select(here, ds, result)
+        return result
 
     def pdf(self, row: OfVariant, origin: Point, distance: Float, cosine: Float) -> Float:
         """Density (1/sr) of `sample` toward a point met at `distance` under |cosine|."""
-        found = self.mi.Float(0)
-        for here, seen in self._seen(row, origin):
-            found = dr.select(here, seen.pdf(distance, cosine), found)
-        return found
+        result = self.mi.Float(0)
+        for here, view in self._seen(row, origin):
+            result = dr.select(here, view.pdf(distance, cosine), result)
+        return result
 
     def sent(self, row: OfVariant, index: UInt, normal: Vector, direction: Vector, active: Mask) -> Radiance:
         """Radiance of a lamp in `direction`, away from its surface; of rgb variants, the others' is not in a table."""
         mi = self.mi
         shines = (row[3, 1] != 0) | (dr.dot(normal, direction) > 0)
         return dr.select(shines & active, dr.gather(mi.Color3f, self.radiance, index, active), 0)
+
+
+class TabledLamps(Lamps):
+    """Lamps of which some, or all, are sampled from a table; the others are asked."""
+
+    table: LampTable
+    index_of_pointer: UInt | None
+
+    @classmethod
+    def of(
+        cls,
+        mi: ModuleType,
+        scene: Scene,
+        emitters: Sequence[Emitter],
+        scene_indices: UInt,
+        environment: int,
+        pointers: OfVariant,
+        index_of_pointer: UInt | None,
+    ) -> TabledLamps | None:
+        """None where no lamp is known.
+
+        pointers          Dr.Jit's to the emitters
+        index_of_pointer  their index by that pointer's number, where there are several
+        """
+        table = LampTable(mi, emitters, pointers)
+        if not table.kinds:
+            return None
+        lamps = cls(mi, scene, emitters, scene_indices, environment)
+        lamps.table, lamps.index_of_pointer = table, index_of_pointer
+        others = [i for i, known in enumerate(table.known) if not known and i != environment]
+        lamps.asks = bool(others)
+        # whether a ray may meet a lamp whose radiance is not in the table
+        lamps.asks_met = any(emitters[i].get_shape() is not None for i in others) or table.radiance is None
+        return lamps
+
+    asks = asks_met = False
+
+    def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
+        if self.asks_met or self.index_of_pointer is None:
+            return super().emitted(si, active)
+        mi = self.mi
+        number = dr.reinterpret_array(mi.UInt32, si.emitter(self.scene, active))
+        here = active & (number > 0)
+        index = dr.gather(mi.UInt32, self.index_of_pointer, number, here)
+        row = self.table.row(index, here)
+        return dr.select(here, self.table.sent(row, index, si.n, si.to_world(si.wi), here), 0)
+
+    def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
+        mi, table = self.mi, self.table
+        emitter = self.emitter(index, active)
+        row = table.row(index, active)
+        known = active & table.is_known(row)
+        ds = table.sample(row, si, u)
+        if table.radiance is not None:
+            sent = table.sent(row, index, ds.n, -ds.d, known)
+        else:
+            sent = self.sent(emitter, ds, si, known)
+        light = with_shadow_target(mi, si, ds, dr.select(ds.pdf > 0, sent / ds.pdf, 0))
+        if not self.asks:
+            return light
+        asked = with_shadow_target(mi, si, *self._asked(emitter, index, si, u, active & ~known))
+        return dr.select(known, light, asked)
+
+    def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:
+        row = self.table.row(index, active)
+        known = active & self.table.is_known(row)
+        others = super().pdf(hit, index, active & ~known) if self.asks else self.mi.Float(0)
+        cosine = dr.abs(dr.dot(hit.ds.d, hit.ds.n))
+        return dr.select(known, self.table.pdf(row, hit.origin, hit.ds.dist, cosine), others)
 
 
 def has_known_sides(emitter: Emitter) -> bool:
@@ -114,27 +187,14 @@ def shines_evenly(mi: ModuleType, emitter: Emitter) -> bool:
     return has_known_sides(emitter) and not mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying)
 
 
-def balls(mi: ModuleType, emitters: Sequence[Emitter]) -> Float | None:
-    """Four numbers for each lamp: the centre of a sphere and its radius, which is negative where the normal points
-    inward; 0 of lamps that are none. None where no lamp is one."""
-    rows, read = np.zeros((len(emitters), 4)), reader(mi)
-    for row, emitter in zip(rows, emitters, strict=True):
-        shape = emitter.get_shape() if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface) else None
-        if shape is not None and is_sphere(mi, shape):
-            to_world = np.array(read(shape)).reshape(4, 4)
-            radius = np.linalg.norm(to_world[:3, 0])
-            row[:] = *to_world[:3, 3], -radius if shape.has_flipped_normals() else radius
-    return engine.own(mi.Float, rows.astype(np.float32).ravel()) if np.any(rows[:, 3]) else None
-
-
 def rectangle_of(mi: ModuleType, shape: Shape) -> Rectangle | None:
     """The rectangle that a shape is, as data of the kernel: moving it recompiles nothing. None where it is none."""
     row = np.zeros((4, 4))
     if shape.class_name() == "Rectangle":
-        _fill(row, "Rectangle", np.array(reader(mi)(shape)).reshape(4, 4), shape.has_flipped_normals())
+        _fill(row, "Rectangle", np.array(placement_reader(mi)(shape)).reshape(4, 4), shape.has_flipped_normals())
     if row[3, 0] != RECTANGLE:
         return None
-    table = engine.own(mi.Float, row.ravel().astype(np.float32))
+    table = own(mi.Float, row.ravel().astype(np.float32))
     return _rectangle(mi, dr.gather(mi.Matrix4f, table, mi.UInt32(0)))
 
 
@@ -144,7 +204,7 @@ def _rectangle(mi: ModuleType, row: OfVariant) -> Rectangle:
 
 
 def _fill(row: np.ndarray, kind: str, to_world: np.ndarray, flipped: bool) -> None:
-    """What `Lamps._seen` reads: place and side of the normal; of rectangles axes and lengths, of balls the radius."""
+    """The row of a lamp: position and side of the normal; of rectangles axes and lengths, of balls the radius."""
     side = -1.0 if flipped else 1.0
     if kind == "Sphere":
         row[0], row[1, 3], row[3, 0] = (*to_world[:3, 3], side), np.linalg.norm(to_world[:3, 0]), BALL
@@ -155,23 +215,3 @@ def _fill(row: np.ndarray, kind: str, to_world: np.ndarray, flipped: bool) -> No
         return
     row[0] = *(to_world[:3, 3] - 0.5 * edges.sum(0)), side * np.sign(np.linalg.det(to_world[:3, :3]))
     row[1:3, :3], row[1:3, 3], row[3, 0] = edges / lengths[:, None], lengths, RECTANGLE
-
-
-def direction_sample(mi: ModuleType, seen: Seen, sample: Point, it: Interaction) -> DirectionSample:
-    """A Mitsuba direction sample toward a lamp as it is seen from `it`."""
-    ps = dr.zeros(mi.PositionSample3f, dr.width(it.p))
-    point, normal, uv, pdf = seen.sample(sample.x, sample.y)
-    ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(normal), mi.Point2f(*uv), it.time
-    ds = toward(mi, ps, it)
-    ds.pdf = pdf
-    return ds
-
-
-def toward(mi: ModuleType, ps: Record, it: Interaction) -> DirectionSample:
-    """The direction sample of a position sample, without its density."""
-    ds = mi.DirectionSample3f(ps)
-    away = ps.p - it.p
-    ds.dist = dr.norm(away)
-    ds.d = away / ds.dist
-    ds.delta = mi.Bool(False)
-    return ds

@@ -1,0 +1,76 @@
+"""A scene lit by a single rectangle, as most of the lab's are.
+
+No choice of a light and no call from the kernel: the rectangle is sampled uniformly in its solid angle, whether the
+emitter is `gonio_area` or Mitsuba's one-sided `area`, and for the last ray of a path a hit test of one rectangle and a
+shadow ray take the place of the nearest surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import ModuleType
+
+import drjit as dr
+
+from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Ray, Scene, SurfaceInteraction, UInt
+from ..lights.base import LightHit, LightSample, shadow_offset, with_shadow_target
+from ..lights.directions import direction_sample
+from ..lights.lamps import Lamps
+from ..lights.solid_angles import Rectangle, SphericalRectangle
+from ..surfaces import Surfaces
+from .lamp_table import has_known_sides, rectangle_of
+
+
+class RectangleLight(Lamps):
+    """The only light of a scene, a rectangle."""
+
+    rectangle: Rectangle
+    surfaces: Surfaces
+
+    @classmethod
+    def of(
+        cls,
+        mi: ModuleType,
+        scene: Scene,
+        emitters: Sequence[Emitter],
+        scene_indices: UInt,
+        environment: int,
+        surfaces: Surfaces,
+    ) -> RectangleLight | None:
+        """None where the only light is no rectangle."""
+        rectangle = rectangle_of(mi, emitters[0].get_shape()) if has_known_sides(emitters[0]) else None
+        if rectangle is None:
+            return None
+        dr.make_opaque(rectangle)
+        light = cls(mi, scene, emitters, scene_indices, environment)
+        light.rectangle, light.surfaces = rectangle, surfaces
+        return light
+
+    def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
+        view = SphericalRectangle(self.rectangle, si.p)
+        ds = direction_sample(self.mi, view, u, si)
+        light = with_shadow_target(self.mi, si, ds, self.sent(self.emitters[0], ds, si, active) / ds.pdf)
+        light.solid_angle = dr.select(view.uniform, view.solid_angle, 0)
+        return light
+
+    def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:
+        away = hit.si.p - hit.origin
+        distance = dr.norm(away)
+        return self.rectangle.pdf(hit.solid_angle, distance, dr.abs(dr.dot(away, hit.si.n)) / distance)
+
+    def along(self, ray: Ray, solid_angle: Float, active: Mask) -> tuple[Radiance, Float]:
+        """The radiance that arrives along a ray, and the density of `sample` in its direction."""
+        mi = self.mi
+        distance, uv, hit = self.rectangle.hit(ray.o, ray.d)
+        active = active & hit & (distance < ray.maxt)
+        ds = dr.zeros(mi.DirectionSample3f)
+        ds.n, ds.d, ds.uv = mi.Normal3f(self.rectangle.normal), ray.d, mi.Point2f(*uv)
+        at_light = mi.SurfaceInteraction3f(ds, ray.wavelengths)
+        at_light.wi = at_light.to_local(-ray.d)
+        radiance = self.emitters[0].eval(at_light, active)
+        shadow = mi.Ray3f(ray)
+        shadow.maxt = distance - shadow_offset(mi, ray.o, ray(distance))
+        active &= dr.any(radiance != 0)
+        active &= ~self.surfaces.blocked(shadow, active)
+        pdf = self.rectangle.pdf(solid_angle, distance, dr.abs(dr.dot(ray.d, self.rectangle.normal)))
+        return dr.select(active, radiance, 0), pdf

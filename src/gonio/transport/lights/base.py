@@ -1,0 +1,90 @@
+"""What every kind of light answers: the radiance it emits, a sample of it, and the density of that sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+
+import drjit as dr
+
+from ...bridge.types import DirectionSample, Float, Interaction, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
+
+
+@dataclass
+class LightSample:
+    """A sample of the light that arrives at a point.
+
+    ds           Mitsuba's direction sample: direction, distance, density in 1/sr
+    target       the point up to which a shadow ray must be free
+    weight       radiance over density
+    delta        whether the light is a point or a parallel beam, which no BSDF sample can meet
+    solid_angle  of a rectangle sampled uniformly in it, else 0
+    """
+
+    ds: DirectionSample
+    target: Point
+    weight: Radiance
+    delta: Mask
+    solid_angle: Float
+
+
+class LightHit:
+    """A light met at `si` by a ray from `origin`; `solid_angle` is that of the `LightSample` taken there."""
+
+    def __init__(self, mi: ModuleType, scene: Scene, origin: Point, solid_angle: Float, si: SurfaceInteraction) -> None:
+        self.mi, self.scene, self.origin, self.solid_angle, self.si = mi, scene, origin, solid_angle, si
+
+    @cached_property
+    def it(self) -> Interaction:
+        """The origin as Mitsuba's emitters take it."""
+        it = dr.zeros(self.mi.SurfaceInteraction3f)
+        it.p = self.origin
+        return it
+
+    @cached_property
+    def ds(self) -> DirectionSample:
+        """The direction sample that leads from the origin to the light."""
+        return self.mi.DirectionSample3f(self.scene, self.si, self.it)
+
+
+class LightSampler:
+    """One or several lights of a scene that are sampled by one method.
+
+    index  the light's place in `Lights.emitters`
+    """
+
+    def owns(self, si: SurfaceInteraction) -> Mask:
+        """Whether a ray that ended at `si` may have met one of these lights."""
+        raise NotImplementedError
+
+    def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
+        """Radiance that the light at `si` sends back along the ray."""
+        raise NotImplementedError
+
+    def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
+        """A direction from `si` toward light `index`, from two numbers in [0, 1)."""
+        raise NotImplementedError
+
+    def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:
+        """Density (1/sr) with which `sample` chooses the direction of `hit`."""
+        raise NotImplementedError
+
+
+def with_shadow_target(mi: ModuleType, si: SurfaceInteraction, ds: DirectionSample, weight: Radiance) -> LightSample:
+    """A light sample whose shadow ray ends as far off the lamp's surface as it begins off that of `si`.
+
+    A ray that ended on the surface itself would let a round lamp hide its own limb. Nothing arrives from closer, where
+    positions consist of rounding errors.
+    """
+    offset = shadow_offset(mi, si.p, ds.p)
+    normal = dr.select(dr.any(ds.n != 0), ds.n, -ds.d)  # a point has none
+    target = mi.Point3f(ds.p - normal * dr.mulsign(offset, dr.dot(normal, ds.d)))
+    weight = dr.select(ds.delta | (ds.dist > offset), weight, 0)
+    return LightSample(ds, target, weight, mi.Bool(ds.delta), mi.Float(0))
+
+
+def shadow_offset(mi: ModuleType, p: Point, q: Point) -> Float:
+    """How far off the surfaces a ray between two points begins and ends."""
+    reach = dr.maximum(dr.max(dr.abs(p)), dr.max(dr.abs(q)))
+    return mi.math.RayEpsilon * (1 + reach)

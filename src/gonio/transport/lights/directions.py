@@ -1,0 +1,49 @@
+"""Mitsuba's direction samples toward lamps, from points on them and their densities."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import drjit as dr
+
+from ...bridge.types import DirectionSample, Float, Interaction, Mask, Point, PositionSample, Record, Shape
+from .solid_angles import Seen
+
+
+def direction_sample(mi: ModuleType, view: Seen, sample: Point, it: Interaction) -> DirectionSample:
+    """A direction sample toward a lamp as it is seen from `it`, from two numbers in [0, 1)."""
+    ps = dr.zeros(mi.PositionSample3f, dr.width(it.p))
+    point, normal, uv, pdf = view.sample(sample.x, sample.y)
+    ps.p, ps.n, ps.uv, ps.time = point, mi.Normal3f(normal), mi.Point2f(*uv), it.time
+    ds = toward(mi, ps, it)
+    ds.pdf = pdf
+    return ds
+
+
+def area_sample(mi: ModuleType, ps: PositionSample, it: Interaction) -> DirectionSample:
+    """A direction sample from a point sampled by area: pdf per steradian = pdf per area * r^2 / |cos|."""
+    ds = toward(mi, ps, it)
+    ds.pdf = per_steradian(ps.pdf, ds)
+    return ds
+
+
+def toward(mi: ModuleType, ps: Record, it: Interaction) -> DirectionSample:
+    """The direction sample of a position sample, without its density."""
+    ds = mi.DirectionSample3f(ps)
+    away = ps.p - it.p
+    ds.dist = dr.norm(away)
+    ds.d = away / ds.dist
+    ds.delta = mi.Bool(False)
+    return ds
+
+
+def area_density(shape: Shape, ps: PositionSample, active: Mask) -> Float:
+    """Density per area with which a shape samples its own points."""
+    density: Float = shape.pdf_position(ps, active)
+    return density
+
+
+def per_steradian(pdf: Float, ds: DirectionSample) -> Float:
+    """A density per area as one per solid angle."""
+    cosine = dr.abs(dr.dot(ds.d, ds.n))
+    return dr.select(cosine > 0, pdf * dr.square(ds.dist) / cosine, 0)

@@ -1,0 +1,60 @@
+"""The environment as a light: by Mitsuba's own sampling, or by the density of `sky.py`."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import drjit as dr
+
+from ...bridge.types import Emitter, Float, Mask, Point, Radiance, Scene, SurfaceInteraction, UInt
+from .base import LightHit, LightSample, LightSampler, with_shadow_target
+from .sky import Sky
+
+
+class Environment(LightSampler):
+    """What rays that leave the scene meet."""
+
+    def __init__(self, mi: ModuleType, emitter: Emitter) -> None:
+        self.mi, self.emitter = mi, emitter
+
+    def owns(self, si: SurfaceInteraction) -> Mask:
+        return ~si.is_valid()
+
+    def emitted(self, si: SurfaceInteraction, active: Mask) -> Radiance:
+        return self.emitter.eval(si, active)
+
+    def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
+        return with_shadow_target(self.mi, si, *self.emitter.sample_direction(si, u, active))
+
+    def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:
+        return self.emitter.pdf_direction(hit.it, hit.ds, active)
+
+
+class VaryingEnvironment(Environment):
+    """An environment map, sampled by its brightness."""
+
+    def __init__(self, mi: ModuleType, emitter: Emitter, sky: Sky) -> None:
+        super().__init__(mi, emitter)
+        self.sky = sky
+
+    def sample(self, si: SurfaceInteraction, u: Point, index: UInt, active: Mask) -> LightSample:
+        mi = self.mi
+        ds = dr.zeros(mi.DirectionSample3f, dr.width(si.p))
+        ds.d, ds.p, ds.pdf, radiance = self.sky.sample(si, u, active)
+        ds.dist, ds.n, ds.time, ds.delta = dr.norm(ds.p - si.p), mi.Normal3f(-ds.d), si.time, mi.Bool(False)
+        return LightSample(ds, ds.p, dr.select(ds.pdf > 0, radiance / ds.pdf, 0), mi.Bool(False), mi.Float(0))
+
+    def pdf(self, hit: LightHit, index: UInt, active: Mask) -> Float:
+        return self.sky.pdf(hit.ds.d)
+
+
+def environment(mi: ModuleType, scene: Scene, emitter: Emitter, mis_compensation: bool) -> Environment:
+    """The sampler of an environment.
+
+    mis_compensation  whether BSDFs are sampled too, to which the even part of a map is left (Karlik2019)
+    """
+    if "data" in dict(mi.traverse(emitter)):
+        sky = Sky(mi, scene, emitter, mis_compensation)
+        if sky.known:
+            return VaryingEnvironment(mi, emitter, sky)
+    return Environment(mi, emitter)

@@ -1,0 +1,197 @@
+"""Particles on their way from the lamps: the steps that `light` and `caustics` share.
+
+    leave -> [ intersect -> sample_bsdf, eval_bsdf -> follow ]
+
+A particle arrives at a surface with a flux; what leaves again is the adjoint of what a path does: radiance's (eta_o /
+eta_i)^2 is left out, and where shading and geometric normals differ the flux is corrected (Veach1997, sec. 5.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+
+from ..bridge.adapter.variant import DISPERSES
+from ..bridge.faults.bent_normals import bends_normals
+from ..bridge.types import (
+    BSDFSample,
+    DirectionSample,
+    Float,
+    Hit,
+    Mask,
+    Radiance,
+    Ray,
+    SurfaceInteraction,
+    UInt,
+    Vector,
+)
+from . import sampler
+from .lights.sources import Particle, Sources, Targets
+from .scattering import Vertex, keep_hero
+from .scene_data import SceneData
+
+# Dimensions of a particle: at the lamp, and at each vertex.
+PICK, PLACE, WAY, AIM, FIRST_VERTEX = 0, 1, 2, 3, 4
+LOBE, CHOICE, LENS, VERTEX_DIMENSIONS = 0, 1, 2, 3
+
+ROULETTE_DEPTH = 5  # segments, as along paths
+
+
+@dataclass
+class Flight:
+    """Particles on their way, one per lane."""
+
+    depth: UInt  # segments traced, the one to `hit` with them
+    ray: Ray
+    hit: Hit
+    flux: Radiance  # with which it left the lamp
+    throughput: Radiance  # the part of it that is left
+    eta: Float  # product of the relative indices on the way: of where it is over where it began
+    hero_only: UInt
+    inside: UInt
+    active: Mask
+
+    @property
+    def dimension(self) -> UInt:
+        """Of the first random number of its next vertex."""
+        return self.depth * VERTEX_DIMENSIONS + (FIRST_VERTEX - VERTEX_DIMENSIONS)
+
+
+class Particles:
+    """The particles of a picture. Number n = (low, high) is the same whoever traces it: all are one sequence.
+
+    max_depth  the longest path in segments, as data of the kernel
+    targets    where they go; None: everywhere
+    """
+
+    def __init__(self, data: SceneData, seed: int, max_depth: UInt, targets: Targets | None = None) -> None:
+        self.mi = mi = data.mi
+        self.data, self.max_depth = data, max_depth
+        self.sources = Sources(mi, data.scene, data.sensor, data.lights, targets)
+        self.context = mi.BSDFContext(mi.TransportMode.Importance)
+        self.context.type_mask = data.scattering.context.type_mask
+        self.seed = dr.opaque(mi.UInt32, seed)
+        self.bent = bends_normals(data.scene)
+
+    def key(self, high: UInt) -> UInt:
+        """The sampler's key of particles whose number has these upper 32 bits."""
+        return sampler.pixel_key(high, self.seed)
+
+    def number(self, index: UInt, pixel: UInt, pixels: UInt) -> tuple[UInt, UInt]:
+        """(key, lower 32 bits of the number) of the particle of a pixel's sample."""
+        mi = self.mi
+        number = mi.UInt64(index) * mi.UInt64(pixels) + mi.UInt64(pixel)
+        low = mi.UInt32(number)
+        return self.key(mi.UInt32(number >> 32)), low
+
+    def leave(self, key: UInt, low: UInt, wavelength: Float | None = None) -> tuple[Particle, Flight]:
+        """Particle `low` as it leaves its lamp, and on the way to the first surface that it meets.
+
+        wavelength  a number in [0, 1) that chooses its wavelengths, for which it stands; None: it has some of its own,
+                    and stands for all
+        """
+        mi, data = self.mi, self.data
+        pick, color = data.pair(key, low, PICK)
+        place, way = mi.Point2f(*data.pair(key, low, PLACE)), mi.Point2f(*data.direction_pair(key, low, WAY))
+        wavelengths, weight = self.sources.wavelengths(color if wavelength is None else wavelength)
+        weight = weight if wavelength is None else mi.Spectrum(1)
+        particle = self.sources.sample(pick, place, data.pair(key, low, AIM)[0], way, wavelengths)
+        particle.flux *= weight
+        particle.direct_weight *= weight
+        ray = particle.place.spawn_ray(particle.direction)  # off the lamp's own surface
+        ray.o = dr.select(particle.place.is_valid(), ray.o, particle.origin)
+        ray.wavelengths = wavelengths
+        active = mi.Bool(True) & dr.any(particle.flux != 0) & (self.max_depth > 1)
+        hit = data.surfaces.nearest(ray, active)
+        one, none = mi.UInt32(1), mi.UInt32(0)
+        flight = Flight(
+            one,
+            ray,
+            hit,
+            particle.flux,
+            mi.Spectrum(1),
+            mi.Float(1),
+            none,
+            mi.UInt32(0),
+            active & hit.is_valid(),
+        )
+        return particle, flight
+
+    def intersect(self, flight: Flight) -> Vertex:
+        """The surface that a particle meets; its throughput loses what media absorb on the way."""
+        mi, data, active = self.mi, self.data, flight.active
+        si = data.surfaces.interaction(flight.hit, flight.ray, active)
+        vertex = Vertex(si, si.bsdf(flight.ray))
+        if data.media.known:
+            flight.throughput *= dr.select(active, data.media.transmitted(flight.inside, si, si.t), 1)
+            vertex.crossing = data.media.crossing(si, vertex.bsdf, flight.inside, active)
+            si.duv_dx = mi.Vector2f(vertex.crossing.outer - 1.0, 0.0)
+        if data.disperses:
+            here = active & ((vertex.bsdf.flags() & DISPERSES) != 0)
+            flight.throughput, flight.hero_only = keep_hero(mi, flight.throughput, flight.hero_only, here)
+        return vertex
+
+    def sample_bsdf(self, key: UInt, low: UInt, flight: Flight, vertex: Vertex) -> tuple[BSDFSample, Radiance]:
+        """A direction to go on in, and the weight of the flux that goes there."""
+        mi, data, si, active = self.mi, self.data, vertex.si, flight.active
+        lobe, _ = data.pair(key, low, flight.dimension + CHOICE)
+        u = mi.Point2f(*data.direction_pair(key, low, flight.dimension + LOBE))
+        bs, weight = vertex.bsdf.sample(self.context, si, lobe, u, active)
+        bs, weight = data.scattering.pass_through(vertex, bs, weight, active)
+        if not self.bent:
+            return bs, weight * adjoint(si, bs.wo)
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        value = self.eval_bsdf(vertex, bs.wo, active & ~delta) / dr.select(bs.pdf > 0, bs.pdf, 1)
+        between = si.wi + bs.wo * bs.eta  # along the normal that mirrors or refracts
+        bend = adjoint(si, bs.wo, si.to_world(between * dr.rsqrt(dr.maximum(dr.squared_norm(between), 1e-12))))
+        return bs, dr.select(delta, weight * dr.select(dr.squared_norm(between) > 1e-6, bend, 1), value)
+
+    def eval_bsdf(self, vertex: Vertex, toward: Vector, active: Mask) -> Radiance:
+        """The flux that a rough surface sends in a direction, with its cosine: what a path from there would find."""
+        si, bsdf = vertex.si, vertex.bsdf
+        if not self.bent:
+            return bsdf.eval(self.context, si, toward, active) * adjoint(si, toward)
+        # As radiance from there: glass scales that by its index, and importance not.
+        reverse = self.mi.SurfaceInteraction3f(si)
+        reverse.wi = toward
+        into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(toward)))
+        value = bsdf.eval(self.data.scattering.context, reverse, si.wi, active)
+        return value * (out / dr.maximum(into, 1e-12))
+
+    def through_media(self, vertex: Vertex, value: Radiance, ds: DirectionSample) -> Radiance:
+        """What is left of the light that a vertex sends toward the camera, after media on the way."""
+        if vertex.crossing is None:
+            return value
+        side = vertex.side(vertex.si.to_local(ds.d))
+        return value * (self.data.media.transmitted(side, vertex.si, ds.dist) & vertex.crossing.surface)
+
+    def follow(
+        self, key: UInt, low: UInt, flight: Flight, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
+    ) -> Flight:
+        """To the next surface, in the direction of a sample."""
+        data, si = self.data, vertex.si
+        throughput = flight.throughput * weight
+        active = active & dr.any(throughput != 0) & (flight.depth + 1 < self.max_depth)
+        survive = dr.clip(dr.max(throughput), 1e-6, 0.95)
+        plays = flight.depth >= ROULETTE_DEPTH
+        active &= ~plays | (data.pair(key, low, flight.dimension + CHOICE)[1] < survive)
+        throughput = dr.select(plays, throughput / survive, throughput)
+        inside = flight.inside if vertex.crossing is None else vertex.side(bs.wo)
+        ray = si.spawn_ray(si.to_world(bs.wo))
+        hit = data.surfaces.nearest(ray, active)
+        active &= hit.is_valid()
+        eta = flight.eta * dr.select(active, bs.eta, 1)
+        return Flight(flight.depth + 1, ray, hit, flight.flux, throughput, eta, flight.hero_only, inside, active)
+
+
+def adjoint(si: SurfaceInteraction, wo: Vector, normal: Vector | None = None) -> Float:
+    """Factor of a particle's flux where the shading normal s is not the geometric one g: |wi.s wo.g / (wi.g wo.s)|.
+
+    normal  s where it is not that of the surface
+    """
+    into, out = abs(dr.dot(si.n, si.to_world(si.wi))), abs(dr.dot(si.n, si.to_world(wo)))
+    shading = si.sh_frame.n if normal is None else normal
+    from_light, onward = abs(dr.dot(shading, si.to_world(si.wi))), abs(dr.dot(shading, si.to_world(wo)))
+    factor = from_light * out / dr.maximum(into * onward, 1e-12)
+    return dr.select(abs(dr.dot(si.n, shading)) > 1 - 1e-6, 1, factor)

@@ -1,0 +1,201 @@
+"""The maps of a picture with caustics: particles that mirrors and smooth glass have thrown on other surfaces.
+
+A particle leaves a lamp toward smooth surfaces, goes through mirrors and glass, and stays on the first surface that is
+neither; from there it goes on once more, through mirrors and glass to a second one. SAMPLES_PER_MAP samples of every
+pixel share a map; from map to map the radius within which a particle counts shrinks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import numpy as np
+
+from ..bridge.types import Float, Mask, Point, Radiance, UInt
+from . import sampler
+from .lights.sources import Targets
+from .particles import Flight, Particles
+from .photons import Photon, PhotonDensity, PhotonMap
+from .scene_data import SceneData
+
+SAMPLES_PER_MAP = 4
+PER_PIXEL = 2.0  # particles of a map for each pixel,
+MIN_PARTICLES, MAX_PARTICLES = 1 << 14, 1 << 19
+FOOTPRINT = 1.0  # first radius of a search, in pixels as they are seen on the scene on the median
+SHRINKING = -1 / 6  # power of the number of maps by which the radius goes to 0 (Knaus2011, with alpha = 2/3)
+DENSITY_CELL = 4.0  # radii wide: the cubes in which particles are counted
+WAVELENGTHS = 4  # of a sample in spectral variants
+WAVELENGTH_KEY = 0x48554553  # of the sequence that maps take them from
+PROBED = 48  # rays each way, to measure a pixel
+
+
+@dataclass
+class _Trail:
+    """Particles on their way from a lamp by mirrors to a surface, and from there by mirrors to a second one."""
+
+    flight: Flight
+    density: Float  # of étendue, where the present chain of mirrors began
+    mirrored: Mask  # whether such a chain has begun
+    landed: Mask
+    first: Photon
+    landed_again: Mask
+    second: Photon
+
+
+class PhotonMaps:
+    """The maps of a render, one at a time.
+
+    current  the map of the samples at work
+    density  how many particles arrive per area, roughly; of the first map, and the same for all
+
+    radius_factor  of the first radius, over what is chosen
+    """
+
+    def __init__(self, data: SceneData, seed: int, max_depth: UInt, radius_factor: float) -> None:
+        mi = data.mi
+        self.mi, self.data = mi, data
+        self.particles = Particles(data, seed, max_depth, Targets(mi, data.smooth))
+        size = data.sensor.film().crop_size()
+        self.count = int(np.clip(PER_PIXEL * int(size[0]) * int(size[1]), MIN_PARTICLES, MAX_PARTICLES))
+        self.radius = FOOTPRINT * radius_factor * self._pixel_width()
+        self.total = dr.opaque(mi.Float, self.count)
+        self.density, self._is_dense = PhotonDensity.nowhere(mi), False
+        self._current: tuple[int, PhotonMap] | None = None
+
+    def prepare(self, number: int) -> None:
+        """Make map `number` the current one."""
+        if not self._is_dense:
+            trail, width = self._trace(0), DENSITY_CELL * self.radius
+            self.density, self._is_dense = PhotonDensity(self.mi, trail.first, trail.landed, width, self.count), True
+        if self._current is None or self._current[0] != number:
+            self._current = None  # before the next one: there is one at a time
+            trail, radius = self._trace(number), self.radius * (number + 1) ** SHRINKING
+            photons, landed = [trail.first, trail.second], [trail.landed, trail.landed_again]
+            self._current = number, PhotonMap(self.mi, photons, landed, radius)
+
+    @property
+    def current(self) -> PhotonMap:
+        assert self._current is not None, "`prepare` comes first"
+        return self._current[1]
+
+    def path_weight(self, lobe: Float, density: Float) -> Float:
+        """Weight of a path that finds the lamp behind mirrors by itself, beside the particles (power heuristic).
+
+        lobe     density of its last direction before the mirrors, over the cosine
+        density  of the particles' étendue at the lamp, in the medium where the path set out
+        """
+        particles = density * (self.total * dr.pi * dr.square(self.current.radius))
+        ratio = particles / lobe
+        return dr.select(lobe > 0, dr.rcp(dr.fma(ratio, ratio, 1)), 0)
+
+    def etendue_density(self, place: Point) -> Float:
+        """Roughly, of particles that arrive at a rough surface."""
+        return self.density.at(place) * dr.inv_pi
+
+    # ------------------------------------------------------------------ wavelengths
+
+    def wavelength(self, number: UInt, turn: UInt) -> Float:
+        """The number in [0, 1) that chooses the wavelengths of a map's particles, and of the paths that look at it;
+        `turn` says which of them comes first.
+
+        Wavelengths are one number and it shifted by 1/4, 2/4, 3/4 of the range: multiples of the golden ratio spread
+        all of them evenly over a quarter, and those of the root of 2 say which of them comes first.
+        """
+        key = sampler.pixel_key(self.mi.UInt32(WAVELENGTH_KEY), self.particles.seed)
+        place, first = (
+            sampler.unit(key + number * 0x9E3779B9),
+            sampler.unit(sampler.mix(key, key) + number * 0x6A09E667),
+        )
+        return (place + self.mi.Float((self.mi.UInt32(WAVELENGTHS * first) + turn) % WAVELENGTHS)) / WAVELENGTHS
+
+    def rotated(self, flux: Radiance, by: UInt) -> Radiance:
+        """The flux by wavelength, in the order that begins with number `by`."""
+        values = list(flux)
+        for step in range(1, WAVELENGTHS if self.mi.is_spectral else 1):
+            values = [
+                dr.select(by % WAVELENGTHS == step, flux[(i + step) % WAVELENGTHS], v) for i, v in enumerate(values)
+            ]
+        return type(flux)(*values)
+
+    # ------------------------------------------------------------------ particles
+
+    def _pixel_width(self) -> float:
+        """The width of a pixel on what is seen, on the median."""
+        mi, sensor = self.mi, self.data.sensor
+        across = int(sensor.film().crop_size()[0])
+        x, y = dr.meshgrid(*[dr.linspace(mi.Float, 0.01, 0.99, PROBED)] * 2)
+        rays = []
+        for step in (0.0, 1.0 / across):
+            place = mi.Point2f(x + dr.opaque(mi.Float, step), y)
+            rays.append(sensor.sample_ray(0.0, 0.5, place, mi.Point2f(0.5))[0])
+        hit = self.data.surfaces.nearest(mi.Ray3f(rays[0]))
+        angle = dr.norm(rays[1].d - rays[0].d)
+        widths = np.array(dr.select(hit.is_valid(), hit.t * angle, 0))
+        widths = widths[widths > 0]
+        return float(np.median(widths)) if len(widths) else 1e-3
+
+    def _trace(self, number: int) -> _Trail:
+        """The particles of map `number`, at the end of their ways."""
+        mi, particles = self.mi, self.particles
+        lane = dr.arange(mi.UInt32, self.count)
+        begin = mi.UInt64(dr.opaque(mi.UInt64, number * self.count)) + mi.UInt64(lane)
+        low, key = mi.UInt32(begin), particles.key(mi.UInt32(begin >> 32))
+        # Where wavelengths part, each of a map's goes on without the others with a part of the particles: of
+        # neighbors in the sequence, which are even by themselves.
+        turn = lane * WAVELENGTHS // dr.opaque(mi.UInt32, self.count)
+        wavelength = self.wavelength(dr.opaque(mi.UInt32, number), turn) if mi.is_spectral else None
+        particle, flight = particles.leave(key, low, wavelength)
+        none = Photon.none(mi)
+        trail = _Trail(flight, particle.density, mi.Bool(False), mi.Bool(False), none, mi.Bool(False), none)
+        trail = dr.while_loop(
+            (trail,),
+            lambda t: t.flight.active,
+            lambda t: (self._vertex(t, key, low, turn),),
+            mode="symbolic",
+            label="particles",
+        )[0]
+        dr.eval(
+            trail.landed, trail.landed_again, trail.first, trail.second
+        )  # all, that it be one kernel for all who ask
+        return trail
+
+    def _vertex(self, trail: _Trail, key: UInt, low: UInt, turn: UInt) -> _Trail:
+        """One vertex of a particle: it stays there, or goes on."""
+        mi, particles, flight = self.mi, self.particles, trail.flight
+        vertex = particles.intersect(flight)
+        flags = vertex.bsdf.flags()
+        smooth, rough = mi.has_flag(flags, mi.BSDFFlags.Delta), mi.has_flag(flags, mi.BSDFFlags.Smooth)
+        # A surface that is both a mirror and rough keeps every second particle, at twice its flux.
+        both = smooth & rough & trail.mirrored
+        flight.throughput *= dr.select(both, 2, 1)
+        coin = self.data.pair(key, low, flight.dimension + 2)[0]
+        stays = flight.active & rough & trail.mirrored & (~both | (coin < 0.5))
+        if vertex.crossing is not None:
+            stays &= vertex.crossing.surface
+        photon = Photon(
+            vertex.si.p,
+            mi.Vector3f(vertex.si.n),
+            mi.Vector3f(-flight.ray.d),
+            self.rotated(flight.flux * flight.throughput, WAVELENGTHS - turn) / self.total,
+            trail.density * dr.square(flight.eta),
+            flight.depth,
+            trail.landed,
+        )
+        first, second = stays & ~trail.landed, stays & trail.landed
+        bs, weight = particles.sample_bsdf(key, low, flight, vertex)
+        delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        # From where it has arrived it goes on once more, to a second surface behind mirrors.
+        active = flight.active & ~second & (first ^ delta)
+        flight.eta = dr.select(first, 1, flight.eta)
+        following = particles.follow(key, low, flight, vertex, bs, weight, active)
+        following.eta = dr.select(first, 1, following.eta)
+        return _Trail(
+            following,
+            dr.select(first, self.etendue_density(vertex.si.p), trail.density),
+            (trail.mirrored & ~first) | (active & delta),
+            trail.landed | first,
+            dr.select(first, photon, trail.first),
+            trail.landed_again | second,
+            dr.select(second, photon, trail.second),
+        )

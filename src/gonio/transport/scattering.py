@@ -1,0 +1,76 @@
+"""How integrators ask BSDFs at a vertex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import drjit as dr
+
+from ..bridge.adapter.variant import NESTS, SEPARATES
+from ..bridge.types import BSDFPlugin, BSDFSample, Float, Mask, Point, Radiance, SurfaceInteraction, UInt, Vector
+from .media import Crossing, Media
+
+
+@dataclass
+class Vertex:
+    """A point where a path has met a surface.
+
+    crossing  the media on both sides of it, None in scenes where none matter
+    """
+
+    si: SurfaceInteraction
+    bsdf: BSDFPlugin
+    crossing: Crossing | None = None
+
+    def side(self, direction: Vector) -> UInt:
+        """The media on the side of a local direction."""
+        assert self.crossing is not None
+        return dr.select(self.si.wi.z * direction.z < 0.0, self.crossing.beyond, self.crossing.here)
+
+
+class Scattering:
+    """BSDFs in a context of Mitsuba's that tells Gonio's what the integrator does with media and wavelengths."""
+
+    def __init__(self, mi: ModuleType, media: Media) -> None:
+        self.mi = mi
+        self.context = mi.BSDFContext()
+        self.context.type_mask = NESTS if media.known else SEPARATES
+
+    def eval(self, vertex: Vertex, toward: Vector, active: Mask) -> Radiance:
+        """The BSDF times the cosine, toward a light in the local direction `toward`."""
+        return vertex.bsdf.eval(self.context, vertex.si, toward, active)
+
+    def sample(self, vertex: Vertex, lobe: Float, u: Point, active: Mask) -> tuple[BSDFSample, Radiance]:
+        """A direction, and its weight: the BSDF times the cosine over the density."""
+        return vertex.bsdf.sample(self.context, vertex.si, lobe, u, active)
+
+    def eval_pdf_sample(
+        self, vertex: Vertex, toward: Vector, lobe: Float, u: Point, active: Mask
+    ) -> tuple[Radiance, Float, BSDFSample, Radiance]:
+        """Value and density toward a light, and a sample, in one call from the kernel."""
+        return vertex.bsdf.eval_pdf_sample(self.context, vertex.si, toward, lobe, u, active)
+
+    def pass_through(
+        self, vertex: Vertex, bs: BSDFSample, weight: Radiance, active: Mask
+    ) -> tuple[BSDFSample, Radiance]:
+        """The sample, or where the media say that there is no surface after all, one that goes straight on."""
+        if vertex.crossing is None:
+            return bs, weight
+        mi, through = self.mi, active & ~vertex.crossing.surface
+        bs.wo = dr.select(through, -vertex.si.wi, bs.wo)
+        bs.pdf, bs.eta = dr.select(through, 1.0, bs.pdf), dr.select(through, 1.0, bs.eta)
+        bs.sampled_type = dr.select(through, mi.UInt32(+mi.BSDFFlags.DeltaTransmission), bs.sampled_type)
+        return bs, dr.select(through, mi.Spectrum(1.0), weight)
+
+
+def keep_hero(mi: ModuleType, throughput: Radiance, hero_only: UInt, here: Mask) -> tuple[Radiance, UInt]:
+    """Go on with the first wavelength only where the index depends on it, at the weight of all.
+
+    The wavelengths of a sample are shifted copies of one number, so that the first is distributed as each of them is:
+    it stands for all (PBRT4, sec. 4.5.4; Wilkie2014 calls it the hero).
+    """
+    count = dr.size_v(throughput)
+    hero = mi.Spectrum(0)
+    hero[0] = throughput[0] * dr.select(hero_only == 0, count, 1)
+    return dr.select(here, hero, throughput), dr.select(here, mi.UInt32(1), hero_only)

@@ -1,0 +1,154 @@
+"""What the kernels of a render read of a scene: one object, made once and passed to the integrator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from types import ModuleType
+
+import drjit as dr
+
+from ..bridge.adapter.variant import DISPERSES
+from ..bridge.faults.shadow_ray_gap import shadow_ray_to
+from ..bridge.types import (
+    Color,
+    Float,
+    Hit,
+    Mask,
+    Point,
+    Radiance,
+    Ray,
+    Scene,
+    Sensor,
+    Shape,
+    SurfaceInteraction,
+    Texture,
+    UInt,
+)
+from . import sampler
+from .camera import Camera
+from .lights.lights import Lights
+from .media import Media
+from .scattering import Scattering
+from .surfaces import Surfaces
+
+# The integral of the CIE 1931 luminosity curve as Mitsuba tabulates it (nm): white of radiance 1 has Y = 1.
+CIE_Y_INTEGRAL = 106.7502593994140625
+
+
+class SceneData:
+    """The parts of a scene as integrators use them; lights and media are prepared when first asked for.
+
+    pair, direction_pair  the sampler's points: two numbers in [0, 1) of (key, index, dimension), for positions on
+                          pixels and lamps, and for directions
+    camera      rays through pixels
+    surfaces    what rays meet
+    media       what absorbs light between surfaces
+    lights      what emits it
+    scattering  how BSDFs are evaluated and sampled
+    aovs        whether albedo and normal of the first hit are wanted for the denoiser
+
+    sampler_name      a name of `sampler.SAMPLERS`, or "default"
+    ambient_color     scene-wide ambient radiance, None or 0 without any
+    mis_compensation  whether BSDFs are sampled beside the lights
+    """
+
+    def __init__(
+        self,
+        mi: ModuleType,
+        scene: Scene,
+        sensor: Sensor,
+        sampler_name: str = "default",
+        ambient_color: Sequence[float] | None = None,
+        mis_compensation: bool = True,
+        aovs: bool = False,
+    ) -> None:
+        self.mi, self.scene, self.sensor, self.aovs = mi, scene, sensor, aovs
+        self._ambient_color, self._mis_compensation = ambient_color, mis_compensation
+        names = sampler.DEFAULT if sampler_name == "default" else [sampler_name] * 2
+        self.pair, self.direction_pair = (sampler.PAIRS[name] for name in names)
+        self.surfaces = Surfaces(mi, scene)
+        self.camera = Camera(mi, sensor, self.pair)
+
+    @cached_property
+    def media(self) -> Media:
+        return Media(self.mi, self.scene)
+
+    @cached_property
+    def scattering(self) -> Scattering:
+        return Scattering(self.mi, self.media)
+
+    @cached_property
+    def lights(self) -> Lights:
+        return Lights(self.mi, self.scene, self.surfaces, self._mis_compensation)
+
+    @cached_property
+    def ambient(self) -> Texture | None:
+        """The ambient light as a texture of radiance, None where no BSDF has an attribute "ambient" to reflect it."""
+        color = self._ambient_color
+        if color is None or not any(color):
+            return None
+        if not any(dr.any(shape.bsdf().has_attribute("ambient")) for shape in self.scene.shapes()):
+            return None
+        # An rgb texture alone is a reflectance and ends at 1; d65 times one is a light, also in spectral variants.
+        scale = max(color)
+        tint = {"type": "rgb", "value": [c / scale for c in color]}
+        return self.mi.load_dict({"type": "d65", "color": tint, "scale": scale})
+
+    @cached_property
+    def smooth(self) -> list[Shape]:
+        """The shapes that are mirrors or smooth glass, at least in part."""
+        mi = self.mi
+        return [shape for shape in self.scene.shapes() if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta)]
+
+    @cached_property
+    def disperses(self) -> bool:
+        """Whether an index of refraction depends on the wavelength."""
+        return any(shape.bsdf().flags() & DISPERSES for shape in self.scene.shapes())
+
+    @cached_property
+    def media_at_camera(self) -> UInt:
+        """The media in which camera rays begin, as `Media` counts them."""
+        mi = self.mi
+        if not self.media.known:
+            return mi.UInt32(0)
+        return self.media.containing(mi.Point3f(self.sensor.world_transform() @ mi.Point3f(0.0)))
+
+    # ------------------------------------------------------------------ what integrators ask
+
+    def first_hit(
+        self, pixel: UInt, key: UInt, index: UInt, active: Mask = True, wavelength: Float | None = None
+    ) -> tuple[Ray, Radiance, Hit]:
+        """A sample's camera ray, its weight, and the first surface that it meets."""
+        ray, weight = self.camera.ray(pixel, key, index, wavelength)
+        ray = self.mi.Ray3f(ray)
+        return ray, weight, self.surfaces.nearest(ray, active, coherent=True)
+
+    def begins_path(self, hit: Hit) -> Mask:
+        """Whether a camera ray that ends at `hit` begins a path."""
+        return self.mi.Bool(True)
+
+    def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
+        """Lanes whose surface sees a point, which lies on none itself."""
+        return active & ~self.surfaces.blocked(shadow_ray_to(si, point), active)
+
+    def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:
+        """Of the first vertex of a sample, what is averaged beside its color: albedo and normal where wanted.
+
+        throughput   of the ray that the BSDF has sampled there
+        alive        lanes with a path; `active` those whose path has met a surface there
+        """
+        if not self.aovs:
+            return []
+        values = (*self.rgb(throughput, si.wavelengths), *si.sh_frame.n)
+        return [dr.select(active, value, 0) for value in values]
+
+    def rgb(self, radiance: Radiance, wavelengths: Sequence[Float]) -> Color:
+        """Radiance at a sample's wavelengths as linear RGB."""
+        mi = self.mi
+        if mi.is_spectral:
+            responses = [mi.cie1931_xyz(wavelength) * r for wavelength, r in zip(wavelengths, radiance, strict=True)]
+            return mi.xyz_to_srgb(sum(responses) / (len(responses) * CIE_Y_INTEGRAL))
+        if mi.is_monochromatic:
+            return mi.Color3f(radiance[0])
+        return radiance

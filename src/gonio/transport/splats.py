@@ -1,0 +1,141 @@
+"""The camera as particles see it: connections from points of the scene to pixels, and what they add up there."""
+
+from __future__ import annotations
+
+import drjit as dr
+import numpy as np
+
+from ..bridge.faults.thin_lens_importance import camera_sample
+from ..bridge.types import Mask, Point, Radiance, Record, SurfaceInteraction, UInt, Vector
+from ..errors import InputError
+from . import sampler
+from .lights.sources import INFINITE, POINT, SURFACE, UNMET, Particle
+from .particles import FIRST_VERTEX, LENS, VERTEX_DIMENSIONS, Particles
+from .scene_data import SceneData
+from .sums import Sums
+
+CAMERAS = ("PerspectiveCamera", "ThinLensCamera")  # of Mitsuba's: those that a point in the scene can be seen by
+
+# A splat is counted in units of 2^-32 of the largest radiance that a lamp has: no picture is brighter on the mean, so
+# that 2^30 samples fit a word of 64 bits, and a thousandth of a unit is lost nowhere, since chance rounds.
+BITS = 32
+PROBED = 4096  # points of the lamps, to find that radiance
+MAX_BITS = 58  # of one splat; a larger one is left out and counted as no number
+DITHER = 0xD1B54A32
+NEAREST = 1e-2  # of the scene's size: how near to a lamp that is a point brightness still has a bound
+AT_LAMP = FIRST_VERTEX - VERTEX_DIMENSIONS  # dimension of the connection of the lamp itself
+
+
+class SplatCamera:
+    """The camera of a picture that particles splat.
+
+    unit  radiance that one of the whole numbers counts which splats are added up as
+    """
+
+    def __init__(self, data: SceneData, particles: Particles) -> None:
+        mi, sensor = data.mi, data.sensor
+        self.mi, self.data, self.sensor, self.particles = mi, data, sensor, particles
+        size = sensor.film().crop_size()
+        self.pixels = dr.opaque(mi.UInt32, int(size[0]) * int(size[1]))
+        self.width, self.height = data.camera.width, dr.opaque(mi.UInt32, int(size[1]))
+        self.far = dr.opaque(mi.Float, 0.5 * float(sensor.far_clip()))
+        self.clips = [dr.opaque(mi.Float, float(clip)) for clip in (sensor.near_clip(), sensor.far_clip())]
+        self.eye = mi.Point3f(sensor.world_transform() @ mi.Point3f(0.0))
+        self.ahead = dr.normalize(mi.Vector3f(sensor.world_transform() @ mi.Vector3f(0.0, 0.0, 1.0)))
+        self.unit = 1.0 if not data.lights.count else self._brightest() * 2.0**-BITS
+        self.per_unit = dr.opaque(mi.Float64, 1.0 / self.unit)
+
+    @staticmethod
+    def check(data: SceneData, location: str) -> None:
+        """Raise InputError where particles cannot make the picture that is asked for."""
+        sensor = data.sensor
+        if data.aovs:
+            raise InputError("it has no features for the denoiser", location, "leave out --denoise, or use path")
+        if data.ambient is not None:
+            raise InputError("ambient light comes from no lamp", location, "leave ambient out, or use path")
+        if sensor.class_name() not in CAMERAS:
+            what = f"a camera of the kind {sensor.class_name()}, which no point of the scene is connected to"
+            raise InputError(what, location, "use a perspective camera, or path")
+        if any(value[0] for name, value in data.mi.traverse(sensor) if name.startswith("principal_point_offset")):
+            what = "a camera with a principal point that is not in the middle, which Mitsuba does not project by"
+            raise InputError(what, location, "leave it out, or use path")
+
+    def _brightest(self) -> float:
+        """A power of two above the largest radiance, of what can be probed of the lamps."""
+        mi, sources = self.mi, self.particles.sources
+        low = dr.arange(mi.UInt32, PROBED)
+        particle, _ = self.particles.leave(self.particles.key(mi.UInt32(0)), low)
+        size = dr.square(NEAREST * sources.radius)
+        bright = dr.select(particle.kind == POINT, particle.flux / size, particle.flux * particle.density)
+        bright = dr.select((particle.kind == INFINITE) & (particle.density >= UNMET), particle.flux, bright)
+        values = np.array(dr.max(bright), np.float64)
+        values = values[np.isfinite(values)]
+        largest = float(values.max()) if len(values) else 0.0
+        return float(2.0 ** np.ceil(np.log2(largest))) if largest > 0 else 1.0
+
+    def see_lamp(self, key: UInt, low: UInt, particle: Particle, sums: Sums) -> UInt:
+        """Splat the lamp itself, as the camera sees it from the point where a particle leaves it; as `splat`."""
+        mi = self.mi
+        invalid = mi.UInt32(0)
+        if SURFACE in self.particles.sources.known:
+            si, here = mi.SurfaceInteraction3f(particle.place), particle.kind == SURFACE
+            ds, importance = self.sample_direction(key, low, AT_LAMP, si, here)
+            si.wi = si.to_local(ds.d)
+            value = particle.emitter.eval(si, here) * particle.direct_weight * importance * abs(si.wi.z)
+            invalid += self.splat(key, low, sums, ds.uv, value, si, ds.p, here)
+        if INFINITE in self.particles.sources.known:
+            si, here = dr.zeros(mi.SurfaceInteraction3f), particle.kind == INFINITE
+            si.p = self.eye - particle.direction * self.far
+            si.wavelengths = particle.place.wavelengths
+            ds, importance = self.sample_direction(key, low, AT_LAMP, si, here)
+            value = particle.direct_weight * importance * dr.square(ds.dist)
+            si.p = ds.p  # from the camera into the distance, where no surface is
+            invalid += self.splat(key, low, sums, ds.uv, value, si, None, here, -ds.d)
+        return invalid
+
+    def sample_direction(
+        self, key: UInt, low: UInt, dimension: UInt | int, si: SurfaceInteraction, active: Mask
+    ) -> tuple[Record, Radiance]:
+        """The direction sample from a point to the camera, and its importance there."""
+        lens = self.mi.Point2f(0.5)
+        if self.sensor.needs_aperture_sample():
+            lens = self.mi.Point2f(*self.data.pair(key, low, dimension + LENS))
+        return camera_sample(self.sensor, si, lens, active)
+
+    def splat(
+        self,
+        key: UInt,
+        low: UInt,
+        sums: Sums,
+        uv: Point,
+        value: Radiance,
+        si: SurfaceInteraction,
+        eye: Point | None,
+        active: Mask,
+        away: Vector | None = None,
+    ) -> UInt:
+        """Add to the pixel at `uv` the light that arrives there; returns 1 where that is no finite number.
+
+        eye   the point that `si` must see; None where it must see infinity, in the direction `away`
+        """
+        mi = self.mi
+        x, y = mi.Int32(dr.floor(uv.x)), mi.Int32(dr.floor(uv.y))
+        active = active & (x >= 0) & (y >= 0) & (x < mi.Int32(self.width)) & (y < mi.Int32(self.height))
+        active &= dr.any(value != 0)
+        near, far = self.clips
+        if eye is not None:
+            depth = dr.dot(si.p - eye, self.ahead)
+            active &= (depth >= near) & (depth <= far)
+            active = self.data.visible(si, eye + (si.p - eye) * (near / depth), active)
+        else:
+            ahead = dr.maximum(dr.dot(away, self.ahead), 1e-6)
+            ray = mi.Ray3f(si.p + away * (near / ahead), away)
+            ray.maxt = (far - near) / ahead
+            active &= ~self.data.surfaces.blocked(ray, active)
+        place = mi.UInt32(y) * self.width + mi.UInt32(x)
+        dither = mi.Float64(sampler.independent_pair(key, low, place ^ DITHER)[0])
+        color = [mi.Float64(v) * self.per_unit for v in self.data.rgb(value, si.wavelengths)]
+        countable = abs(color[0]) + abs(color[1]) + abs(color[2]) < 2.0**MAX_BITS  # nor is it so for NaN
+        for target, v in zip(sums.splats, color, strict=True):
+            dr.scatter_add(target, mi.Int64(dr.floor(v + dither)), place, active & countable)
+        return dr.select(active & ~countable, mi.UInt32(1), 0)
