@@ -24,7 +24,7 @@ from ..errors import GonioError, InputError
 from ..material import BSDF, Breach, Parameter, Sample, models, tree
 from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
-from . import directions, severity
+from . import directions
 from .isolation import watch
 
 
@@ -43,11 +43,13 @@ class Subject:
     model     what speaks the protocol
     target    how it was named: "conductor", "glass.py:Glass", "mitsuba:plastic"
     settings  the parameters that were set, by name, for titles and commands
+    memo      values that are expensive to compute, kept by whoever computes them: `estimators`
     """
 
     model: Any
     target: str
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
+    memo: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False, compare=False)
 
     # ------------------------------------------------------------------ facts
 
@@ -160,11 +162,6 @@ class Subject:
         return all(
             np.allclose(v, w, rtol=1e-5, equal_nan=True) for v, w in zip(again, (first, first[256:]), strict=True)
         )
-
-    @functools.cached_property
-    def light(self) -> severity.Estimates:
-        """The albedos that integrators find, each in its way: computed when a law fails, once for all laws."""
-        return severity.estimates(self)
 
     def replace(self, **values: Any) -> Subject:
         """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ...energy.albedo import cubature
-from .. import directions, severity
+from .. import directions, estimators, severity
 from ..figures import SampleCells
 from . import factors
 from .ratio import NUMBERS, Cause, written
@@ -104,7 +104,7 @@ def crowd(subject: Subject, held: Blocks) -> str:
 
 def named(subject: Subject, held: Blocks) -> Cause | None:
     """The factor between samples and pdf; None where none is clean."""
-    light = subject.light
+    light = estimators.of_subject(subject)
     for formula, guess, field in _fields(subject):
         weighed = held.expected * field(np.broadcast_to(held.wo, held.wi.shape), held.wi)
         expected = held.joined(np.nan_to_num(weighed, posinf=0.0, neginf=0.0))
@@ -239,9 +239,9 @@ def _through(o: np.ndarray, i: np.ndarray, eta: float, side: float, power: float
     return np.where(there, np.where(o[:, 2] > 0.0, eta, 1.0 / eta) ** power, 1.0)
 
 
-def around(subject: Subject, light: severity.Estimates | None = None) -> str:
-    """Where int pdf exceeds the share of samples that come back, in words; "" where it does not."""
-    light = light or subject.light
+def unsampled(subject: Subject) -> str:
+    """Where int pdf exceeds the share of valid samples, in words; "" where it does not."""
+    light = estimators.of_subject(subject)
     excess = light.claimed - light.drawn
     row = int(np.argmax(excess))
     theta = float(directions.angles(light.wo[row])[0])

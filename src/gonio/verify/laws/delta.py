@@ -11,7 +11,7 @@ import numpy as np
 
 from ...material import BSDF, binding, tree
 from ...ops import backend
-from .. import directions, lobes, severity, statistics
+from .. import directions, estimators, lobes, severity, statistics
 from ..effort import Effort
 from ..forensics.ratio import Cause
 from ..lobes import Lobes
@@ -92,7 +92,7 @@ class DeltaLobes(Law):
         misses: list[Miss] = finding.details  # type: ignore[assignment]
         pictures = [miss for miss in misses if not miss.slope]
         if not misses:
-            return severity.of_sampling(subject)  # chosen more or less often than said
+            return estimators.sampling_bias(subject)  # chosen more or less often than said
         worst = max(pictures or misses, key=lambda miss: miss.average)
         where = f"wo at {_angles(worst.wo)} degrees, in its delta lobe"
         size, average = min(worst.size, 1.0), min(worst.average, 1.0)

@@ -11,7 +11,7 @@ from ...energy.albedo import cubature
 from ...errors import InputError
 from ...material import BSDF
 from ...ops import Mode, backend
-from .. import directions, histogram, lobes, severity, statistics
+from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..forensics.causes import place_of
@@ -73,15 +73,15 @@ class Energy(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        found = [severity.of_sampling(subject)]
+        found = [estimators.sampling_bias(subject)]
         if finding.figure > finding.tolerance:
-            found.append(severity.gain(subject))
+            found.append(estimators.gain_bias(subject))
             white = white_twin(subject)
             if white is not None and found[-1].average == 0.0:
-                gained = severity.gain(white)
+                gained = estimators.gain_bias(white)
                 found.append(dataclasses.replace(gained, where=f"{gained.where}, where nothing is absorbed"))
         if finding.problems and (white := white_twin(subject)) is not None:
-            found.append(severity.loss(white))
+            found.append(estimators.loss_bias(white))
         return max(found, key=lambda bias: bias.average)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import directions, histogram, severity
+from .. import directions, estimators, histogram, severity
 from ..effort import Effort
 from ..figures import SampleCells
 from ..forensics import crowding
@@ -86,11 +86,11 @@ class Pdf(Law):
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
         there = where_found(subject, finding)
-        bias = severity.of_sampling(there, "pdf")
+        bias = estimators.sampling_bias(there, "pdf")
         held = crowding.blocks(finding.evidence) if isinstance(finding.evidence, SampleCells) else None
         crowd = crowding.crowd(there, held) if held is not None else ""
         if bias.grade is severity.Grade.INVISIBLE:
-            where = crowding.around(there) or crowd or "less than a thousandth of all samples is misplaced"
+            where = crowding.unsampled(there) or crowd or "less than a thousandth of all samples is misplaced"
             return dataclasses.replace(bias, kind="noise", where=where)
         return dataclasses.replace(bias, where=f"{bias.where}; {crowd}" if crowd else bias.where)
 

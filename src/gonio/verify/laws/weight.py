@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...ops import Precision
-from .. import directions, severity, statistics
+from .. import directions, estimators, severity, statistics
 from ..effort import Effort
 from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject
@@ -57,7 +57,7 @@ class Weight(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        return severity.of_sampling(subject, "weights")
+        return estimators.sampling_bias(subject, "weights")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         if subject.stochastic:
