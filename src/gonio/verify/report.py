@@ -7,7 +7,7 @@ import io
 from typing import TYPE_CHECKING
 
 from .._version import __version__
-from . import terminal
+from . import statistics, terminal
 from .verdict import Card, Verdict
 
 if TYPE_CHECKING:
@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 
 SCHEMA = "gonio-verify/1"
 SIGNIFICANCE = 0.01  # of one false rejection in a whole report
+
+
+def significance(tests: int) -> float:
+    """p-value below which one of that many tests rejects, by Sidak's correction; SIGNIFICANCE where there are none."""
+    return statistics.sidak(SIGNIFICANCE, tests)
 
 
 @dataclasses.dataclass

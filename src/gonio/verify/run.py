@@ -14,14 +14,14 @@ from .. import members
 from ..errors import GonioWarning, InputError
 from ..material import BSDF
 from ..owner import public
-from . import box, directions, quality, statistics, subject
+from . import box, directions, quality, subject
 from .box import Place
 from .ci.outputs import Outputs
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .forensics import diagnosis
 from .isolation.watch import limited
 from .laws import Law, chosen
-from .report import SIGNIFICANCE, Report
+from .report import Report, significance
 from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, Finding, Verdict
 
@@ -91,7 +91,7 @@ def verify(
     if isolated:
         from .isolation import child
 
-        asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.object_(one) for one in all_]
+        asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.item_of(one) for one in all_]
         task = child.Task(asked_of, effort, seed, names)
         from . import trials
 
@@ -108,7 +108,7 @@ def _here(
     """The trial in this process."""
     started = time.perf_counter()
     steps, done = len(subjects) * len(laws), 0
-    held = []
+    results = []
     for one in subjects:
 
         def begin(what: str, title: str = one.title) -> None:
@@ -117,15 +117,15 @@ def _here(
                 progress(min(done, steps), steps, f"{title}: {what}")
             done += what not in (PLACES, QUALITY)
 
-        held.append(judged(one, laws, effort, seed, begin))
-    tests = sum(one.tests for one in held)
-    threshold = statistics.sidak(SIGNIFICANCE, tests)
-    cards = [one.card(threshold, seed, effort) for one in held]
+        results.append(judged(one, laws, effort, seed, begin))
+    tests = sum(len(one.p_values) for one in results)
+    threshold = significance(tests)
+    cards = [one.card(threshold, seed, effort) for one in results]
     return Report(cards, seed, effort, tests, threshold, time.perf_counter() - started)
 
 
-class Held(NamedTuple):
-    """All that was found on a subject, before it is known how many tests the whole report holds."""
+class Judged(NamedTuple):
+    """The findings on a subject, before the number of tests in the whole report is known."""
 
     subject: Subject
     others: list[Place]
@@ -133,23 +133,23 @@ class Held(NamedTuple):
     quality: quality.Quality | None
 
     @property
-    def tests(self) -> int:
-        return sum(len(it.what.trials) for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding))
+    def p_values(self) -> list[float]:
+        """Those of its statistical tests."""
+        findings = [asked.what for _, all_ in self.laws for asked in all_ if isinstance(asked.what, Finding)]
+        return [trial.p for finding in findings for trial in finding.trials]
 
-    @property
-    def lowest(self) -> float:
-        """The smallest p-value of them, 1 where there are none."""
-        found = [it.what for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding)]
-        return min((trial.p for one in found for trial in one.trials), default=1.0)
+    def card(self, threshold: float | None, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
+        """The verdicts by a threshold, the severity of failures and their causes; the BSDF is called again for both.
 
-    def card(self, threshold: float, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
-        """The verdicts, and what failures are worth and come from; the BSDF is asked again for both."""
+        threshold  that of a report of its own where None
+        """
+        threshold = significance(len(self.p_values)) if threshold is None else threshold
         answers = []
         for law, all_ in self.laws:
             begin(law.name)
             verdict, asked = _joined(law, all_, threshold, seed)
-            found = asked.what if isinstance(asked.what, Finding) else None
-            answers.append(diagnosis.Answer(law, verdict, asked.place.subject, found))
+            finding = asked.what if isinstance(asked.what, Finding) else None
+            answers.append(diagnosis.Answer(law, verdict, asked.place.subject, finding))
 
         def judge(law: Law, other: Subject) -> Verdict:
             what = _judge(law, other, EFFORTS[effort], seed)
@@ -157,7 +157,8 @@ class Held(NamedTuple):
 
         diagnosis.explain(answers, EFFORTS[effort], seed, judge)
         verdicts = [answer.verdict for answer in answers]
-        return Card(self.subject, verdicts, box.covered(self.subject, self.others), quality=self.quality)
+        covered = box.covered(self.subject, self.others)
+        return Card(self.subject, verdicts, covered, [], self.quality, self.p_values, threshold)
 
 
 def judged(
@@ -167,7 +168,7 @@ def judged(
     seed: int,
     begin: Begin = lambda what: None,
     skip: Mapping[str, str] = MappingProxyType({}),
-) -> Held:
+) -> Judged:
     """What the laws find on a subject.
 
     begin  called with a law's name, or what else is next
@@ -183,7 +184,7 @@ def judged(
         begin(law.name)
         found.append((law, _everywhere(law, one, others, effort, seed)))
     begin(QUALITY)
-    return Held(one, others, found, None if QUALITY in skip else quality.of(one, seed))
+    return Judged(one, others, found, None if QUALITY in skip else quality.of(one, seed))
 
 
 class Asked(NamedTuple):

@@ -120,9 +120,10 @@ class Verdict:
 class Card:
     """All verdicts on one subject.
 
-    covered  at which values of its parameters
-    notes    how it behaved: what it printed, what brought it down
-    quality  how well it samples; None where it could not be measured
+    covered    the parameter values at which it was judged
+    notes      its behavior: what it printed, what ended its process
+    quality    of its sampling; None where it could not be measured
+    p_values   of its statistical tests, and `threshold` below which they rejected
     """
 
     subject: Subject
@@ -130,6 +131,13 @@ class Card:
     covered: str = ""
     notes: list[str] = dataclasses.field(default_factory=list)
     quality: Quality | None = None
+    p_values: list[float] = dataclasses.field(default_factory=list, repr=False)
+    threshold: float = 0.0
+
+    def decided_by(self, threshold: float) -> bool:
+        """Whether the verdicts are the same with another threshold: no p-value lies between the two."""
+        low, high = sorted((self.threshold, threshold))
+        return not any(low <= p < high for p in self.p_values)
 
     @property
     def title(self) -> str:
