@@ -226,7 +226,7 @@ def test_the_chi_square_tells_place_and_size() -> None:
     assert held is not None
     words = crowding.crowd(subject, held)
     # .55 / .5 where only the wide lobe is, and the noise of cells with a few hundred samples
-    assert 8.0 < float(words.partition(" % more samples than the pdf says")[0]) < 18.0, words
+    assert 8.0 < float(words.partition(" % more samples than the pdf predicts")[0]) < 18.0, words
     assert "of the light" in words
 
 

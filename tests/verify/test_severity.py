@@ -133,7 +133,7 @@ def test_mass_of_the_pdf_where_no_sample_falls_is_noise() -> None:
     from gonio.verify.verdict import Finding
 
     told = Pdf().bias(of(PdfBelow()), Finding(0.1, 1e-3, ""), None, 1)  # type: ignore[arg-type]
-    assert told.grade is Grade.NOISE and "10 % of samples that never come" in told.words
+    assert told.grade is Grade.NOISE and "10 % of samples that never occur" in told.words
 
 
 def test_nan_is_a_grade_of_its_own() -> None:

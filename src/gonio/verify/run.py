@@ -281,7 +281,7 @@ def decide(
     for trial in sorted(finding.trials, key=lambda trial: trial.p):
         if not trial.p < threshold or len(statistical) >= 3:
             break  # three confirmed rejections say enough
-        trial.second = trial.again()
+        trial.second = trial.repeat()
         if trial.second < CONFIRMATION:
             statistical.append(f"{trial.where}: p = {trial.p:.2g}, and with a second seed {trial.second:.2g}")
         else:

@@ -35,7 +35,7 @@ class Trial:
 
     p: float
     where: str
-    again: Callable[[], float]
+    repeat: Callable[[], float]
     second: float | None = None
 
 

@@ -119,7 +119,7 @@ def _pdf(subject: Subject, finding: Finding) -> str:
         middle = np.stack([held.joined(held.wi[:, k] * held.expected) for k in range(3)], -1)
         middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)
         for cosine in (0.9999, 0.999, 0.99, 0.95, 0.8):
-            near = (middle @ middle.T > cosine) @ (expected - held.seen / held.drawn)
+            near = (middle @ middle.T > cosine) @ (expected - held.observed / held.drawn)
             row = int(np.argmax(np.abs(near)))
             if abs(near[row]) > 1.2 * abs(off):
                 where, off = f"dr.dot({{}}, {_vector(middle[row])}) > {cosine}", float(near[row])

@@ -487,11 +487,11 @@ def _frequencies(subject: Subject, effort: Effort, seed: int) -> list[Trial]:
 
     for row, lobe in np.argwhere(known.found):
 
-        def again(row: int = int(row), lobe: int = int(lobe)) -> float:
+        def repeat(row: int = int(row), lobe: int = int(lobe)) -> float:
             return p_value(row, lobe, seed + 7919)
 
         text = f"how often the lobe toward {_angles(known.wi[row, lobe])} is chosen, seen from {_angles(wo[row])}"
-        trials.append(Trial(p_value(int(row), int(lobe), seed), text, again))
+        trials.append(Trial(p_value(int(row), int(lobe), seed), text, repeat))
     return trials
 
 

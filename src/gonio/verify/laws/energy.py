@@ -55,12 +55,12 @@ class Energy(Law):
         for i in range(len(wo)):
             p = _agreement(value[i], error[i], mean[i], noise[i], heavy[i])
 
-            def again(i: int = i) -> float:
+            def repeat(i: int = i) -> float:
                 second = _sampling(subject, wo[i : i + 1], effort.furnace_samples, seed + 7919)
                 return _agreement(value[i], error[i], *(part[0] for part in second))
 
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
-            finding.trials.append(Trial(p, text, again))
+            finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
         white = white_twin(subject)
         if white is None and getattr(subject.model, "lossless", None) is not None:

@@ -100,10 +100,10 @@ class Reciprocity(Law):
             if z is None:
                 continue
 
-            def again(a: np.ndarray = a, b: np.ndarray = b) -> float:
+            def repeat(a: np.ndarray = a, b: np.ndarray = b) -> float:
                 return statistics.normal_two_sided(_distance(subject, a, b, eta, seed + 7919) or 0.0)
 
-            trials.append(Trial(statistics.normal_two_sided(z), pair_in_words(a, b), again))
+            trials.append(Trial(statistics.normal_two_sided(z), pair_in_words(a, b), repeat))
             if abs(z) > worst:
                 worst, place = abs(z), i
         return Finding(
