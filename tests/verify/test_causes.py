@@ -254,7 +254,7 @@ def test_what_the_examiners_named_is_named() -> None:
     for cls, law, words in (
         (ChoiceNumberAgain, "pdf", "u.x chooses a lobe"),
         (GreyWeight, "weight", "the weight is grey"),
-        (OneLobeDensity, "weight", "a lobe of a mixture left out"),
+        (OneLobeDensity, "weight", "a missing lobe of a mixture"),
         (CertainOfItself, "delta", "the pdf of delta samples is 1"),
     ):
         assert words in verify(cls(), quick=True, law=law)[law].cause, cls

@@ -12,9 +12,9 @@ def at(theta: float | np.ndarray, phi: float | np.ndarray = 0.0) -> np.ndarray:
     t, p = np.broadcast_arrays(np.radians(theta), np.radians(phi))
     # from the nearer pole: sin(pi) is not 0 in floating point
     below = t > 0.5 * np.pi
-    turned = np.where(below, np.radians(180.0 - np.asarray(theta, float)), t)
-    z = np.where(below, -np.cos(turned), np.cos(turned))
-    return np.stack([np.sin(turned) * np.cos(p), np.sin(turned) * np.sin(p), z], axis=-1)
+    from_pole = np.where(below, np.radians(180.0 - np.asarray(theta, float)), t)
+    z = np.where(below, -np.cos(from_pole), np.cos(from_pole))
+    return np.stack([np.sin(from_pole) * np.cos(p), np.sin(from_pole) * np.sin(p), z], axis=-1)
 
 
 def angles(w: np.ndarray) -> np.ndarray:
@@ -65,7 +65,7 @@ def single(w: np.ndarray) -> np.ndarray:
     return w.astype(np.float32).astype(np.float64)
 
 
-def turned(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def rotated(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Directions (N, 3) turned about the normal by angles (N,), radians."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], -1)

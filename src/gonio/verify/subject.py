@@ -69,9 +69,9 @@ class Subject:
         return bool(self.model.isotropic)
 
     @property
-    def leans(self) -> bool:
-        """Whether its mirror is another than the surface."""
-        return self.model.leans
+    def perturbs_normal(self) -> bool:
+        """Whether its normal differs from that of the surface."""
+        return bool(self.model.leans)
 
     @property
     def stochastic(self) -> bool:

@@ -126,7 +126,12 @@ def worst_of(error: np.ndarray) -> tuple[int, float]:
     return row, float(flat[row]) if len(flat) else 0.0
 
 
+def angles(w: np.ndarray) -> str:
+    """A direction's theta and phi in degrees."""
+    theta, phi = directions.angles(w)
+    return f"{theta:.4g}, {phi:.4g}"
+
+
 def pair_in_words(wo: np.ndarray, wi: np.ndarray) -> str:
     """Both directions in degrees."""
-    (to, po), (ti, pi) = directions.angles(wo), directions.angles(wi)
-    return f"wo at {to:.4g}, {po:.4g}; wi at {ti:.4g}, {pi:.4g} degrees"
+    return f"wo at {angles(wo)}; wi at {angles(wi)} degrees"

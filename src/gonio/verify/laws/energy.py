@@ -195,13 +195,13 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
 
 def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
     """What all delta lobes carry, (N, channels)."""
-    seen = lobes.of(subject, wo, seed, "importance")
-    carried = seen.carried
+    power = lobes.of(subject, wo, seed, "importance")
+    carried = power.carried
     if not full and carried.size:
-        # where parameters make two lobes one, each says its own probability and both together are met twice as often
-        often = np.where(seen.share > 0.05, np.round(seen.share / np.maximum(seen.pdf, 0.01)), 1.0)
+        # lobes that coincide at some parameters are sampled together, twice as often as each states
+        often = np.where(power.share > 0.05, np.round(power.share / np.maximum(power.pdf, 0.01)), 1.0)
         carried = carried * np.maximum(often, 1.0)[..., None]
-    return np.sum(carried * seen.found[..., None], axis=1)
+    return np.sum(carried * power.valid[..., None], axis=1)
 
 
 def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from ..forensics.causes import nothing_below
 from ..forensics.ratio import Cause
 from ..subject import Subject
 from ..verdict import Finding, Trial
-from .base import Law, pair_in_words, pairs, where_found
+from .base import Law, angles, pair_in_words, pairs, where_found
 
 ABOVE = (
     (0.0, 0.0),
@@ -60,7 +60,7 @@ class Pdf(Law):
                 continue
             for tested in _chi_square(part, effort, seed):
                 wo, cells = tested.wo, tested.cells
-                place = f"{name + ': ' if name else ''}wo at {_angles(wo)} degrees"
+                place = f"{name + ': ' if name else ''}wo at {angles(wo)} degrees"
                 for kind, p in tested.outcome._asdict().items():
                     finding.trials.append(Trial(p, f"{_KINDS[kind]}, {place}", _Again(part, wo, kind, effort, seed)))
                     # of many that are 0, the one in which most is misplaced
@@ -105,8 +105,8 @@ class Pdf(Law):
         if there.stochastic or not isinstance(finding.evidence, SampleCells):
             return
         # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are one
-        angles = [angles for side, angles in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
-        oblique = directions.single(np.array([directions.at(*pair) for pair in angles]).reshape(-1, 3))
+        views = [view for side, view in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
+        oblique = directions.single(np.array([directions.at(*pair) for pair in views]).reshape(-1, 3))
         for tested in _chi_square(there, FEW, seed, oblique):
             held = crowding.blocks(tested.cells)
             cause = crowding.named(there, held) if held is not None else None
@@ -160,11 +160,6 @@ class _Again:
         return min((getattr(one.outcome, self.kind) for one in tested), default=1.0)
 
 
-def _angles(w: np.ndarray) -> str:
-    theta, phi = directions.angles(w)
-    return f"{theta:.4g}, {phi:.4g}"
-
-
 def _widths(subject: Subject, effort: Effort) -> list[float]:
     """Other widths to try, where there is a width to change."""
     parameter = subject.parameters.get("alpha")
@@ -186,8 +181,8 @@ class _Tested(NamedTuple):
 def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[_Tested]:
     if wo is None:
         above, below = (ABOVE, BELOW) if effort.full else (ABOVE[:6:2], BELOW[1:4])
-        grid_of = [*(above if 1 in subject.sides else ()), *(below if -1 in subject.sides else ())]
-        wo = directions.single(np.array([directions.at(*angles) for angles in grid_of]).reshape(-1, 3))
+        views = [*(above if 1 in subject.sides else ()), *(below if -1 in subject.sides else ())]
+        wo = directions.single(np.array([directions.at(*view) for view in views]).reshape(-1, 3))
     if not len(wo):
         return []
     grid = histogram.place(subject, wo, seed, effort.cells)
