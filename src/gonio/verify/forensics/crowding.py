@@ -16,6 +16,7 @@ import numpy as np
 
 from ...energy.albedo import cubature
 from .. import directions, estimators, severity
+from ..cells import boxes, direction
 from ..figures import SampleCells
 from . import factors
 from .factors import Factor, Field
@@ -55,15 +56,9 @@ def blocks(cells: SampleCells) -> Blocks | None:
     """The cells of a test in blocks; None where their wo is unknown."""
     if cells.wo is None:
         return None
-    height, turn = cells.rows.astype(float), cells.columns.astype(float)
-    quarter = np.minimum(np.floor(turn), 3.0)
-    azimuth = 0.5 * np.pi * quarter + np.arctan2(turn - quarter, 1.0 - (turn - quarter))
-    a, b = height[:, :-1, None], height[:, 1:, None]
-    c, d = azimuth[..., :-1], azimuth[..., 1:]
-    h, phi = np.broadcast_to(0.5 * (a + b), c.shape), 0.5 * (c + d)
-    r = np.sqrt(h * (2.0 - h))
+    a, b, c, d = boxes(cells.rows, cells.columns)
     side = np.array(cells.sides, float)[:, None, None]
-    wi = np.stack([r * np.cos(phi), r * np.sin(phi), (1.0 - h) * side], -1).reshape(-1, 3)
+    wi = direction(0.5 * (a + b), 0.5 * (c + d), side).reshape(-1, 3)
     sides, rows, columns = c.shape
     number = np.arange(sides * (rows // BLOCK) * (columns // BLOCK)).reshape(sides, rows // BLOCK, columns // BLOCK)
     block = number.repeat(BLOCK, 1).repeat(BLOCK, 2).ravel()
