@@ -232,7 +232,7 @@ def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
 
 
 def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[Verdict, Asked]:
-    """One verdict of those at all places, and its result: that at the given values, unless the law holds there and fails
+    """The verdict over all places, and its result: that at the given values, unless the law holds there and fails
     elsewhere. After three failures, no more tests are repeated."""
     first = _verdict(law, all_[0], threshold, seed)
     answer, where = first, all_[0]
