@@ -1,4 +1,4 @@
-"""Directions by their angles, and the pairs of directions that the pointwise laws are judged on."""
+"""Directions: from and to angles, uniform, rounded and rotated."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def text(w: np.ndarray) -> str:
 
 
 def parse(pair: str) -> tuple[np.ndarray, np.ndarray]:
-    """(wo, wi) of "theta_o,phi_o/theta_i,phi_i" in degrees; InputError where it is none."""
+    """(wo, wi) of "theta_o,phi_o/theta_i,phi_i" in degrees. InputError where the text is malformed."""
     try:
         (to, po), (ti, pi) = ([float(x) for x in part.split(",")] for part in pair.split("/"))
     except ValueError:
         hint = "give theta_o,phi_o/theta_i,phi_i in degrees, such as 30,0/45,180"
-        raise InputError(f"'{pair}' is no pair of directions", "--at", hint) from None
+        raise InputError(f"'{pair}' is not a pair of directions", "--at", hint) from None
     return at(to, po), at(ti, pi)
 
 
@@ -56,16 +56,16 @@ def on_side(w: np.ndarray, side: int) -> np.ndarray:
 
 
 def numbers(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Uniform (count, 3) in [0, 1) that float32 holds exactly, so that no rounding reaches 1."""
+    """Uniform numbers (count, 3) in [0, 1), exact in float32, so that no rounding reaches 1."""
     return rng.random((count, 3), dtype=np.float32).astype(np.float64)
 
 
 def single(w: np.ndarray) -> np.ndarray:
-    """The directions as float32 holds them, in float64: both precisions then see the same input."""
+    """The directions rounded to float32, in float64: both precisions then get the same input."""
     return w.astype(np.float32).astype(np.float64)
 
 
 def rotated(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Directions (N, 3) turned about the normal by angles (N,), radians."""
+    """Directions (N, 3) rotated about the normal by angles (N,), radians."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], -1)

@@ -37,7 +37,7 @@ class Weight(Law):
             figures.append(self._at(subject, wo, u, precision, problems))
         size, row, wi = figures[-1]
         exact = subject.best == "float64"
-                if exact and figures[0][0] > SINGLE:
+        if exact and figures[0][0] > SINGLE:
             problems.append(f"float32: {figures[0][0]:.2e} where {SINGLE:.0e} is allowed")
         finding = Finding(
             figure=size,
