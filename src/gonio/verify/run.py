@@ -67,8 +67,7 @@ def verify(
     junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
     baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
     progress  called with the steps done, all steps, and the name of the next
-    isolated  whether the BSDF is judged in a process of its own: a crash or an endless loop then fails the law, and the
-              next law follows. By default, names are and Python objects are not
+    isolated  whether a BSDF is judged in a process of its own, which it may crash or block; by default, names are
     jobs      such processes at a time; the report is the same
     limit     seconds per law there, 300 if not given
     memory    GB per process, half of the machine's if not given

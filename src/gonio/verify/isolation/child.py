@@ -285,10 +285,10 @@ class _Pool:
     def cards(self) -> list[Card]:
         return [one.card for one in self.states or () if one.card]
 
-    def judge(self, threshold: float | None, again: Sequence[int] = ()) -> None:
+    def judge(self, threshold: float | None, repeat: Sequence[int] = ()) -> None:
         """Judge all cards, or some of them again, by a threshold; where None each by the number of its own tests."""
-        self.waiting = list(again)
-        for number in again:
+        self.waiting = list(repeat)
+        for number in repeat:
             assert self.states is not None
             self.states[number].card = None
         while self.jobs and (self.states is None or len(self.cards) < len(self.states)):

@@ -64,8 +64,8 @@ class Calls(Law):
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
         for answer in wrong:
             if answer.rows is not None:
-                name, other, wo, wi, got, whole = answer.rows
-                yield Ratio(name, other, wo, wi, got, whole, subject)
+                name, other, wo, wi, got, all_rows = answer.rows
+                yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
             words = SUSPECTS.get(answer.what, f"{answer.what}, not the formula: {answer.wrong}")
             yield Cause(words, f"calls {answer.what}")

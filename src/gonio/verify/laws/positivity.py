@@ -46,6 +46,13 @@ class Positivity(Law):
         )
         declared = "positivity" in subject.breaches  # measured noise around 0: its size is a share of the largest value
         checked = 0
+
+        def fails(text: str, suffix: str, a: np.ndarray, b: np.ndarray, changed: dict[str, Any]) -> None:
+            place = pair_in_words(a, b)
+            finding.problems.append(f"{text}{_words(changed)}: {suffix}{place}")
+            if finding.at is None:
+                finding.at, finding.settings, finding.worst = (a, b), changed, place
+
         for changes, together in _batches(subject, variants, len(wo)):
             many_o, many_i, many_u = (np.tile(part, (len(changes), 1)) for part in (wo, wi, u))
             for precision in together.precisions:
@@ -53,36 +60,23 @@ class Positivity(Law):
                     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
                     wrong = ~np.isfinite(values) | (values < (-NEGATIVE * largest if what != "wi" else -np.inf))
                     checked += values.size
-                    if declared and what in ("eval", "weight") and np.isfinite(values).all():
-                        finding.figure += int(wrong.sum())
-                        finding.breach = max(finding.breach or 0.0, float(-values.min(initial=0.0) / (largest or 1.0)))
-                        continue
-                    if not wrong.any():
+                    noise = declared and what in ("eval", "weight") and np.isfinite(values).all()
+                    if not (noise or wrong.any()):
                         continue
                     finding.figure += int(wrong.sum())
-                    deep = float(np.min(values, initial=0.0, where=np.isfinite(values)) / -largest) if largest else 0.0
-                    finding.breach = max(finding.breach or 0.0, deep)
-                    row = int(np.flatnonzero(wrong.any(1))[0])
-                    changed = changes[rows[row] // len(wo)]
-                    text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}{_words(changed)}"
-                    place = pair_in_words(a[row], b[row])
-                    kept = declared and what in ("eval", "weight") and bool(np.isfinite(values).all())
-                    texts = finding.notes if kept else finding.problems
-                    texts.append(f"{text}: {int(wrong.sum())} values, first at {place}")
-                    if finding.at is None:
-                        finding.at, finding.settings, finding.worst = (
-                            (a[row], b[row]),
-                            changed,
-                            pair_in_words(a[row], b[row]),
+                    deepest = -float(np.min(values, initial=0.0, where=np.isfinite(values))) / float(largest or 1.0)
+                    finding.breach = max(finding.breach or 0.0, deepest)
+                    if not noise:
+                        row = int(np.flatnonzero(wrong.any(1))[0])
+                        text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}"
+                        fails(
+                            text, f"{int(wrong.sum())} values, first at ", a[row], b[row], changes[rows[row] // len(wo)]
                         )
             if isinstance(together.model, BSDF) and not together.stochastic:
                 for name, row in _bad_gradients(together, many_o, many_i):
                     finding.figure += 1
-                    place = pair_in_words(many_o[row], many_i[row])
-                    changed = changes[row // len(wo)]
-                    finding.problems.append(f"the gradient of eval by {name} is not finite{_words(changed)}: {place}")
-                    if finding.at is None:
-                        finding.at, finding.settings, finding.worst = ((many_o[row], many_i[row]), changed, place)
+                    text = f"the gradient of eval by {name} is not finite"
+                    fails(text, "", many_o[row], many_i[row], changes[row // len(wo)])
         finding.shown = f"{finding.figure:g} of {checked:.3g}"
         del finding.problems[6:], finding.notes[7:]
         return finding
