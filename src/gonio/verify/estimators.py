@@ -10,7 +10,7 @@ estimator must return int eval dwi. The difference, as a share of the reflected 
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -169,7 +169,7 @@ def _split(value: Scalar, w: Direction) -> list[Scalar]:
     dr = backend.drjit()
     sides = [(~side, side) for side in (w.x > 0.0, w.y > 0.0, dr.abs(w.z) > np.sqrt(0.5), w.z > 0.0)]
 
-    def inside(number: int) -> Scalar:
+    def inside(number: int) -> Any:
         a, b, c, d = (choice[number >> bit & 1] for bit, choice in enumerate(sides))
         return a & b & c & d
 

@@ -54,9 +54,9 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
     for law, verdict, subject, finding in sorted(failed, key=lambda a: rank.get(a.law.name, len(rank))):
         if finding is None:
             # an exception or a timeout; the same one in several laws is one failure
-            leader = faults.setdefault(re.sub(r"\d+", "", verdict.why[0]), law.name)
-            if leader != law.name:
-                verdict.cause = f"follows from {leader.upper()}'s"
+            first = faults.setdefault(re.sub(r"\d+", "", verdict.why[0]), law.name)
+            if first != law.name:
+                verdict.cause = f"follows from {first.upper()}'s"
             continue
         if verdict.status == DECLARED and effort.name == "quick":
             continue  # a first check spends no time on declared breaches

@@ -78,7 +78,8 @@ def _cosines(ratio: Ratio) -> Fit | None:
     if r is None or not _reflects(ratio):
         return None
     wo, wi = ratio.wo, ratio.wi
-    names, logs = COSINES, np.log(factors.values_of(COSINES, wo, wi, factors.half_vector(wo, wi)))
+    names: tuple[str, ...] = COSINES
+    logs = np.log(factors.values_of(COSINES, wo, wi, factors.half_vector(wo, wi)))
     if ratio.antisymmetric:  # factors that both directions share cancel
         names, logs = ("cos_i", "sin_i"), logs[:, [2, 4]] - logs[:, [3, 5]]
     positive = np.isfinite(r) & (r > 0.0)
