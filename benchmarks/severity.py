@@ -196,9 +196,9 @@ def stated(cls: type[BSDF], law: str) -> Bias:
     from gonio.verify.subject import of
 
     if law == "pdf":  # its figures need no chi-square
-        from gonio.verify.severity import of_sampling
+        from gonio.verify.estimators import sampling_bias
 
-        return of_sampling(of(cls()), "pdf")
+        return sampling_bias(of(cls()), "pdf")
     one, effort = of(cls()), EFFORTS["quick"]
     bias = laws()[law].bias(one, laws()[law].judge(one, effort, 1), effort, 1)
     assert bias is not None, f"{cls.__name__}: {law} states nothing"

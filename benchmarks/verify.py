@@ -21,7 +21,7 @@ from pathlib import Path
 
 import gonio as go
 import numpy as np
-from gonio.verify import directions, histogram, subject, verify
+from gonio.verify import cells, directions, histogram, subject, verify
 from scipy import stats
 
 ROOT = Path(__file__).parents[1]
@@ -86,7 +86,7 @@ def speed() -> None:
     wo = directions.single(directions.at(np.array([0, 15, 30, 45, 60, 75, 85, 89.5]), 20.0))
     for alpha in (0.005, 0.1, 1.0):
         one = subject.of(go.Conductor.preset("Au", alpha=alpha))
-        grid = histogram.place(one, wo, 1)
+        grid = cells.place(one, wo, 1)
         seconds = []
         for seed in range(6):
             start = time.perf_counter()
@@ -135,7 +135,7 @@ def uniform(seeds: int) -> None:
     one = subject.of(go.Conductor.preset("Au", alpha=0.2))
     found: dict[str, list[float]] = {"fine": [], "coarse": [], "others": []}
     for seed in range(seeds):
-        grid = histogram.place(one, wo, seed)
+        grid = cells.place(one, wo, seed)
         expected = histogram.expect(one, grid, 0.1 * 2.0**-9)
         counts = histogram.count(one, grid, 18, seed)
         for row in range(len(wo)):

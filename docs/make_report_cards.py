@@ -1,9 +1,9 @@
-"""Write docs/report-cards/: what every Gonio model and every BSDF plugin of Mitsuba does under the laws.
+"""Write docs/report-cards/: the verdicts on every Gonio model and every BSDF plugin of Mitsuba.
 
     python docs/make_report_cards.py [--effort quick|default] [--only NAME,...] [--seed 1]
 
-One page a material, README.md with all that fails in order of severity, cards.json with every figure, and in programs/
-a program of Mitsuba alone for each failure of its plugins. Nothing here judges.
+One page per material, README.md with all failures in order of severity, cards.json with every figure, and in programs/
+a program that needs Mitsuba alone for each failure of its plugins.
 """
 
 from __future__ import annotations
@@ -31,52 +31,52 @@ PROGRAMS = FOLDER / "programs"
 MARKS = {PASS: "pass", FAIL: "**fails**", DECLARED: "declared", NOT_APPLICABLE: "-"}
 SHORT = [name for name, law in laws().items() if not law.on_request]
 
-# besides the defaults, what is no number and no choice that the verifier itself would try
+# settings besides the defaults that the verifier itself would not try
 SETTINGS = {
     "mitsuba:roughconductor": [["distribution=ggx"]],
     "mitsuba:roughdielectric": [["distribution=ggx"]],
     "mitsuba:roughplastic": [["distribution=ggx"]],
 }
 
-# worst first; what is no bias of a picture after what is one, what is not its own fault last
+# worst first; grades that bias no picture after those that do, those of other materials last
 ORDER = [
     *(Grade.BROKEN, Grade.VISIBLE, Grade.SMALL, Grade.INVISIBLE, Grade.NAN),
     *(Grade.NOISE, Grade.FITTING, Grade.INTERFACE, Grade.INNER, Grade.BY_NATURE),
 ]
 
-# what its authors know of it, or have said of something near: issues and pull requests by number
+# issues and pull requests of its authors about the failure or a related one
 UPSTREAM = {
     ("principled", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
     ("principledthin", "calls"): "mitsuba3 #1951 (merged 2026-09-07, in no version yet) names the component numbers",
-    ("principled", "energy"): "mitsuba3 #465 (closed) is about what its transmission loses",
+    ("principled", "energy"): "mitsuba3 #465 (closed) is about the energy that its transmission loses",
     ("blendbsdf", "calls"): "mitsuba2 #151 (open): the component is always 0",
-    ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) mended its pdf and null lobes",
+    ("blendbsdf", "positivity"): "mitsuba3 #1681 (merged 2025) fixed its pdf and null lobes",
     ("roughplastic", "positivity"): "mitsuba2 #32 (open): NaN where the cosine is 0",
-    ("roughplastic", "energy"): "mitsuba3 #1155 (closed) is about what it loses when rough",
+    ("roughplastic", "energy"): "mitsuba3 #1155 (closed) is about the energy that it loses when rough",
     ("hair", "pdf"): "mitsuba3 #871 (merged 2023): its own chi-square test covers few parameters",
 }
 
 EXPLANATION = """
 - *pass*: the law holds within its tolerance, at the given values and at those that the page names. *declared*: the
-  model states that it breaks the law, and how far. **fails**, with the grade: *invisible* (under .1 % of the reflected
-  light on average and under 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %), *broken*; *NaN*; *noise* (costs
-  samples, biases nothing); *interface* (calls that plain path tracers do not make); *inner* (what it holds fails, and
-  around a sound one the law holds); *by nature* (what the plugin is meant to be breaks the law).
+  model declares that it violates the law, and by how much. **fails**, with the grade: *invisible* (under 0.1 % of the
+  reflected light on average and under 1 % at worst), *small* (1 %, 10 %), *visible* (10 %, 50 %), *broken*; *NaN*;
+  *noise* (costs samples, biases nothing); *interface* (calls that plain path tracers do not make); *inner* (a material
+  inside it fails, and around a sound one the law holds); *by nature* (the law does not apply to this kind of plugin).
 - *-*: the law does not apply; the page says why. Mitsuba's plugins are float32, with wider tolerances, and have no
-  64-bit twin for `gradients` and `precision`.
+  64-bit variant for `gradients` and `precision`.
 - A sample of weight 0 counts as failed, as in Mitsuba's own chi-square test.
 - BSDFs of BSDFs are judged with plain ones inside: blendbsdf = diffuse + roughconductor, mask, bumpmap and normalmap
-  over diffuse, twosided over roughconductor. bumpmap is a uniform slope: a turned normal is by nature neither
-  isotropic nor reciprocal about the geometric one. hair is defined about a fibre, not about a surface's normal.
+  over diffuse, twosided over roughconductor. bumpmap is a uniform slope: a tilted normal is by nature neither
+  isotropic nor reciprocal about the geometric one. hair is defined about a fiber, not about a surface normal.
 - Mitsuba's microfacet plugins take Beckmann's distribution by default; here GGX too.
 """
 
 BLIND = """
 ## What this cannot see
 
-One point of a surface (uv = .5, .5) without textures, unpolarized light in three channels, the parameter values above
-and no others, figures below the tolerances; what an integrator does between two surfaces; and whether the formula is
-the right one for the material: a law holds for many wrong formulas.
+One point of a surface (uv = 0.5, 0.5) without textures, unpolarized light in three channels, the parameter values above
+and no others, figures below the tolerances; the integrator between two surfaces; and whether the formula is right for
+the material: the laws hold for many wrong formulas.
 """
 
 
@@ -91,10 +91,10 @@ def trials(target: str) -> list[Any]:
 
 
 def losses(report: Report) -> dict[str, str]:
-    """What the white furnace loses, setting by setting."""
+    """The loss of the white furnace, per setting."""
     words = "white furnace loses "
-    found = {card.title: [n for n in card["energy"].notes if n.startswith(words)] for card in report.cards}
-    return {title: notes[0].removeprefix(words) for title, notes in found.items() if notes}
+    notes_of = {card.title: [n for n in card["energy"].notes if n.startswith(words)] for card in report.cards}
+    return {title: notes[0].removeprefix(words) for title, notes in notes_of.items() if notes}
 
 
 def summary(report: Report, law: str) -> str:
@@ -103,8 +103,8 @@ def summary(report: Report, law: str) -> str:
     failed = sorted((v for v in verdicts if v.failed), key=_rank)
     if failed:
         return f"**{failed[0].grade or 'fails'}**"
-    found = {v.status for v in verdicts}
-    return next(MARKS[status] for status in (DECLARED, PASS, NOT_APPLICABLE) if status in found)
+    statuses = {v.status for v in verdicts}
+    return next(MARKS[status] for status in (DECLARED, PASS, NOT_APPLICABLE) if status in statuses)
 
 
 def _rank(verdict: Verdict) -> tuple[int, float]:
@@ -113,8 +113,8 @@ def _rank(verdict: Verdict) -> tuple[int, float]:
 
 
 def findings(target: str, report: Report) -> list[dict[str, Any]]:
-    """All that fails, and the programs that show it."""
-    found = []
+    """All failures, and the programs that show them."""
+    failures = []
     for card in report.cards:
         for v in card.verdicts:
             if not v.failed:
@@ -124,7 +124,7 @@ def findings(target: str, report: Report) -> list[dict[str, Any]]:
                 PROGRAMS.mkdir(exist_ok=True)
                 about = f"# {card.title}: {v.law}. Mitsuba {version('mitsuba')}, {datetime.date.today()}.\n"
                 (PROGRAMS / f"{name}.py").write_text(about + v.reproduction)
-            found.append(
+            failures.append(
                 {
                     "rank": _rank(v),
                     "grade": str(v.grade or "ungraded"),
@@ -137,7 +137,7 @@ def findings(target: str, report: Report) -> list[dict[str, Any]]:
                     "program": f"programs/{name}.py" if v.reproduction else "",
                 }
             )
-    return found
+    return failures
 
 
 def _size(v: Verdict) -> str:
@@ -158,7 +158,7 @@ def page(target: str, report: Report) -> str:
         f"# {target}",
         "",
         f"`gonio verify`, {made}Gonio {go.__version__}, {datetime.date.today()}, effort {report.effort}, seed "
-        f"{report.seed}; {report.tests} statistical tests at {report.threshold:.1e} each (.01 over all, Sidak), "
+        f"{report.seed}; {report.tests} statistical tests at {report.threshold:.1e} each (0.01 over all, Sidak), "
         "rejections confirmed with a second seed.",
     ]
     for card in report.cards:
@@ -231,7 +231,7 @@ def main() -> int:
 
 
 def overview(results: dict[str, Any], effort: str, seed: int) -> str:
-    """All that fails, the worst first, and the tables of all targets."""
+    """All failures, the worst first, and the tables of all targets."""
     renderers = f"Gonio {go.__version__} and Mitsuba {version('mitsuba')} (llvm_ad_rgb), {datetime.date.today()}"
     ordered = sorted(results.items(), key=lambda item: (":" in item[0], item[0]))
     lines = [
@@ -242,12 +242,12 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
         "",
         *EXPLANATION.strip().splitlines(),
         "",
-        "## What fails, the worst first",
+        "## Failures, the worst first",
         "",
         "Shares are of the reflected light. A program needs Mitsuba alone, and ends with an AssertionError that gives",
         "the figure for as long as the fault is there.",
         "",
-        "| grade | BSDF | law | what it does | probable cause | known upstream | program |",
+        "| grade | BSDF | law | effect | probable cause | known upstream | program |",
         "|---|---|---|---|---|---|---|",
     ]
     failures = [one for _, result in ordered for one in result.get("findings", [])]
@@ -272,9 +272,9 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
             lines.append(f"| {link} | " + " | ".join(result["laws"][law] for law in SHORT) + " |")
     lines += [
         "",
-        "## How well they sample",
+        "## Sampling quality",
         "",
-        "No verdict: two can hold all laws and differ here. Means over the hemisphere of wo.",
+        "Figures, not verdicts: two materials that hold all laws may differ here. Means over the hemisphere of wo.",
         "",
         "| target, setting | samples that fail | variance of the weight | against cosine sampling | of the ideal |",
         "|---|---|---|---|---|",
@@ -285,9 +285,9 @@ def overview(results: dict[str, Any], effort: str, seed: int) -> str:
                 lines.append(f"| {setting} | {' | '.join(text.split('fail')[0].strip() for text in texts)} |")
     lines += [
         "",
-        "## What a white furnace loses",
+        "## Loss of the white furnace",
         "",
-        "Every albedo 1 and, where it can be chosen, F = 1. The loss is that of the average over a hemisphere, and the",
+        "Every albedo 1 and, where it can be chosen, F = 1. The loss is the average over a hemisphere, and the",
         "largest; a negative loss is a gain.",
         "",
         "| target, setting | loss |",

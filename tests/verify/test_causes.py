@@ -226,7 +226,7 @@ def test_the_chi_square_tells_place_and_size() -> None:
     assert held is not None
     words = crowding.crowd(subject, held)
     # .55 / .5 where only the wide lobe is, and the noise of cells with a few hundred samples
-    assert 8.0 < float(words.partition(" % more samples than the pdf says")[0]) < 18.0, words
+    assert 8.0 < float(words.partition(" % more samples than the pdf predicts")[0]) < 18.0, words
     assert "of the light" in words
 
 
@@ -254,7 +254,7 @@ def test_what_the_examiners_named_is_named() -> None:
     for cls, law, words in (
         (ChoiceNumberAgain, "pdf", "u.x chooses a lobe"),
         (GreyWeight, "weight", "the weight is grey"),
-        (OneLobeDensity, "weight", "a lobe of a mixture left out"),
+        (OneLobeDensity, "weight", "a missing lobe of a mixture"),
         (CertainOfItself, "delta", "the pdf of delta samples is 1"),
     ):
         assert words in verify(cls(), quick=True, law=law)[law].cause, cls

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gonio as go
 import numpy as np
 import pytest
-from gonio.verify import directions, histogram, statistics, subject, verify
+from gonio.verify import cells, directions, histogram, statistics, subject, verify
 from scipy import stats
 
 WO = directions.single(directions.at(np.array([0.0, 45.0, 89.5]), np.array([0.0, 20.0, 200.0])))
@@ -13,7 +13,7 @@ WO = directions.single(directions.at(np.array([0.0, 45.0, 89.5]), np.array([0.0,
 
 def outcomes(model: go.BSDF, log_samples: int, seed: int, wo: np.ndarray = WO) -> list[histogram.Outcome]:
     one = subject.of(model)
-    grid = histogram.place(one, wo, seed)
+    grid = cells.place(one, wo, seed)
     assert grid is not None
     expected = histogram.expect(one, grid, 0.1 * 2.0 ** (-0.5 * log_samples))
     counts = histogram.count(one, grid, log_samples, seed)
@@ -29,14 +29,14 @@ def test_a_right_model_is_not_rejected_at_any_width(alpha: float) -> None:
 
 def test_there_are_as_many_cells_as_promised() -> None:
     one = subject.of(go.Lambert(0.5))
-    grid = histogram.place(one, WO, 1)
+    grid = cells.place(one, WO, 1)
     assert grid is not None
     assert grid.rows.shape[2] - 1 >= 100 and grid.columns.shape[3] - 1 >= 200
 
 
 def test_the_kernel_counts_where_numpy_counts() -> None:
     one = subject.of(go.Conductor(alpha=0.3))
-    grid = histogram.place(one, WO[1:2], 1)
+    grid = cells.place(one, WO[1:2], 1)
     assert grid is not None
     counts = histogram.count(one, grid, 14, 5)
     from gonio.ops import backend
@@ -46,9 +46,9 @@ def test_the_kernel_counts_where_numpy_counts() -> None:
     u = np.array(histogram.random_numbers(kind, index, 5).numpy()).T
     s = one.sample(np.repeat(WO[1:2], len(u), 0), u, precision="float32")
     wi = s.wi[s.pdf > 0].astype(np.float32)
-    height, turn = histogram._height(wi), histogram._turn(wi)
-    row = np.clip(np.searchsorted(grid.rows[0, 0], height, "right") - 1, 0, histogram.CELLS[0] - 1)
-    expected = np.bincount(row, minlength=histogram.CELLS[0])
+    height, turn = cells.height(wi), cells.pseudo_angle(wi)
+    row = np.clip(np.searchsorted(grid.rows[0, 0], height, "right") - 1, 0, cells.CELLS[0] - 1)
+    expected = np.bincount(row, minlength=cells.CELLS[0])
     # a sample on an edge may be rounded to either side
     assert np.abs(counts.cells[0, 0].sum(1) - expected).sum() <= 6
     assert turn.min() >= 0 and turn.max() <= 4
@@ -76,7 +76,7 @@ def test_a_step_beside_the_edges_of_a_ring_of_cells_is_found(place: float) -> No
     rng = np.random.default_rng(1)
     pilot = directions.on_side(directions.uniform(rng, 40_000), 1)
     wo = np.array([[0.0, 0.0, 1.0]])
-    grid = histogram.place_around([pilot], wo, lambda _, wi: np.ones(len(wi)))
+    grid = cells.place_around([pilot], wo, lambda _, wi: np.ones(len(wi)))
     low, high = grid.rows[0, 0, 50:52].astype(float)
     edge = low + place * (high - low)
 

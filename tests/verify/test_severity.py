@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gonio.material import Sample
 from gonio.ops import where
-from gonio.verify import severity, verify
+from gonio.verify import estimators, severity, verify
 from gonio.verify.severity import Bias, Grade
 from gonio.verify.subject import of
 
@@ -55,8 +55,8 @@ class PdfBelow(RightDiffuse):
         return RightDiffuse.pdf(self, wo, wi) + where((wo.z > 0.0) & (wi.z < 0.0), 0.1 * abs(wi.z) / np.pi, 0.0)
 
 
-def sampling(material: go.BSDF, part: severity.Part = "all") -> Bias:
-    return severity.of_sampling(of(material), part)
+def sampling(material: go.BSDF, part: estimators.Part = "all") -> Bias:
+    return estimators.sampling_bias(of(material), part)
 
 
 def test_views_are_shares_of_the_hemisphere() -> None:
@@ -95,7 +95,7 @@ def test_half_a_hemisphere_loses_half_where_only_samples_are_followed() -> None:
 
 def test_the_lobes_probability() -> None:
     # the diffuse lobe's samples are found 1.1 times as often, the narrow one's .9 times, against the pdf's half each
-    found = severity.estimates(of(OtherLobeWeights()))
+    found = estimators.estimate(of(OtherLobeWeights()))
     c = (np.arange(4000) + 0.5) / 4000
     wide, narrow = c / np.pi, 21.0 / (2.0 * np.pi) * c**20
     expected = np.mean(0.8 * 2.0 * c * (0.55 * wide + 0.45 * narrow) / (0.5 * (wide + narrow)))
@@ -133,7 +133,7 @@ def test_mass_of_the_pdf_where_no_sample_falls_is_noise() -> None:
     from gonio.verify.verdict import Finding
 
     told = Pdf().bias(of(PdfBelow()), Finding(0.1, 1e-3, ""), None, 1)  # type: ignore[arg-type]
-    assert told.grade is Grade.NOISE and "10 % of samples that never come" in told.words
+    assert told.grade is Grade.NOISE and "10 % of samples that never occur" in told.words
 
 
 def test_nan_is_a_grade_of_its_own() -> None:

@@ -27,7 +27,7 @@ class MitsubaBSDF(BSDF):
     """A BSDF of Mitsuba's."""
 
     precisions: ClassVar[tuple[str, ...]] = ("float32",)
-    black_fails: ClassVar[bool] = True
+    zero_weight_is_failure: ClassVar[bool] = True
     bsdf: ClassVar[BSDFPlugin]  # of an instance, but no parameter
     _si: ClassVar[SurfaceInteraction | None] = None  # where it is asked, on a copy that `at` bound
     _active: ClassVar[Mask] = True

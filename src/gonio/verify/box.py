@@ -1,12 +1,12 @@
-"""Where in the ranges of its parameters a BSDF is tried: not only at the values that were given.
+"""The parameter values at which a BSDF is judged, besides the given ones.
 
-A material that is right at its defaults may be wrong for a coat above .9, for a narrow lobe, or where two parameters
-meet. So the laws are asked again, at less cost, at corners, edges and random points of the declared ranges, and on both
-sides of every place where a scan along one parameter sees the values jump.
+A material that is right at its defaults may be wrong for a coat above 0.9, for a narrow lobe, or for a combination of
+two parameters. So the laws are judged again, at less cost, at corners, edges and random points of the declared ranges,
+and behind every jump of the values in a scan along one parameter.
 
     for place in box.places(subject, effort, seed): ...     place.values, place.why, place.subject
 
-No range is invented: a parameter that declares none stays at its value.
+No range is assumed: a parameter that declares none stays at its value.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from .effort import Effort
 from .subject import Fault, Subject
 
 SCAN = 64  # values along one parameter
-RAYS = 96  # pairs of directions for each of them
-WIDE = 30.0  # a range whose ends differ by more is scanned and drawn from in equal ratios
-JUMP = 6.0  # how many times its neighbours' a step must be
-LEAST = 0.004  # and how large, as a share of the value: what is smaller no one sees
-DEAR = 1  # place of a material whose values must not vary from ray to ray
-MANY = 9  # places for each choice of names that is tried
+RAYS = 96  # pairs of directions per value
+WIDE = 30.0  # ratio of the ends beyond which a range is scanned and sampled in equal ratios
+JUMP = 6.0  # least ratio of a jump to the neighboring steps
+MIN_JUMP = 0.004  # least jump, as a share of the value: smaller ones are invisible
+UNIFORM_PLACES = 1  # places of a material whose values must not vary from ray to ray
+PLACES_PER_CHOICE = 9
 MARGIN = 0.02  # of a range, where its ends are left out
-DARK = 0.01  # least albedo of what tells of a failed sample by a weight of 0: a black sample is no failure
-SMALLEST = 1e-4  # of a range that starts at 0, where equal ratios have no first step
+MIN_ALBEDO = 0.01  # of plugins whose failed samples have weight 0: black samples would count as failed
+MIN_RATIO = 1e-4  # first value over the last of a range that starts at 0 and is divided in equal ratios
 
 
 @dataclasses.dataclass(frozen=True)
 class Place:
-    """A point of the box.
+    """A point in the ranges of the parameters.
 
-    values   what differs from the given material, by path
+    values   those that differ from the given material, by path
     why      "given", "choice", "corner", "edge", "interior" or "jump"
     subject  the BSDF there
     along    the parameters that move; those of the subject itself where it is the given one
@@ -55,11 +55,11 @@ class Place:
     along: tuple[Axis, ...] = ()
 
     def inside(self) -> Place:
-        """The point moved in from the ends of the ranges, where values may be clamped and slopes break off."""
+        """The point moved away from the ends of the ranges, where values may be clamped and have no derivatives."""
         moved = {}
         for number, axis in enumerate(self.along or axes(self.subject)):
             value = tree.value_at(self.subject.model, axis.path)
-            # not all by the same: eta = k is a place where a conductor's formula has a kink
+            # not all by the same amount: at eta = k the formula of a conductor has a kink
             margin = MARGIN * (1.0 + 0.1 * number) * (axis.high - axis.low)
             if axis.path in self.values:
                 moved[axis.path] = float(np.clip(self.values[axis.path], axis.low + margin, axis.high - margin))
@@ -70,7 +70,7 @@ class Place:
         values = {path: moved.get(path, value) for path, value in self.values.items()}
         try:
             return dataclasses.replace(self, values=values, subject=self.subject.replace(**moved))
-        except InputError:  # at the end of its range one parameter asks something of another
+        except InputError:  # at the end of its range one parameter restricts another
             return self
 
     @property
@@ -81,7 +81,7 @@ class Place:
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """One parameter that may move, from `low` to `high`; `ratio` where in equal ratios."""
+    """The range of one parameter; `ratio` where it is divided in equal ratios."""
 
     path: str
     low: float
@@ -89,10 +89,10 @@ class Axis:
     ratio: bool
 
     def at(self, share: float | np.ndarray) -> Any:
-        """The value at a share of the way, 0 to 1."""
+        """The value at a share of the range, 0 to 1."""
         if not self.ratio:
             return self.low + share * (self.high - self.low)
-        low = self.low if self.low > 0.0 else SMALLEST * self.high
+        low = self.low if self.low > 0.0 else MIN_RATIO * self.high
         value = low * (self.high / low) ** share
         return np.where(np.asarray(share) <= 0.0, self.low, value) if self.low <= 0.0 else value
 
@@ -101,25 +101,25 @@ def axes(subject: Subject) -> list[Axis]:
     """The parameters that declare a range, inner materials' included."""
     if not isinstance(subject.model, BSDF):
         return []
-    found = []
+    axes_ = []
     for leaf in tree.surface(subject.model):
         ends = _ends(leaf.parameter, leaf.value)
         if ends is None:
             continue
         low, high, ratio = ends
-        if leaf.parameter.kind == "spectrum" and subject.black_fails:
-            low = max(low, min(DARK, high))
+        if leaf.parameter.kind == "spectrum" and subject.zero_weight_is_failure:
+            low = max(low, min(MIN_ALBEDO, high))
         if leaf.owner is not subject.model and _becomes_delta(subject, leaf.path, low):
             low += MARGIN * (high - low)
-        found.append(Axis(leaf.path, low, high, ratio))
-    return found
+        axes_.append(Axis(leaf.path, low, high, ratio))
+    return axes_
 
 
 def _becomes_delta(subject: Subject, path: str, value: float) -> bool:
-    """Whether an inner material has a delta lobe at this value, while the one that holds it says that there is none:
-    it was not written for such lobes, and need not answer for them."""
+    """Whether an inner material has a delta lobe at this value, while the outer one declares none: it was not written
+    for such lobes."""
     if _hides_delta(subject.model):
-        return False  # as given: then it does answer
+        return False  # also at the given values, which are to be judged
     try:
         return _hides_delta(subject.replace(**{path: value}).model)
     except InputError:
@@ -140,7 +140,7 @@ def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
     if not math.isfinite(low):
         return None
     if not math.isfinite(high):
-        # no upper end is declared, and none is invented: up to what was given
+        # no upper end is declared, and none is assumed: up to the given value
         high = float(np.max(np.asarray(pair_of(value) if parameter.kind == "alpha" else value, float)))
     if not low < high:
         return None
@@ -148,18 +148,18 @@ def _ends(parameter: Parameter, value: Any) -> tuple[float, float, bool] | None:
 
 
 def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
-    """The points to try besides the given one, each once, in order of importance."""
+    """The points besides the given one, each once, in order of importance."""
     along, others = axes(subject), _choices(subject)
     if not (along or others) or effort.places <= 0:
         return []
-    # what must be the same for all rays is worked out anew for each value, which takes seconds
-    most = min(effort.places, DEAR) if subject.model.needs_uniform else effort.places
+    # values that must be the same for all rays are derived for each place, which takes seconds
+    most = min(effort.places, UNIFORM_PLACES) if subject.model.needs_uniform else effort.places
     rng = np.random.default_rng([seed, 71])
     wanted: list[tuple[str, dict[str, Any]]] = []
     if not subject.model.needs_uniform:
         for jump in jumps(subject, along, seed)[: max(2, most // 3)]:
             wanted.append(("jump", jump))
-    wanted += [("choice", other) for other in others[: max(1, most // MANY)]]
+    wanted += [("choice", other) for other in others[: max(1, most // PLACES_PER_CHOICE)]]
     corners = [{axis.path: axis.at(float(end)) for axis in along} for end in (0, 1)] if along else []
     if len(along) > 1:
         for _ in range(2):
@@ -186,8 +186,8 @@ def places(subject: Subject, effort: Effort, seed: int) -> list[Place]:
 
 
 def _choices(subject: Subject) -> list[dict[str, str | bool]]:
-    """Each name that a choice has besides the given one, and each switch the other way; of several the first of each,
-    then the next, as a change of code costs more than one of a number."""
+    """Each other option of a choice, and each flag inverted; of several the first of each, then the next, as a change
+    of code costs more than one of a number."""
     if not isinstance(subject.model, BSDF) or subject.model.needs_uniform:
         return []
     turns: list[list[dict[str, str | bool]]] = []
@@ -200,7 +200,7 @@ def _choices(subject: Subject) -> list[dict[str, str | bool]]:
 
 
 def covered(subject: Subject, tried: list[Place]) -> str:
-    """What was tried, in a sentence."""
+    """The judged parameter values, in a sentence."""
     if not tried:
         return "judged at the given values only" + ("" if axes(subject) else ": no parameter declares a range")
     kinds = Counter(place.why for place in tried)
@@ -218,23 +218,23 @@ def _made(subject: Subject, values: dict[str, Any], why: str, along: tuple[Axis,
     try:
         return Place(values, why, subject.replace(**values), along)
     except InputError:
-        return None  # the material refuses the values: it need not answer for them
+        return None  # the material rejects the values
 
 
-# --------------------------------------------------------------------------- where something changes fast
+# --------------------------------------------------------------------------- jumps
 
 
 def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]]:
-    """Values on the far side of a jump, and in its middle, the largest jump first.
+    """Values behind a jump, the largest jump first.
 
-    Each parameter is moved through its range, the others as given, and eval, pdf and the mean weight are looked at. The
-    step from one value to the next is held against its neighbours': where it is many times theirs, something begins.
+    Each parameter is moved through its range, with the others as given. A step of eval, pdf or the mean weight from one
+    value to the next that is many times the neighboring steps is a jump.
     """
-    found: list[tuple[float, dict[str, Any]]] = []
+    sized: list[tuple[float, dict[str, Any]]] = []
     for axis in along:
-        if axis.path in subject.model.fixed:  # tables would be found anew for each of a hundred values
+        if axis.path in subject.model.fixed:  # tables would be computed for each value
             continue
-        # not from 0 where the steps are in ratio: the first is of another size than all others
+        # not from 0 where steps are ratios: the first step would differ from all others
         first = 1.0 / SCAN if axis.ratio and axis.low <= 0.0 else 0.0
         values = np.asarray(axis.at(np.linspace(first, 1.0, SCAN)), float)
         try:
@@ -243,21 +243,21 @@ def jumps(subject: Subject, along: list[Axis], seed: int) -> list[dict[str, Any]
             continue
         for curve in curves:
             for size, at in _steps(curve):
-                # the value just behind the step, and one further in: what begins there may end soon
-                found.append((size, {axis.path: float(values[at])}))
-    found.sort(key=lambda one: -one[0])
-    kept: list[dict[str, Any]] = []
-    for _, one in found:
-        if one not in kept:
-            kept.append(one)
-    return kept
+                # the value just behind the step, and the next: the change may end soon
+                sized.append((size, {axis.path: float(values[at])}))
+    sized.sort(key=lambda one: -one[0])
+    values_: list[dict[str, Any]] = []
+    for _, one in sized:
+        if one not in values_:
+            values_.append(one)
+    return values_
 
 
 def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
-    """Sizes of the jumps of curves (SCAN, N) along the first axis, and the value behind each.
+    """Sizes of the jumps of curves (SCAN, N) along the first axis, and the index behind each.
 
-    The median over the N curves of the bend relative to the value, so that a factor over all directions shows however
-    small it is, and the largest tenth, so that one that a few directions have does. What is linear has no bend.
+    The bend is a second difference relative to the value, 0 for linear curves. Its median over the N curves shows a
+    small factor for all directions, its 90th percentile a change for a few.
     """
     least = 1e-6 * float(np.max(np.abs(curve), initial=0.0, where=np.isfinite(curve)))
     if least <= 0.0:
@@ -265,23 +265,23 @@ def _steps(curve: np.ndarray) -> list[tuple[float, int]]:
     size_of = np.maximum(np.maximum(np.abs(curve[:-2]), np.abs(curve[2:])), np.abs(curve[1:-1]))
     lit = np.minimum(np.abs(curve[:-2]), np.abs(curve[2:])) > least
     bend = np.where(lit, np.abs(curve[2:] - 2.0 * curve[1:-1] + curve[:-2]) / np.maximum(size_of, least), 0.0)
-    found = []
+    sized = []
     for share in (50.0, 90.0):
         size = np.percentile(bend, share, axis=1)
         for i in range(len(size)):
             near = np.concatenate([size[max(i - 5, 0) : max(i - 1, 0)], size[i + 2 : i + 6]])
             usual = float(np.median(near)) if len(near) else 0.0
-            if size[i] > LEAST and size[i] > JUMP * usual:
-                found.append((float(size[i]) / (1.0 if share == 50.0 else 2.0), i + 1))
-                found.append((float(size[i]) / (1.01 if share == 50.0 else 2.02), i + 2))
-    return [(size, min(at, SCAN - 1)) for size, at in found]
+            if size[i] > MIN_JUMP and size[i] > JUMP * usual:
+                sized.append((float(size[i]) / (1.0 if share == 50.0 else 2.0), i + 1))
+                sized.append((float(size[i]) / (1.01 if share == 50.0 else 2.02), i + 2))
+    return [(size, min(at, SCAN - 1)) for size, at in sized]
 
 
 def _curves(subject: Subject, path: str, values: np.ndarray, along: list[str], seed: int) -> list[np.ndarray]:
-    """eval, pdf (SCAN, N) and weights (SCAN, N) at the same directions and numbers for every value.
+    """eval, pdf and weights (SCAN, N) at the same directions and random numbers for every value.
 
-    along  the paths of all parameters that are moved, one after the other: each is given as an array, so that one
-           kernel serves them all
+    along  the paths of all parameters that are moved in turn: each is given as an array, so that one kernel serves
+           them all
     """
     rng = np.random.default_rng([seed, 72])
     sides = np.array(subject.sides or (1,))
@@ -321,8 +321,8 @@ def _repeated(subject: Subject, path: str, count: int) -> np.ndarray:
 
 
 def per_ray(subject: Subject, values: Mapping[str, np.ndarray]) -> Subject | None:
-    """The subject with one value a ray of some parameters, by path, a colour's (N,) or (N, 3), a pair of widths' (N,)
-    or (N, 2); None where it takes no arrays."""
+    """The subject with one value per ray of some parameters, by path, of a color (N,) or (N, 3), of a pair of widths
+    (N,) or (N, 2); None where it takes no arrays."""
     kinds = {leaf.path: leaf.parameter.kind for leaf in tree.leaves(subject.model)}
     arrays: dict[str, Any] = {}
     for path, column in values.items():

@@ -1,4 +1,4 @@
-"""Directions by their angles, and the pairs of directions that the pointwise laws are judged on."""
+"""Directions: from and to angles, uniform, rounded and rotated."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ def at(theta: float | np.ndarray, phi: float | np.ndarray = 0.0) -> np.ndarray:
     t, p = np.broadcast_arrays(np.radians(theta), np.radians(phi))
     # from the nearer pole: sin(pi) is not 0 in floating point
     below = t > 0.5 * np.pi
-    turned = np.where(below, np.radians(180.0 - np.asarray(theta, float)), t)
-    z = np.where(below, -np.cos(turned), np.cos(turned))
-    return np.stack([np.sin(turned) * np.cos(p), np.sin(turned) * np.sin(p), z], axis=-1)
+    from_pole = np.where(below, np.radians(180.0 - np.asarray(theta, float)), t)
+    z = np.where(below, -np.cos(from_pole), np.cos(from_pole))
+    return np.stack([np.sin(from_pole) * np.cos(p), np.sin(from_pole) * np.sin(p), z], axis=-1)
 
 
 def angles(w: np.ndarray) -> np.ndarray:
@@ -31,12 +31,12 @@ def text(w: np.ndarray) -> str:
 
 
 def parse(pair: str) -> tuple[np.ndarray, np.ndarray]:
-    """(wo, wi) of "theta_o,phi_o/theta_i,phi_i" in degrees; InputError where it is none."""
+    """(wo, wi) of "theta_o,phi_o/theta_i,phi_i" in degrees. InputError where the text is malformed."""
     try:
         (to, po), (ti, pi) = ([float(x) for x in part.split(",")] for part in pair.split("/"))
     except ValueError:
         hint = "give theta_o,phi_o/theta_i,phi_i in degrees, such as 30,0/45,180"
-        raise InputError(f"'{pair}' is no pair of directions", "--at", hint) from None
+        raise InputError(f"'{pair}' is not a pair of directions", "--at", hint) from None
     return at(to, po), at(ti, pi)
 
 
@@ -56,16 +56,16 @@ def on_side(w: np.ndarray, side: int) -> np.ndarray:
 
 
 def numbers(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Uniform (count, 3) in [0, 1) that float32 holds exactly, so that no rounding reaches 1."""
+    """Uniform numbers (count, 3) in [0, 1), exact in float32, so that no rounding reaches 1."""
     return rng.random((count, 3), dtype=np.float32).astype(np.float64)
 
 
 def single(w: np.ndarray) -> np.ndarray:
-    """The directions as float32 holds them, in float64: both precisions then see the same input."""
+    """The directions rounded to float32, in float64: both precisions then get the same input."""
     return w.astype(np.float32).astype(np.float64)
 
 
-def turned(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Directions (N, 3) turned about the normal by angles (N,), radians."""
+def rotated(w: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Directions (N, 3) rotated about the normal by angles (N,), radians."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], -1)

@@ -1,25 +1,25 @@
-"""How much a trial spends: directions, samples, accuracy."""
+"""The cost of a trial: directions, samples, accuracy."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from . import histogram
+from .cells import CELLS
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is spent.
+    """The cost of a trial.
 
     pairs            pairs of directions for the pointwise laws
-    log_samples      binary logarithm of the samples of the chi-square test, for each direction
-    furnace          directions of the furnace's curve
-    furnace_samples  of `sample`, for each of them
+    log_samples      binary logarithm of the samples of the chi-square test, per direction
+    furnace          directions wo of the furnace
+    furnace_samples  of `sample`, per direction
     accuracy         of integrals
-    widths           widths of microfacet distributions that sampling is also tried at
-    cells            rows and columns of the chi-square test, a side of the surface
-    full             whether these are the given values: views go to 89.9 degrees, and claims are held to
-    places           other parameter values that every law is tried at, `gonio.verify.box`
+    widths           other widths of microfacet distributions at which sampling is judged
+    cells            rows and columns of the chi-square test, per side of the surface
+    full             whether these are the given values: directions go to 89.9 degrees, and claims are checked
+    places           number of other parameter values at which every law is judged, `gonio.verify.box`
     """
 
     name: str
@@ -30,7 +30,7 @@ class Effort:
     accuracy: float
     widths: tuple[float, ...] = ()
     places: int = 0
-    cells: tuple[int, int] = histogram.CELLS
+    cells: tuple[int, int] = CELLS
     full: bool = True
 
 
@@ -39,8 +39,8 @@ EFFORTS = {
     "default": Effort("default", 1 << 16, 20, 32, 1 << 17, 3e-5, (0.005, 1.0), 18),
     "deep": Effort("deep", 1 << 19, 23, 64, 1 << 20, 1e-5, (0.005, 0.02, 0.05, 0.2, 0.5, 1.0), 60),
 }
-# At each of the other places. Not to the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower than the steps
-# between float32 directions.
+# At the other parameter values. Not to the horizon: a lobe of width 2e-4 at 89.9 degrees is narrower than the steps
+# of float32 directions.
 ELSEWHERE = {
     "quick": Effort("quick", 1 << 11, 14, 3, 1 << 12, 1e-3, cells=(30, 60), full=False),
     "default": Effort("default", 1 << 12, 16, 4, 1 << 14, 3e-4, cells=(30, 60), full=False),

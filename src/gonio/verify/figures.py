@@ -1,4 +1,4 @@
-"""What laws saw, and how the report draws it: Matplotlib's SVG as text."""
+"""The evidence of laws, and the report's figures of it: Matplotlib's SVG as text."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from . import cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,8 +53,9 @@ class SampleCells:
     """The cells of the chi-square test of one wo.
 
     expected, observed  samples in each cell, (sides, rows, columns)
-    rows, columns       edges of the cells, see `gonio.verify.histogram`
-    wo, sides           whose cells they are, and on which sides of the surface
+    rows, columns       edges of the cells, see `gonio.verify.cells`
+    drawn               samples in all
+    wo, sides           the direction that they belong to, and the sides of the surface with cells
     """
 
     expected: np.ndarray
@@ -64,20 +67,13 @@ class SampleCells:
     sides: tuple[int, ...] = (1,)
 
     def draw(self) -> tuple[str, str]:
-        """Samples, what the pdf expects, and their difference in standard deviations, about the brighter lobe."""
+        """Samples, their expectation by the pdf, and the difference in standard deviations, around the main lobe."""
         observed, expected = self.observed, self.expected
         side = int(np.argmax(observed.sum((1, 2))))
         o, e = observed[side].astype(float), expected[side]
-        height, turn = self.rows[side].astype(float), self.columns[side].astype(float)
-        quarter = np.minimum(np.floor(turn), 3.0)
-        azimuth = 0.5 * np.pi * quarter + np.arctan2(turn - quarter, 1.0 - (turn - quarter))
-        a, b, c, d = (
-            np.broadcast_to(v, o.shape) for v in (height[:-1, None], height[1:, None], azimuth[:, :-1], azimuth[:, 1:])
-        )
+        a, b, c, d = cells.boxes(self.rows[side], self.columns[side])
         area = np.maximum((b - a) * (d - c), 1e-30)
-        h, p = 0.5 * (a + b), 0.5 * (c + d)
-        r = np.sqrt(h * (2.0 - h))
-        x, y = r * np.cos(p), r * np.sin(p)
+        x, y, _ = np.moveaxis(cells.direction(0.5 * (a + b), 0.5 * (c + d), 1.0), -1, 0)
         # the window that holds 95 % of the samples, square
         order = np.argsort(-(e / area).ravel())
         inside = order[: max(int(np.searchsorted(np.cumsum(e.ravel()[order]), 0.95 * e.sum())), 8)]
@@ -94,7 +90,7 @@ class SampleCells:
         figure, axes = _canvas(10.0, 3.3, 3)
         top = max(float(np.percentile(grids[1], 99.8)), 1e-9)
         extent = (xe[0], xe[-1], ye[0], ye[-1])
-        for axis, grid, title in zip(axes[:2], grids, ("what sample does", "what pdf says"), strict=True):
+        for axis, grid, title in zip(axes[:2], grids, ("sample", "pdf"), strict=True):
             image = axis.imshow(
                 grid, origin="lower", extent=extent, cmap="cividis", vmin=0.0, vmax=top, interpolation="nearest"
             )
@@ -108,7 +104,7 @@ class SampleCells:
         _label(axes[2], "x of wi", "y of wi", "difference")
         figure.colorbar(shown, ax=axes[2], shrink=0.85, label="standard deviations").outline.set_visible(False)
         caption = (
-            f"{self.drawn:,} samples for the direction whose test came out lowest, seen from above, around the lobe. "
+            f"{self.drawn:,} samples for the wo with the lowest p-value, projected along the normal, around the lobe. "
             "The difference is noise where the law holds."
         )
         return _svg(figure), caption
@@ -120,7 +116,7 @@ class AlbedoCurves:
 
     quadrature, error  (N, channels)
     sampling, noise    mean weight and its standard error, (N, channels)
-    furnace, loss      albedo of the white twin, where there is one, and what it loses on average
+    furnace, loss      albedo of the lossless variant, where there is one, and its average loss
     """
 
     wo: np.ndarray
@@ -132,7 +128,7 @@ class AlbedoCurves:
     loss: float = 0.0
 
     def draw(self) -> tuple[str, str]:
-        """Albedo over angle by both estimators, and the furnace's loss."""
+        """Albedo over angle by both estimators, and the loss in the white furnace."""
         wo = self.wo
         theta = np.degrees(np.arctan2(np.hypot(wo[:, 0], wo[:, 1]), wo[:, 2]))
         order = np.argsort(theta)
@@ -162,7 +158,7 @@ class AlbedoCurves:
             )
         return (
             _svg(figure),
-            "Above the dotted line at 1 light is made of nothing. Points carry three standard errors.",
+            "Above the dotted line at 1, more light is reflected than arrives. Error bars are three standard errors.",
         )
 
 
@@ -195,13 +191,13 @@ class ReciprocityMap:
         bar.outline.set_visible(False)
         return (
             _svg(figure),
-            "Relative difference of f when the two directions trade places, the worst over eight azimuths.",
+            "Largest relative difference over eight azimuths of f with the two directions exchanged.",
         )
 
 
 @dataclass
 class RoundingErrors:
-    """The relative error of float32 pair by pair, and both cosines, (N,)."""
+    """The relative error of float32 per pair, and both cosines, (N,)."""
 
     error: np.ndarray
     cos_o: np.ndarray
@@ -220,4 +216,4 @@ class RoundingErrors:
         axes[0].set_xscale("log")
         axes[0].set_yscale("log")
         _label(axes[0], "smaller of the two cosines", "relative error of float32")
-        return _svg(figure), "float32 against float64, pair by pair; the 400 worst in red."
+        return _svg(figure), "float32 against float64 per pair of directions; the 400 worst in red."

@@ -1,21 +1,16 @@
 """Pearson's chi-square test of a model's samples against its pdf, in cells that follow the samples.
 
-A lobe of width .005 fills a hundred-thousandth of the sphere: fixed cells would hold it in one, or number millions. So
-a first, small draw (the pilot) places the edges, and a second, independent one is counted: 100 rows a side of the
-surface and 200 columns a row, at quantiles of the pilot, at equal steps, and at growing distances from its middle for
-the tails. The coordinates are (1 - |z|, a pseudo-angle of (x, y)): equal areas, no transcendental function, and no
-cancellation near the pole. Sampling, binning and counting are one kernel, in which nothing is stored but the counts.
+A second draw, independent of the pilot that placed the cells, is counted: sampling, binning and counting are one
+kernel, in which nothing is stored but the counts. Failed samples, delta samples and those outside of all cells are
+counted too: their expectation is 1 - int pdf.
 
-What fails, is a delta sample, or lands where no cell is, is counted too: its expectation is 1 - int pdf.
-
-    grid = place(subject, wo, seed)
+    grid = cells.place(subject, wo, seed)
     outcome = compare(expect(subject, grid, tolerance), count(subject, grid, log_samples, seed), row)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,47 +18,20 @@ from ..energy.albedo.cells import Seen, product, rim, step_aside
 from ..ops import backend
 from ..ops.backend import Array, Types
 from ..transport.sampler import mix, unit
-from . import directions, statistics
+from . import statistics
+from .cells import Density, Grid, boxes, direction
 from .subject import Subject, guarded
 
-CELLS = (100, 200)  # rows and columns a side of the surface
-COARSE = (10, 10)  # rows and columns that are joined for the coarse test, which sees small errors of broad lobes
-PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
-DEPTH = 9  # divisions of a cell; a step such as total reflection's divides those that it runs through to the last
-BESIDE = 1.1  # times: a step of a tenth next to the edges of a ring of cells is 1e-4 of all
-LARGEST = 400_000  # cells of one round, some 10 M directions
-LEAST = 10.0  # expectation of a pooled cell: Pearson's statistic then follows its limit well within the noise
-
-Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
-
-
-class Grid(NamedTuple):
-    """Cells of several wo.
-
-    wo     (N, 3)
-    sides  which sides of the surface have cells
-    rows   edges of 1 - |z|, (N, sides, rows + 1), float32
-    columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
-    """
-
-    wo: np.ndarray
-    sides: tuple[int, ...]
-    rows: np.ndarray
-    columns: np.ndarray
-
-    @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """(N, sides, rows, columns)."""
-        n, sides, rows, edges = self.columns.shape
-        return n, sides, rows, edges - 1
-
-
-FINEST = 3e-5  # of an azimuth: 120 of the steps that float32 directions have
+COARSE = (10, 10)  # rows and columns per cell of the coarse test, which detects small errors of broad lobes
+DEPTH = 9  # divisions of a cell; cells with a step, such as that of total reflection, are divided to the last
+ASIDE = 1.1  # times: a step of a tenth next to the edges of a ring of cells is 1e-4 of all
+MAX_CELLS = 400_000  # of one round, some 10 M directions
+MIN_EXPECTED = 10.0  # of a pooled cell: Pearson's statistic then follows its limit well within the noise
 
 
 class Expectation(NamedTuple):
-    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and how far that may
-    be off where cells were still to be divided."""
+    """Probability of each cell (N, sides, rows, columns), the integral of the pdf over all (N,), and its error where
+    cells were not fully divided."""
 
     cells: np.ndarray
     total: np.ndarray
@@ -71,7 +39,7 @@ class Expectation(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Samples in each cell (N, sides, rows, columns), all others (N,), and how many were drawn for each wo."""
+    """Samples in each cell (N, sides, rows, columns), all others (N,), and samples drawn per wo."""
 
     cells: np.ndarray
     others: np.ndarray
@@ -79,166 +47,60 @@ class Counts(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """p-values of one wo: of all cells, of coarse ones, and of the number of samples that are in none."""
+    """p-values of one wo: of all cells, of coarse ones, and of the number of samples outside of all cells."""
 
     fine: float
     coarse: float
     others: float
 
 
-# --------------------------------------------------------------------------- the cells
-
-
-def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
-    """Cells where the pilot's samples are; None where there is no sample with a density."""
-    rng = np.random.default_rng([seed, 11])
-    pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
-    many = np.repeat(wo, pilot, axis=0)
-    drawn = subject.sample(many, directions.numbers(rng, len(many)), precision="float32")
-    good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
-    if not good.any():
-        return None
-    rows = zip(drawn.wi.reshape(len(wo), pilot, 3), good.reshape(len(wo), pilot), strict=True)
-    return place_around([wi[kept] for wi, kept in rows], wo, lambda o, i: subject.pdf(o, i, "float32"), cells)
-
-
-def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
-    """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf claims some.
-
-    A wo is left out whose samples lie so close together that float32 directions are a visible raster.
-    """
-    sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
-    resolved = [i for i, wi in enumerate(pilot) if _spread(wi) > FINEST]
-    pilot, wo = [pilot[i] for i in resolved], wo[resolved]
-    many_rows, many_columns = cells
-    rows = np.empty((len(wo), len(sides), many_rows + 1), np.float32)
-    columns = np.empty((len(wo), len(sides), many_rows, many_columns + 1), np.float32)
-    for i, wi in enumerate(pilot):
-        for j, side in enumerate(sides):
-            mine = wi[side * wi[:, 2] > 0.0]
-            height, turn = _height(mine), _turn(mine)
-            order = np.argsort(height)
-            height, turn = height[order], turn[order]
-            rows[i, j] = _edges(height, 0.0, 1.0, many_rows)
-            for r, (a, b) in enumerate(zip(rows[i, j][:-1], rows[i, j][1:], strict=True)):
-                first, last = np.searchsorted(height, [a, b])
-                more = max(300 - (last - first), 0) // 2  # neighbours say where a row with few samples has its own
-                columns[i, j, r] = _edges(turn[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
-    return Grid(wo, sides, rows, columns)
-
-
-def _spread(wi: np.ndarray) -> float:
-    """How far the middle half of directions spreads in azimuth; infinite where there are too few to say."""
-    if len(wi) < 20:
-        return float("inf")
-    first, last = np.percentile(_turn(wi), [25.0, 75.0])
-    return float(last - first)
-
-
-def _claims(pdf: Density, wo: np.ndarray, side: int) -> bool:
-    """Whether the pdf claims anything on that side."""
-    rng = np.random.default_rng(3)
-    wi = directions.on_side(directions.uniform(rng, 256 * len(wo)), side)
-    return bool(np.any(pdf(np.repeat(wo, 256, axis=0), wi) > 0.0))
-
-
-def _height(w: np.ndarray) -> np.ndarray:
-    """1 - |z|, from x and y: nothing cancels near the pole."""
-    return (w[:, 0] ** 2 + w[:, 1] ** 2) / (1.0 + np.abs(w[:, 2]))
-
-
-def _turn(w: np.ndarray) -> np.ndarray:
-    """Pseudo-angle in [0, 4]: monotone in the azimuth, y / (|x| + |y|) in the first quarter."""
-    reach = np.abs(w[:, 0]) + np.abs(w[:, 1])
-    t = w[:, 1] / np.where(reach > 0, reach, 1.0)
-    return np.where(w[:, 0] < 0, 2.0 - t, np.where(w[:, 1] < 0, 4.0 + t, t))
-
-
-def _azimuth(turn: np.ndarray) -> np.ndarray:
-    """The azimuth in [0, 2 pi] of a pseudo-angle in [0, 4]."""
-    quarter = np.minimum(np.floor(turn), 3.0)
-    t = turn - quarter
-    return 0.5 * np.pi * quarter + np.arctan2(t, 1.0 - t)
-
-
-def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """count + 1 edges over [low, high]: half at quantiles, a quarter evenly, a quarter at growing distances."""
-    inside = values[(values > low) & (values < high)]
-    if not len(inside):
-        return np.linspace(low, high, count + 1).astype(np.float32)
-    even, far = count // 4 - 2, count // 4
-    own = np.sort(inside)[np.linspace(0, len(inside) - 1, count - 1 - even - far).astype(int)]
-    first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
-    tails = [
-        middle + sign * _growing(reach, high - low, far // 2)
-        for sign, reach in ((1, last - middle), (-1, middle - first))
-    ]
-    # a density that ends with a step does so just beyond the outermost samples
-    beyond = [own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])]
-    spread = np.concatenate([own, beyond, np.linspace(low, high, even + 2)[1:-1], *tails])
-    edges = np.sort(np.clip(spread, low, high))
-    # clipped tails leave several edges at an end: cells of no width, which count nothing and expect nothing
-    edges = np.concatenate([[low], edges, np.full(max(count - len(edges), 0), high)])[: count + 1]
-    edges[-1] = high
-    return edges.astype(np.float32)
-
-
-def _growing(first: float, last: float, count: int) -> np.ndarray:
-    """Distances in equal ratios, by 1e4 at least: a lobe of width 1e-4 has its tail a million of its heights away."""
-    first = max(first, 1e-10)
-    return first * max(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1))
-
-
-# --------------------------------------------------------------------------- what the pdf expects
+# --------------------------------------------------------------------------- the expectation by the pdf
 
 
 def expect(pdf: Density | Subject, grid: Grid, tolerance: float) -> Expectation:
-    """The pdf's integral over every cell; cells whose value is off by more than their noise allows are divided.
+    """The pdf's integral over every cell; cells whose error exceeds what their noise allows are divided.
 
     pdf        of a subject, or a function of rows
     tolerance  error allowed in a cell, as a share of the square root of its expected count at `1 / tolerance^2` samples
     """
     shape = grid.shape
     look: _Look = _InKernel(pdf, grid.wo) if isinstance(pdf, Subject) else _ByRows(pdf, grid.wo)
-    a = np.repeat(grid.rows[..., :-1].astype(float)[..., None], shape[3], axis=-1).ravel()
-    b = np.repeat(grid.rows[..., 1:].astype(float)[..., None], shape[3], axis=-1).ravel()
-    azimuth = _azimuth(grid.columns.astype(float))
-    c, d = azimuth[..., :-1].ravel(), azimuth[..., 1:].ravel()
+    a, b, c, d = (edge.ravel() for edge in boxes(grid.rows, grid.columns))
     row, side, _, _ = np.unravel_index(np.arange(len(a)), shape)
     side = np.array(grid.sides)[side]
-    cells = np.zeros(len(a))
+    integral = np.zeros(len(a))
     owner = np.flatnonzero((b > a) & (d > c))
     box = np.stack([a, b, c, d], -1)[owner]
-    unsettled = np.zeros(len(grid.wo))
+    unresolved = np.zeros(len(grid.wo))
     for depth in range(DEPTH):
         place = row[owner], side[owner], box
-        two, three, seen = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
-        four = seen.integral
-        # the error of four nodes is far below the difference from two: for smooth cells its square, over the value.
-        # Where a step runs through the middle, two and four agree by chance, and three does not.
+        two, three, last = (look(*place, *_GAUSS[order]) for order in (2, 3, 4))
+        four = last.integral
+        # The error of four nodes is far below the difference from two: for smooth cells its square, over the value.
+        # With a step through the middle, two and four agree by chance, and three does not.
         rough = np.abs(four - three.integral)
         off = np.maximum(0.3 * np.abs(four - two.integral), rough)
         allowed = tolerance * np.sqrt(np.maximum(four, tolerance**2)) * 0.5**depth
         area = (box[:, 1] - box[:, 0]) * (box[:, 3] - box[:, 2])
-        aside = area * step_aside(seen, look(*place, *_RIM), BESIDE)
-        divide = (off > allowed) | (aside > allowed) | ((seen.most <= 0.0) & (aside > 0.0))
+        aside = area * step_aside(last, look(*place, *_RIM), ASIDE)
+        divide = (off > allowed) | (aside > allowed) | ((last.most <= 0.0) & (aside > 0.0))
         divide &= depth < DEPTH - 1
-        if 4 * divide.sum() > LARGEST:  # a pdf that is rough everywhere: the roughest cells, and the rest as it is
+        if 4 * divide.sum() > MAX_CELLS:  # a pdf that is rough everywhere: only the roughest cells
             worst = np.argsort(-np.where(divide, off / allowed, 0.0))
-            divide[worst[LARGEST // 4 :]] = False
-        np.add.at(unsettled, row[owner[~divide]], np.maximum(rough, aside)[~divide])
-        np.add.at(cells, owner[~divide], four[~divide])
+            divide[worst[MAX_CELLS // 4 :]] = False
+        np.add.at(unresolved, row[owner[~divide]], np.maximum(rough, aside)[~divide])
+        np.add.at(integral, owner[~divide], four[~divide])
         if not divide.any():
             break
         box, owner = box[divide], np.repeat(owner[divide], 4)
         lo_a, hi_a, lo_c, hi_c = box.T
-        # a narrow lobe's heights span decades: those are halved in ratio
+        # the heights of a narrow lobe span decades: they are halved in ratio
         m = np.where(hi_a > 4.0 * lo_a, np.maximum(np.sqrt(lo_a * hi_a), hi_a / 64.0), 0.5 * (lo_a + hi_a))
         q = 0.5 * (lo_c + hi_c)
         parts = [(lo_a, m, lo_c, q), (m, hi_a, lo_c, q), (lo_a, m, q, hi_c), (m, hi_a, q, hi_c)]
         box = np.stack([np.stack(p, -1) for p in parts], 1).reshape(-1, 4)
-    shaped = cells.reshape(shape)
-    return Expectation(shaped, shaped.sum((1, 2, 3)), unsettled)
+    shaped = integral.reshape(shape)
+    return Expectation(shaped, shaped.sum((1, 2, 3)), unresolved)
 
 
 _GAUSS = {order: product(order) for order in (2, 3, 4)}
@@ -269,9 +131,7 @@ class _ByRows:
         for start in range(0, len(box), CHUNK // len(s)):
             part = slice(start, start + CHUNK // len(s))
             a, b, c, d = box[part].T[..., None]
-            height, phi = a + (b - a) * s, c + (d - c) * t
-            r = np.sqrt(height * (2.0 - height))
-            wi = np.stack([r * np.cos(phi), r * np.sin(phi), (1.0 - height) * side[part, None]], -1).reshape(-1, 3)
+            wi = direction(a + (b - a) * s, c + (d - c) * t, side[part, None]).reshape(-1, 3)
             values[part] = self.pdf(np.repeat(self.wo[row[part]], len(s), axis=0), wi).reshape(-1, len(s))
         a, b, c, d = box.T
         return Seen(values @ weight * (b - a) * (d - c), values.min(1), values.max(1))
@@ -327,7 +187,7 @@ class _InKernel:
         return Seen(integral.numpy(), least.numpy(), most.numpy())
 
 
-# --------------------------------------------------------------------------- what the samples say
+# --------------------------------------------------------------------------- the counts of samples
 
 
 def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
@@ -346,14 +206,14 @@ def count(subject: Subject, grid: Grid, log_samples: int, seed: int) -> Counts:
 
 
 def count_given(samples: np.ndarray, drawn: int, grid: Grid) -> Counts:
-    """As `count`, of samples (n, 3) that are there already, for the only wo of a grid; the others failed."""
+    """As `count`, of given samples (n, 3), for the only wo of a grid; the other samples failed."""
     kind = backend.types("float32")
     wi = backend.vector_of(samples, 3, kind)
     return _counted(grid, kind.module.UInt32(0), wi, kind.bool(True), drawn)
 
 
 def _counted(grid: Grid, which: Array, wi: Array, valid: Array, drawn: int) -> Counts:
-    """How many directions, each for the wo of a number, lie in each cell; those that are not valid lie in none."""
+    """Count of valid directions in each cell; `which` is the number of each direction's wo."""
     dr = backend.drjit()
     kind = backend.types("float32")
     UInt = kind.module.UInt32
@@ -394,14 +254,14 @@ def _find(kind: Types, edges: Array, start: Array, cells: int, value: Array) -> 
     return dr.binary_search(0, cells - 1, lambda i: dr.gather(kind.float, edges, start + i + 1) <= value)
 
 
-# --------------------------------------------------------------------------- the two compared
+# --------------------------------------------------------------------------- the comparison
 
 
 def compare(expected: Expectation, counts: Counts, row: int, grid: Grid | None = None) -> Outcome:
     """p-values of one wo.
 
-    grid  the cells: where some are hardly larger than the steps of float32 directions, so many samples more or less
-          lie in them by rounding alone
+    grid  the cells, where rounding is to be allowed for: cells hardly larger than the steps of float32 directions
+          gain or lose samples by rounding alone
     """
     n = counts.drawn
     e, o = expected.cells[row] * n, counts.cells[row]
@@ -418,7 +278,7 @@ STEP = 2.0**-24  # of a component of a float32 direction, half a unit of its las
 
 
 def _rounding(grid: Grid, row: int) -> np.ndarray:
-    """Share of a cell's samples that lie in the next one by rounding, (sides, rows, columns): a step of the coordinates
+    """Share of a cell's samples that rounding moves to the next one, (sides, rows, columns): a step of the coordinates
     over the cell's width, along both. A step of a component moves 1 - |z| by sin theta, and the azimuth by 1 / sin."""
     edges = grid.rows[row].astype(float)
     heights, middle = np.diff(edges, axis=-1), 0.5 * (edges[..., 1:] + edges[..., :-1])
@@ -430,19 +290,19 @@ def _rounding(grid: Grid, row: int) -> np.ndarray:
 
 
 def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int, rounding: np.ndarray | None = None) -> float:
-    """Chi-square of cells, small ones pooled; conditional on how many lie in any cell, which `_others` judges."""
-    inside, seen = expected.sum(), observed.sum()
-    if seen < LEAST or inside <= 0.0:
-        return 1.0 if abs(seen - inside) < 6.0 * np.sqrt(max(seen, inside, 1.0)) else 0.0
-    expected = expected * (seen / inside)
+    """Chi-square of cells, small ones pooled; conditional on the number of samples in them, which `_others` tests."""
+    inside, total = expected.sum(), observed.sum()
+    if total < MIN_EXPECTED or inside <= 0.0:
+        return 1.0 if abs(total - inside) < 6.0 * np.sqrt(max(total, inside, 1.0)) else 0.0
+    expected = expected * (total / inside)
     order = np.argsort(expected, kind="stable")
     e, o = expected[order], observed[order]
-    # what rounding moves adds to the variance, as much as it moves squared; pooled cells are wide
+    # the number of samples that rounding moves, squared, adds to the variance; pooled cells are wide
     more = np.zeros(len(e)) if rounding is None else (rounding[order] * e) ** 2
     cumulative = np.cumsum(e)
-    # one pool for all that is below the least expectation: its cells are many and their sum is what they tell
-    small = np.searchsorted(e, LEAST)
-    while small < len(e) and small and cumulative[small - 1] < LEAST:
+    # one pool for all cells below the least expectation
+    small = np.searchsorted(e, MIN_EXPECTED)
+    while small < len(e) and small and cumulative[small - 1] < MIN_EXPECTED:
         small += 1
     if small:
         e = np.concatenate([[cumulative[small - 1]], e[small:]])
@@ -455,14 +315,14 @@ def _pearson(expected: np.ndarray, observed: np.ndarray, drawn: int, rounding: n
     return statistics.chi_square_tail(float(np.sum((o - e) ** 2 / (e + more))), len(e) - 1)
 
 
-QUADRATURE = 3e-5  # what float32 pdfs summed over thousands of cells may be off by
+QUADRATURE = 3e-5  # error of float32 pdfs summed over thousands of cells
 
 
 def _others(total: float, error: float, others: int, drawn: int) -> float:
-    """p-value of how many samples lie in no cell, expected 1 - int pdf.
+    """p-value of the number of samples outside of all cells, expected 1 - int pdf.
 
-    The integral is known to `QUADRATURE` and its own error: the expectation nearest to what was seen within that
-    counts.
+    The integral is known to `QUADRATURE` and its own error; of the expectations within these, the nearest to the
+    observation counts.
     """
     known = QUADRATURE + error
     share = float(np.clip(others / drawn, 1.0 - total - known, 1.0 - total + known))

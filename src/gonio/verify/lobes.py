@@ -1,7 +1,7 @@
-"""The delta lobes of a BSDF, as its own sampling shows them: where they go, what they carry, how often they are chosen.
+"""The delta lobes of a BSDF, from its own samples: their directions, the light they carry, and their probabilities.
 
-A delta lobe has no value that could be asked for, but everything about it can be read off `sample`: its direction, its
-probability (`pdf` of a delta sample), and what it carries, weight x pdf, which does not depend on how it is chosen.
+`eval` is 0 for a delta lobe, but `sample` determines all of it: the direction, the probability (`pdf` of a delta
+sample), and the light that it carries, weight x pdf, which does not depend on how it is chosen.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from ..ops import Mode, Precision
 from . import directions
 from .subject import Subject
 
-DRAWN = 256  # samples for each wo, in equal steps of the number that picks the lobe
-ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # and near its ends, where a lobe of small probability is
-MOST = 6  # lobes for each wo
-NEAR = 1e-3  # directions that differ by less are one lobe's
+DRAWN = 256  # samples per wo, in equal steps of the number that chooses the lobe
+ENDS = (1e-7, 1e-5, 1e-4, 1e-3)  # and near its ends, where lobes of small probability are
+MAX_LOBES = 6  # per wo
+NEAR = 1e-3  # directions that differ by less belong to one lobe
 
 
 class Lobes(NamedTuple):
-    """Of N views, L lobes each.
+    """L lobes for each of N directions wo.
 
-    found   (N, L) whether there is such a lobe
+    valid   (N, L) whether there is such a lobe
     wi      (N, L, 3)
     weight  (N, L, channels)
     pdf     (N, L) probability
     eta     (N, L) index on wi's side over that on wo's, as sampled
-    share   (N, L) of the samples that went there, known to a hundredth or so
+    share   (N, L) of the samples, known to about a hundredth
     """
 
-    found: np.ndarray
+    valid: np.ndarray
     wi: np.ndarray
     weight: np.ndarray
     pdf: np.ndarray
@@ -40,16 +40,16 @@ class Lobes(NamedTuple):
 
     @property
     def carried(self) -> np.ndarray:
-        """Share of the light that each lobe carries, (N, L, channels)."""
+        """Share of the light in each lobe, (N, L, channels)."""
         return self.weight * self.pdf[..., None]
 
     def through(self, wo: np.ndarray) -> np.ndarray:
-        """Which lobes go to the other side, (N, L)."""
-        return self.found & (self.wi[..., 2] * wo[:, None, 2] < 0.0)
+        """Whether each lobe is transmitted, (N, L)."""
+        return self.valid & (self.wi[..., 2] * wo[:, None, 2] < 0.0)
 
 
 def chosen(count: int, seed: int) -> np.ndarray:
-    """Numbers (n, 3) for one view that meet every lobe: the first in equal steps and near both ends."""
+    """Random numbers (n, 3) that choose every lobe of one wo: the first in equal steps and near both ends."""
     first = np.concatenate([(np.arange(count) + 0.5) / count, ENDS, 1.0 - np.array(ENDS)])
     u = directions.numbers(np.random.default_rng([seed, 31]), len(first))
     u[:, 0] = np.minimum(first, 0.99999994)
@@ -59,17 +59,17 @@ def chosen(count: int, seed: int) -> np.ndarray:
 def of(
     subject: Subject, wo: np.ndarray, seed: int, mode: Mode = "radiance", precision: Precision | None = None
 ) -> Lobes:
-    """The delta lobes of each of the views wo (N, 3)."""
+    """The delta lobes for each wo (N, 3)."""
     u = chosen(DRAWN, seed)
     n, k = len(wo), len(u)
     s = subject.sample(np.repeat(wo, k, axis=0), np.tile(u, (n, 1)), mode, precision)
     wi, weight = s.wi.reshape(n, k, 3), s.weight.reshape(n, k, -1)
     pdf, eta = s.pdf.reshape(n, k), s.eta.reshape(n, k)
-    even = np.arange(k) < DRAWN  # those in equal steps, which can be counted
+    even = np.arange(k) < DRAWN  # those in equal steps, whose shares are probabilities
     left = s.delta.reshape(n, k) & (pdf > 0.0) & np.all(np.isfinite(wi), axis=2)
     rows = np.arange(n)
-    lobes: list[tuple[np.ndarray, ...]] = []
-    while left.any() and len(lobes) < MOST:
+    parts: list[tuple[np.ndarray, ...]] = []
+    while left.any() and len(parts) < MAX_LOBES:
         first = np.argmax(left, axis=1)
         there = left[rows, first]
         direction = wi[rows, first]
@@ -78,20 +78,20 @@ def of(
             np.abs(pdf - pdf[rows, first][:, None]) <= 1e-5 * pdf[rows, first][:, None]
         )
         share = np.mean((mine & left)[:, even], axis=1)
-        lobes.append((there, direction, weight[rows, first], pdf[rows, first], eta[rows, first], share))
+        parts.append((there, direction, weight[rows, first], pdf[rows, first], eta[rows, first], share))
         left &= ~mine & there[:, None]
-    if not lobes:
+    if not parts:
         empty = np.zeros((n, 0))
         return Lobes(empty.astype(bool), np.zeros((n, 0, 3)), np.zeros((n, 0, weight.shape[2])), empty, empty, empty)
-    return Lobes(*[np.stack(part, axis=1) for part in zip(*lobes, strict=True)])
+    return Lobes(*[np.stack(part, axis=1) for part in zip(*parts, strict=True)])
 
 
 def along(lobes: Lobes, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the lobes along wi (N, 3) carry together, (N, channels), and whether there are any, (N,)."""
-    mine = lobes.found & (np.abs(lobes.wi - wi[:, None]).max(2) < NEAR)
+    """The light of all lobes along wi (N, 3), (N, channels), and whether there are any, (N,)."""
+    mine = lobes.valid & (np.abs(lobes.wi - wi[:, None]).max(2) < NEAR)
     return np.sum(lobes.carried * mine[..., None], axis=1), mine.any(1)
 
 
 def rows_of(lobes: Lobes, rows: np.ndarray) -> Lobes:
-    """Some of the views."""
+    """The lobes of some of the directions wo."""
     return Lobes(*[part[rows] for part in lobes])

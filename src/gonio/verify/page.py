@@ -1,6 +1,6 @@
 """The report as files: report.json, and one self-contained report.html with pictures.
 
-The page needs no network and no script: pictures are SVG inside it, colours follow the reader's light or dark setting.
+The page needs no network and no script: figures are inline SVG, and colors follow the reader's light or dark setting.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ figcaption { font-size: 13.5px; color: var(--soft); margin-top: 4px }
 
 
 def write(report: Report, folder: Path) -> Path:
-    """Write report.json and report.html into a folder, all or none; returns the page's path."""
+    """Write report.json and report.html into a folder, both or none; returns the path of the page."""
     contents = {"report.json": json.dumps(report.as_dict(), indent=2) + "\n", "report.html": page(report)}
     files.write_all(files.check_folder(folder), {name: text.encode() for name, text in contents.items()})
     return folder / "report.html"
@@ -92,7 +92,7 @@ def _pill(verdict: Verdict) -> str:
 
 
 def _overview(report: Report) -> str:
-    """Which law holds for which setting: a row a law, a column a card."""
+    """The verdicts of all laws (rows) for all cards (columns)."""
     heads = "".join(f"<th>{html.escape(_settings(card))}" for card in report.cards)
     rows = []
     for i, verdict in enumerate(report.cards[0].verdicts):
@@ -142,7 +142,7 @@ def _detail(v: Verdict, anchor: str) -> str:
     if v.cause:
         rows.append(("cause", html.escape(v.cause)))
     if v.reproduction:
-        program = f"<summary>a program of Mitsuba alone</summary><pre>{html.escape(v.reproduction)}</pre>"
+        program = f"<summary>a program that needs Mitsuba alone</summary><pre>{html.escape(v.reproduction)}</pre>"
         rows.append(("without Gonio", f"<details>{program}</details>"))
     text = "".join(f"<dt>{name}<dd>{value}" for name, value in rows)
     drawn = ""

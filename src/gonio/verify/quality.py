@@ -1,10 +1,10 @@
-"""How well a BSDF samples itself: figures, not verdicts.
+"""The quality of a BSDF's sampling: figures, not verdicts.
 
     gonio models --quality
     go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % fail, variance .013, ..."
 
-A path tracer multiplies by the weight of each sample, so the weight's variance is noise in the picture, and a sample
-that fails is a path for nothing. Both can be poor while every law holds.
+A path tracer multiplies by the weight of each sample, so the weight's variance is noise in the picture, and a failed
+sample is a wasted path. Both can be poor while every law holds.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from .subject import Fault, Subject
 from .subject import of as subject_of
 
 THETA = (6.0, 17.0, 28.0, 39.0, 51.0, 62.0, 73.0, 84.0)  # of wo, degrees: the middles of eight equal parts
-SAMPLES = 1 << 12  # for each of them: the share of failed samples to half a percent
-INNER = ("conductor", "lambert")  # what a material that is built on others is judged with
+SAMPLES = 1 << 12  # per wo: the share of failed samples is accurate to half a percent
+INNER = ("conductor", "lambert")  # inner materials of those that require some
 POWER = "importance"
-LEAST = 1e-9  # a relative variance below it is rounding
+ROUNDING = 1e-9  # relative variance below which it counts as 0
 
 
 @dataclasses.dataclass(frozen=True)
 class Quality:
-    """Means over the directions from which light comes back at all.
+    """Means over the directions wo with reflected or transmitted light.
 
-    failed    share of samples that fail: pdf = 0, nothing to follow
-    variance  of the weight, relative to the square of its mean; a failed sample weighs 0
+    failed    share of samples that fail: pdf = 0
+    variance  of the weight, relative to the square of its mean; a failed sample has weight 0
     cosine    variance of the albedo when wi is drawn by the cosine (on both sides where light is transmitted), divided
               by the model's own; None where there is a delta lobe, which the cosine never finds, or no variance at all
-    ideal     how much a sample tells of the albedo, against a sampling without variance: mean^2 / (mean^2 + variance)
+    ideal     mean^2 / (mean^2 + variance): efficiency against sampling without variance
     """
 
     failed: float
@@ -55,7 +55,7 @@ class Quality:
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """The four in words; "" where there is none."""
+        """The four figures in words; "" where one is None."""
         return (
             f"{100.0 * self.failed:.2g} % fail",
             f"variance {_short(self.variance)}",
@@ -66,7 +66,7 @@ class Quality:
 
 def _short(value: float) -> str:
     """Two digits: .013, 31, 4200."""
-    if value < LEAST:
+    if value < ROUNDING:
         return "0"
     value = float(f"{value:.2g}")
     text = f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
@@ -74,7 +74,7 @@ def _short(value: float) -> str:
 
 
 def of(subject: Subject, seed: int = 1) -> Quality | None:
-    """The quality of a subject's sampling; None where it cannot be sampled, or gives back no light."""
+    """The quality of a subject's sampling; None where it cannot be sampled, or is black."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", GonioWarning)
@@ -84,12 +84,12 @@ def of(subject: Subject, seed: int = 1) -> Quality | None:
 
 
 def of_models() -> dict[str, tuple[str, Quality | None]]:
-    """Every material at its defaults, by name: which it was, and its quality."""
+    """Every material at its defaults, by name: its title and quality."""
     return {name: (one.title, of(one)) for name, cls in models().items() for one in [_default(cls)]}
 
 
 def _default(cls: type[BSDF]) -> Subject:
-    """A material at its defaults; inner materials that it requires are the first of INNER that it takes."""
+    """A material at its defaults; required inner materials are the first of INNER that it accepts."""
     required = [name for name, parameter in cls.parameters().items() if parameter.required]
     for turn in range(len(INNER)):
         inner = {name: INNER[(turn + i) % len(INNER)] for i, name in enumerate(required)}
@@ -106,20 +106,20 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     rng = np.random.default_rng([seed, 91])
     wo = np.concatenate([side * directions.at(np.array(THETA), 20.0) for side in subject.sides])
     rows = directions.single(np.repeat(wo, SAMPLES, axis=0))
-    # of power: the factor eta^2 of radiance is undone where light leaves again, and is no noise
+    # of power: the factor eta^2 of radiance cancels where light leaves again, and is not noise
     s = subject.sample(rows, directions.numbers(rng, len(rows)), POWER, "float32")
     shape = (len(wo), SAMPLES)
-    found = (s.pdf > 0.0).reshape(shape)
-    weight = np.where(found, s.weight.mean(1).reshape(shape), 0.0)
+    valid = (s.pdf > 0.0).reshape(shape)
+    weight = np.where(valid, s.weight.mean(1).reshape(shape), 0.0)
     mean = weight.mean(1)
-    lit = mean > 0.0  # false where it is no number
+    lit = mean > 0.0  # false for NaN
     if not lit.any():
         return None
     spread = np.where(lit, weight.var(1) / np.square(mean), 0.0)
     # The second moment of eval / p_cos under cosine sampling is the mean of eval^2 / (p_cos pdf) under the model's own,
-    # which finds the narrow lobes that a few thousand samples by the cosine would miss.
+    # which samples the narrow lobes that a few thousand cosine samples would miss.
     eval_ = s.weight.mean(1) * s.pdf
-    if subject.stochastic:  # the weight is another random number than eval's
+    if subject.stochastic:  # the weight and eval use different random numbers
         eval_ = subject.eval(rows, s.wi, POWER, "float32").mean(1)
     by_cosine = np.abs(s.wi[:, 2]) / (np.pi * (2.0 if subject.transmits else 1.0))
     second = np.where(s.pdf > 0.0, np.square(eval_) / (by_cosine * s.pdf), 0.0).reshape(shape).mean(1)
@@ -128,12 +128,12 @@ def _measured(subject: Subject, seed: int) -> Quality | None:
     if not ((math.isfinite(model) and math.isfinite(cosine)) or delta):
         return None
     quotient = None
-    if not delta and max(model, cosine) < 1e-6:  # both without variance but for rounding: as good as each other
+    if not delta and max(model, cosine) < 1e-6:  # both without variance but for rounding: equal
         quotient = 1.0
-    elif not delta and model > LEAST:
+    elif not delta and model > ROUNDING:
         quotient = max(cosine, 0.0) / model
     return Quality(
-        failed=float(1.0 - found[lit].mean()),
+        failed=float(1.0 - valid[lit].mean()),
         variance=model,
         cosine=quotient,
         ideal=float((1.0 / (1.0 + spread[lit])).mean()),

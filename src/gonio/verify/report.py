@@ -1,4 +1,4 @@
-"""A report: the cards of a trial, in the terminal and as a dictionary."""
+"""A report: the cards of a trial, for the terminal and as a dictionary."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 from typing import TYPE_CHECKING
 
 from .._version import __version__
-from . import terminal
+from . import statistics, terminal
 from .verdict import Card, Verdict
 
 if TYPE_CHECKING:
@@ -17,13 +17,18 @@ SCHEMA = "gonio-verify/1"
 SIGNIFICANCE = 0.01  # of one false rejection in a whole report
 
 
+def significance(tests: int) -> float:
+    """p-value below which one of that many tests rejects, by Sidak's correction; SIGNIFICANCE where there are none."""
+    return statistics.sidak(SIGNIFICANCE, tests)
+
+
 @dataclasses.dataclass
 class Report:
     """The cards of a run.
 
     tests      statistical tests in the whole report
     threshold  p-value below which one of them rejects, by Sidak's correction
-    mended     what a baseline holds needlessly, in words
+    mended     failures of the baseline that no longer occur, in words
     """
 
     cards: list[Card]
@@ -48,11 +53,11 @@ class Report:
 
     def __getitem__(self, law: str) -> Verdict:
         """The first failing verdict of that law, else the first."""
-        found = [card[law] for card in self.cards]
-        return next((verdict for verdict in found if verdict.failed), found[0])
+        verdicts = [card[law] for card in self.cards]
+        return next((verdict for verdict in verdicts if verdict.failed), verdicts[0])
 
     def as_dict(self) -> dict[str, object]:
-        """What `report.json` holds."""
+        """The contents of `report.json`."""
         return {
             "schema": SCHEMA,
             "gonio": __version__,
@@ -68,14 +73,14 @@ class Report:
         }
 
     def show(self, console: Console) -> None:
-        """Print a table a subject, then for each failure why, what it means, and how to see it again; a line in sum."""
+        """Print a table per subject, then the explanation of each failure, and a summary."""
         for card in self.cards:
             terminal.show_card(card, console)
         for line in self.mended:
             console.print(f"mended: {line}", markup=False)
         broken = len(self.failures)
         word = "[green]all laws hold[/]" if not broken else f"[bold red]{broken} broken[/]"
-        tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (.01 over all)"
+        tests = f"{self.tests} statistical tests, each at {self.threshold:.1e} (0.01 over all)"
         asked = tests if self.tests else "no statistical test"
         console.print(f"{word}  [dim]{self.effort}, seed {self.seed}, {asked}, {self.seconds:.1f} s[/]")
 

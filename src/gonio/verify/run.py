@@ -1,4 +1,4 @@
-"""A trial: every law on every subject, none hidden by the failure of another."""
+"""A trial: every law on every subject, whatever the other laws find."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from .. import members
 from ..errors import GonioWarning, InputError
 from ..material import BSDF
 from ..owner import public
-from . import box, directions, quality, statistics, subject
+from . import box, directions, quality, subject
 from .box import Place
 from .ci.outputs import Outputs
 from .effort import EFFORTS, ELSEWHERE, Effort
 from .forensics import diagnosis
 from .isolation.watch import limited
 from .laws import Law, chosen
-from .report import SIGNIFICANCE, Report
+from .report import Report, significance
 from .subject import Fault, Subject
 from .verdict import DECLARED, FAIL, NOT_APPLICABLE, PASS, Card, DoesNotApply, Finding, Verdict
 
 DEFAULT_SEED = 1
-# what is asked of a subject besides the laws
+# steps of judging a subject besides the laws
 PLACES, QUALITY = "other values", "sampling quality"
-CONFIRMATION = 0.001  # of the second seed's test: a real error shows there as well, chance does not
+CONFIRMATION = 0.001  # p-value of the test with a second seed, below which a rejection is confirmed
 Target = BSDF | Subject | str
 Begin = Callable[[str], None]
 
@@ -53,27 +53,26 @@ def verify(
     limit: float | None = None,
     memory: float | None = None,
 ) -> Report:
-    """Put a BSDF, or several, on trial.
+    """Judge a BSDF, or several, by the laws.
 
         go.verify(go.Conductor.preset("Au", alpha=0.3)).passed
 
     target    a material; or a target's name as `gonio verify` takes it; or a list of either
-    sweep     of a target's name: "alpha=0.01..1", a card for each of five values, or "alpha=0.1,0.5"
-    quick     a first look, in seconds
+    sweep     of a target's name: "alpha=0.01..1" for five values, each with a card, or "alpha=0.1,0.5"
+    quick     a fast first check
     deep      more samples, more directions, more widths
-    seed      of all random numbers; same seed, same report
+    seed      of all random numbers; the same seed gives the same report
     law       a law's name, or several; all where None
     report    folder for report.html and report.json; None writes nothing
     junit     file for JUnit's XML; `sarif` one for SARIF 2.1.0
-    baseline  file of what is known to fail, and fails no more because of it; `write_baseline` writes one
-    progress  called with steps done, steps in all, and what is next
-    isolated  whether the BSDF is judged in a process of its own, which it may bring down or keep for ever: that fails
-              the law, and the next one is asked. Names are, and objects are not, unless this says otherwise
+    baseline  file of known failures, which no longer fail the report; `write_baseline` writes one
+    progress  called with the steps done, all steps, and the name of the next
+    isolated  whether a BSDF is judged in a process of its own, which it may crash or block; by default, names are
     jobs      such processes at a time; the report is the same
-    limit     seconds that a law may take there, 300 if not given
-    memory    GB that such a process may take, half of the machine's if not given
-    Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; printed, it is the terminal's table.
-    Raises InputError for unknown laws and targets. A failing BSDF raises nothing: the law fails.
+    limit     seconds per law there, 300 if not given
+    memory    GB per process, half of the machine's if not given
+    Returns a Report: `.passed`, `["reciprocity"]`, `.as_dict()`; `print` gives the table of the terminal.
+    Raises InputError for unknown laws and targets. A failing BSDF fails the law and raises nothing.
     """
     if seed < 0:
         raise InputError(f"seed {seed} given, 0 or more expected", "--seed")
@@ -84,22 +83,24 @@ def verify(
     effort = "quick" if quick else "deep" if deep else "default"
     names = None if law is None else [law] if isinstance(law, str) else list(law)
     all_: list[Target] = list(target) if isinstance(target, list | tuple) else [target]  # type: ignore[list-item]
-    if isolated is None:
-        # what a program has registered, it alone knows
-        own = any(name in one for one in all_ if isinstance(one, str) for name in members.registered)
-        isolated = all(isinstance(one, str) for one in all_) and not own and bool(sys.executable)
-    if isolated:
+    if isolated or (isolated is None and _isolable(all_)):
+        from . import trials
         from .isolation import child
 
-        asked_of = [child.Item(one, (), sweep) if isinstance(one, str) else child.object_(one) for one in all_]
-        task = child.Task(asked_of, effort, seed, names)
-        from . import trials
-
-        made = trials.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
+        items = [child.Item(one, (), sweep) if isinstance(one, str) else child.item_of(one) for one in all_]
+        task = child.Task(items, effort, seed, names)
+        result = trials.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     else:
-        made = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
-    outputs.write(made, known)
-    return made
+        result = _here(_subjects(all_, sweep), chosen(names), effort, seed, progress)
+    outputs.write(result, known)
+    return result
+
+
+def _isolable(targets: list[Target]) -> bool:
+    """Whether another process can load the targets by their names, without what this program has registered."""
+    if not all(isinstance(one, str) for one in targets) or not sys.executable:
+        return False
+    return not any(name in str(one) for one in targets for name in members.registered)
 
 
 def _here(
@@ -108,7 +109,7 @@ def _here(
     """The trial in this process."""
     started = time.perf_counter()
     steps, done = len(subjects) * len(laws), 0
-    held = []
+    results = []
     for one in subjects:
 
         def begin(what: str, title: str = one.title) -> None:
@@ -117,15 +118,15 @@ def _here(
                 progress(min(done, steps), steps, f"{title}: {what}")
             done += what not in (PLACES, QUALITY)
 
-        held.append(judged(one, laws, effort, seed, begin))
-    tests = sum(one.tests for one in held)
-    threshold = statistics.sidak(SIGNIFICANCE, tests)
-    cards = [one.card(threshold, seed, effort) for one in held]
+        results.append(judged(one, laws, effort, seed, begin))
+    tests = sum(len(one.p_values) for one in results)
+    threshold = significance(tests)
+    cards = [one.card(threshold, seed, effort) for one in results]
     return Report(cards, seed, effort, tests, threshold, time.perf_counter() - started)
 
 
-class Held(NamedTuple):
-    """All that was found on a subject, before it is known how many tests the whole report holds."""
+class Judged(NamedTuple):
+    """The findings on a subject, before the number of tests in the whole report is known."""
 
     subject: Subject
     others: list[Place]
@@ -133,23 +134,23 @@ class Held(NamedTuple):
     quality: quality.Quality | None
 
     @property
-    def tests(self) -> int:
-        return sum(len(it.what.trials) for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding))
+    def p_values(self) -> list[float]:
+        """Those of its statistical tests."""
+        findings = [asked.what for _, all_ in self.laws for asked in all_ if isinstance(asked.what, Finding)]
+        return [trial.p for finding in findings for trial in finding.trials]
 
-    @property
-    def lowest(self) -> float:
-        """The smallest p-value of them, 1 where there are none."""
-        found = [it.what for _, all_ in self.laws for it in all_ if isinstance(it.what, Finding)]
-        return min((trial.p for one in found for trial in one.trials), default=1.0)
+    def card(self, threshold: float | None, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
+        """The verdicts by a threshold, the severity of failures and their causes; the BSDF is called again for both.
 
-    def card(self, threshold: float, seed: int, effort: str, begin: Begin = lambda what: None) -> Card:
-        """The verdicts, and what failures are worth and come from; the BSDF is asked again for both."""
+        threshold  that of a report of its own where None
+        """
+        threshold = significance(len(self.p_values)) if threshold is None else threshold
         answers = []
         for law, all_ in self.laws:
             begin(law.name)
             verdict, asked = _joined(law, all_, threshold, seed)
-            found = asked.what if isinstance(asked.what, Finding) else None
-            answers.append(diagnosis.Answer(law, verdict, asked.place.subject, found))
+            finding = asked.what if isinstance(asked.what, Finding) else None
+            answers.append(diagnosis.Answer(law, verdict, asked.place.subject, finding))
 
         def judge(law: Law, other: Subject) -> Verdict:
             what = _judge(law, other, EFFORTS[effort], seed)
@@ -157,7 +158,8 @@ class Held(NamedTuple):
 
         diagnosis.explain(answers, EFFORTS[effort], seed, judge)
         verdicts = [answer.verdict for answer in answers]
-        return Card(self.subject, verdicts, box.covered(self.subject, self.others), quality=self.quality)
+        covered = box.covered(self.subject, self.others)
+        return Card(self.subject, verdicts, covered, [], self.quality, self.p_values, threshold)
 
 
 def judged(
@@ -167,27 +169,27 @@ def judged(
     seed: int,
     begin: Begin = lambda what: None,
     skip: Mapping[str, str] = MappingProxyType({}),
-) -> Held:
-    """What the laws find on a subject.
+) -> Judged:
+    """The findings of the laws on a subject.
 
-    begin  called with a law's name, or what else is next
-    skip   what must not be asked again, and why: the BSDF ended the process, or kept it for ever
+    begin  called with the name of the next law, or of another step
+    skip   steps to skip, and why: the BSDF ended the process there, or did not return
     """
     begin(PLACES)
     others = [] if PLACES in skip else _places(one, effort, seed)
-    found: list[tuple[Law, list[Asked]]] = []
+    results: list[tuple[Law, list[Asked]]] = []
     for law in laws:
         if law.name in skip:
-            found.append((law, [Asked(Place({}, "given", one), _failed(law, one, skip[law.name]), 0.0)]))
+            results.append((law, [Asked(Place({}, "given", one), _failed(law, one, skip[law.name]), 0.0)]))
             continue
         begin(law.name)
-        found.append((law, _everywhere(law, one, others, effort, seed)))
+        results.append((law, _everywhere(law, one, others, effort, seed)))
     begin(QUALITY)
-    return Held(one, others, found, None if QUALITY in skip else quality.of(one, seed))
+    return Judged(one, others, results, None if QUALITY in skip else quality.of(one, seed))
 
 
 class Asked(NamedTuple):
-    """A law asked of a subject at a place: what it found, and how long that took."""
+    """A law's result for a subject at one place, and the seconds that it took."""
 
     place: Place
     what: Finding | Verdict
@@ -195,9 +197,9 @@ class Asked(NamedTuple):
 
 
 def _places(one: Subject, effort: str, seed: int) -> list[Place]:
-    """The other values to try; none where the BSDF fails already at being asked, which the laws will report."""
+    """The other parameter values; none where the BSDF fails when they are chosen, which the laws will report."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", GonioWarning)  # the box goes to the ends of the ranges on purpose
+        warnings.simplefilter("ignore", GonioWarning)  # the ends of the ranges are chosen on purpose
         try:
             return box.places(one, EFFORTS[effort], seed)
         except Fault:
@@ -205,19 +207,19 @@ def _places(one: Subject, effort: str, seed: int) -> list[Place]:
 
 
 def _everywhere(law: Law, one: Subject, others: list[Place], effort: str, seed: int) -> list[Asked]:
-    """The law at the given values, and elsewhere unless it failed there already."""
-    found = []
+    """The law at the given values, and, unless it fails there, at the others."""
+    results = []
     for place in [Place({}, "given", one), *(others if law.everywhere else [])]:
         began = time.perf_counter()
         place = place if law.at_ends else place.inside()
         spend = EFFORTS[effort] if place.why == "given" else ELSEWHERE[effort]
         what = _judge(law, place.subject, spend, seed)
-        found.append(Asked(place, what, time.perf_counter() - began))
+        results.append(Asked(place, what, time.perf_counter() - began))
         if isinstance(what, Verdict) and what.failed:
-            break  # an exception, or no end: it would be the same, or take for ever
+            break  # an exception or a timeout, which would repeat
         if isinstance(what, Finding) and place.why == "given" and (what.problems or not what.figure <= what.tolerance):
-            break  # it fails, or breaks as declared, as it is
-    return found
+            break  # it fails, or breaks as declared, at the given values
+    return results
 
 
 def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
@@ -229,8 +231,8 @@ def _verdict(law: Law, asked: Asked, threshold: float, seed: int) -> Verdict:
 
 
 def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[Verdict, Asked]:
-    """One verdict of those at all places, and where it was found: the given one, unless the law holds there and fails
-    elsewhere. Once it is known that it fails, no more tests are repeated."""
+    """The verdict over all places, and its result: that at the given values, unless the law holds there and fails
+    elsewhere. After three failures, no more tests are repeated."""
     first = _verdict(law, all_[0], threshold, seed)
     answer, where = first, all_[0]
     failed: list[Asked] = []
@@ -253,14 +255,14 @@ def _joined(law: Law, all_: list[Asked], threshold: float, seed: int) -> tuple[V
 
 
 def _judge(law: Law, one: Subject, effort: Effort, seed: int) -> Finding | Verdict:
-    """A law's finding; what goes wrong inside the BSDF is a failure of the law, and of this law only."""
+    """A law's finding; an error inside the BSDF is a failure of this law only."""
     try:
         with warnings.catch_warnings(), limited(law.name):
-            warnings.simplefilter("ignore", GonioWarning)  # variants go to the ends of the ranges on purpose
+            warnings.simplefilter("ignore", GonioWarning)  # variants use the ends of the ranges on purpose
             return law.judge(one, effort, seed)
     except DoesNotApply as reason:
         return _failed(law, one, str(reason), NOT_APPLICABLE)
-    except (Fault, TimeoutError, InputError) as fault:  # a direction of no unit length is refused as bad input
+    except (Fault, TimeoutError, InputError) as fault:  # a direction that is not a unit vector is rejected as bad input
         return _failed(law, one, str(fault))
 
 
@@ -273,18 +275,18 @@ def _failed(law: Law, one: Subject, why: str, status: str = FAIL) -> Verdict:
 def decide(
     law: Law, one: Subject, finding: Finding, threshold: float, seed: int, place: Place | None = None
 ) -> Verdict:
-    """The verdict on a finding, once it is known how many statistical tests the report holds."""
+    """The verdict on a finding, by the p-value below which a test rejects."""
     why = list(finding.problems)
     statistical: list[str] = []
     lowest = min(finding.trials, key=lambda trial: trial.p, default=None)
     for trial in sorted(finding.trials, key=lambda trial: trial.p):
         if not trial.p < threshold or len(statistical) >= 3:
             break  # three confirmed rejections say enough
-        trial.second = trial.again()
+        trial.second = trial.repeat()
         if trial.second < CONFIRMATION:
             statistical.append(f"{trial.where}: p = {trial.p:.2g}, and with a second seed {trial.second:.2g}")
         else:
-            text = f"{trial.where}: p = {trial.p:.2g} was chance: {trial.second:.2g} with a second seed"
+            text = f"{trial.where}: p = {trial.p:.2g} is due to chance: {trial.second:.2g} with a second seed"
             finding.notes.append(text)
     over = not finding.figure <= finding.tolerance
     status = FAIL if why or statistical or over else PASS
@@ -295,14 +297,14 @@ def decide(
             pass
         elif not over:
             if breach.certain and (place is None or place.why == "given"):
-                status, why = (FAIL, ["it is declared to be broken, and is not: " + breach.reason])
+                status, why = (FAIL, ["the law is declared to be broken, and is not: " + breach.reason])
         elif size <= breach.size * (1.0 + 1e-6) + finding.tolerance:
             status = DECLARED
             finding.notes.insert(0, f"declared: {breach.reason} (at most {breach.size:.4g})")
         else:
-            why.append(f"{size:.4g} is more than the declared {breach.size:.4g}: {breach.reason}")
+            why.append(f"the violation, {size:.4g}, is more than the declared {breach.size:.4g}: {breach.reason}")
     elif over:
-        why.append(f"{finding.shown or f'{finding.figure:.3g}'} where at most {finding.tolerance:.3g} is allowed")
+        why.append(_exceeds(finding))
     why += statistical
     settings = Subject(one.model, one.target, {**one.settings, **finding.settings})
     more = ["--at", "/".join(directions.text(w) for w in finding.at)] if finding.at is not None else []
@@ -327,15 +329,21 @@ def decide(
     )
 
 
+def _exceeds(finding: Finding) -> str:
+    """A figure above its tolerance, in words."""
+    figure = finding.shown or f"{finding.figure:.3g}"
+    return f"{figure}, where at most {finding.allowed or f'{finding.tolerance:.3g}'} is allowed"
+
+
 def _subjects(targets: Sequence[Target], sweep: str) -> list[Subject]:
-    found: list[Subject] = []
+    subjects: list[Subject] = []
     for target in targets:
         if isinstance(target, str):
             from .targets import resolve
 
-            found += resolve(target, sweep=sweep)
+            subjects += resolve(target, sweep=sweep)
         elif sweep:
-            raise InputError("a sweep of an object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
+            raise InputError("a sweep of a Python object", "--sweep", "name the target, such as 'conductor(preset=Au)'")
         else:
-            found.append(subject.of(target))
-    return found
+            subjects.append(subject.of(target))
+    return subjects

@@ -1,4 +1,4 @@
-"""Probabilities of chance, as the laws ask for them. SciPy computes; it is loaded when a law first asks."""
+"""Probabilities of the statistical tests. SciPy, which computes them, is loaded when it is first needed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def normal_two_sided(z: float) -> float:
 
 
 def binomial_two_sided(count: int, trials: int, probability: float) -> float:
-    """How likely a count as far from its expectation is, on either side: twice the smaller tail."""
+    """Probability of a count as far from its expectation, on either side: twice the smaller tail."""
     from scipy import special
 
     at_most = special.bdtr(count, trials, probability)
@@ -27,5 +27,5 @@ def binomial_two_sided(count: int, trials: int, probability: float) -> float:
 
 
 def sidak(significance: float, tests: int) -> float:
-    """Significance of each of that many tests, such that one false alarm in all has the given probability."""
+    """Significance per test, such that the probability of a false alarm in all tests is the given one."""
     return -math.expm1(math.log1p(-significance) / max(tests, 1))

@@ -1,8 +1,8 @@
-"""What the laws are held against: a BSDF behind its protocol, with the facts that it declares about itself.
+"""A BSDF as the laws see it: its protocol, and the facts that it declares about itself.
 
-A subject answers `eval`, `pdf` and `sample` on NumPy arrays, in the precisions it has, and hands out a bound copy for
-wavefronts of Dr.Jit arrays. An exception inside the BSDF comes out as a `Fault` that names the line; so does an answer
-of the wrong shape. Nothing here knows which material it is.
+A subject evaluates `eval`, `pdf` and `sample` on NumPy arrays, in the precisions it has, and gives a bound copy for
+wavefronts of Dr.Jit arrays. An exception inside the BSDF, or a result of the wrong shape, becomes a `Fault` that names
+the line. Nothing here depends on the material.
 """
 
 from __future__ import annotations
@@ -25,30 +25,31 @@ from ..errors import GonioError, InputError
 from ..material import BSDF, Breach, Parameter, Sample, models, tree
 from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
-from . import directions, severity
+from . import directions
 from .isolation import watch
 
 
 class Fault(Exception):
-    """The BSDF itself failed: an exception inside it, or an answer that no BSDF may give."""
+    """A failure of the BSDF itself: an exception inside it, or an invalid result."""
 
-    def __init__(self, what: str, where: str = "") -> None:
-        self.what, self.where = what, where
-        super().__init__(f"{what} ({where})" if where else what)
+    def __init__(self, what: str, location: str = "") -> None:
+        super().__init__(f"{what} ({location})" if location else what)
 
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
     """A BSDF on trial.
 
-    model     what speaks the protocol
-    target    how it was named: "conductor", "glass.py:Glass", "mitsuba:plastic"
+    model     the material or plugin
+    target    its name: "conductor", "glass.py:Glass", "mitsuba:plastic"
     settings  the parameters that were set, by name, for titles and commands
+    memo      cache of values that are expensive to compute: `estimators`
     """
 
     model: Any
     target: str
     settings: dict[str, Any] = dataclasses.field(default_factory=dict)
+    memo: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False, compare=False)
 
     # ------------------------------------------------------------------ facts
 
@@ -68,9 +69,9 @@ class Subject:
         return bool(self.model.isotropic)
 
     @property
-    def leans(self) -> bool:
-        """Whether its mirror is another than the surface."""
-        return self.model.leans
+    def perturbs_normal(self) -> bool:
+        """Whether its normal differs from that of the surface."""
+        return bool(self.model.leans)
 
     @property
     def stochastic(self) -> bool:
@@ -78,9 +79,9 @@ class Subject:
         return bool(getattr(self.model, "stochastic", False))
 
     @property
-    def black_fails(self) -> bool:
-        """Whether a sample that carries nothing counts as failed: Mitsuba's plugins tell a failure by that alone."""
-        return bool(getattr(self.model, "black_fails", False))
+    def zero_weight_is_failure(self) -> bool:
+        """Whether a sample of weight 0 counts as failed: Mitsuba's plugins signal failures by that alone."""
+        return bool(getattr(self.model, "zero_weight_is_failure", False))
 
     @property
     def precisions(self) -> tuple[Precision, ...]:
@@ -97,23 +98,23 @@ class Subject:
 
     @property
     def breaches(self) -> dict[str, Breach]:
-        """Laws that it declares to break."""
+        """Laws that it declares to violate."""
         return self.model.breaches()
 
     @property
     def by_nature(self) -> Mapping[str, str]:
-        """Laws that it breaks by what it is meant to be, with the reasons."""
+        """Laws that its kind violates by nature, with the reasons."""
         return getattr(self.model, "by_nature", {})
 
     @property
     def inner(self) -> list[Subject]:
-        """The materials that it holds, each alone."""
+        """The materials inside it, each as a subject."""
         held = getattr(self.model, "held", None)
         children = held if held is not None else tree.children(self.model) if isinstance(self.model, BSDF) else {}
         return [Subject(inner, f"{self.target}'s {name}") for name, inner in children.items()]
 
     def around_sound(self) -> Subject:
-        """The same around diffuse materials, which break no law."""
+        """The same with diffuse materials inside, which violate no law."""
         if hasattr(self.model, "around_diffuse"):
             return Subject(self.model.around_diffuse(), self.target, self.settings)
         sound = models()["lambert"]()
@@ -121,51 +122,46 @@ class Subject:
 
     @functools.cached_property
     def sides(self) -> tuple[int, ...]:
-        """The sides of the surface from which it answers: (1,), (1, -1), or () where nothing comes back at all."""
+        """The sides of the surface from which it reflects or transmits: (1,), (1, -1), or () where it is black."""
         rng = np.random.default_rng(5)
-        found = []
+        sides = []
         for side in (1, -1):
             wo = directions.single(directions.on_side(directions.uniform(rng, 512), side))
             wi = directions.single(directions.uniform(rng, 512))
             if np.any(self.eval(wo, wi, precision="float32") > 0.0):
-                found.append(side)
+                sides.append(side)
                 continue
-            with contextlib.suppress(Fault):  # a `sample` that fails is for the laws of sampling to report
+            with contextlib.suppress(Fault):  # the laws of sampling report a `sample` that fails
                 if np.any(self.sample(wo, directions.numbers(rng, 512), precision="float32").weight > 0.0):
-                    found.append(side)
-        return tuple(found)
+                    sides.append(side)
+        return tuple(sides)
 
     @functools.cached_property
     def has_density(self) -> bool:
-        """Whether some lobe is no delta: it gives values, or samples with a density."""
+        """Whether some lobe is not a delta lobe: it has values, or samples with a density."""
         rng = np.random.default_rng(6)
         wo, wi = (directions.single(directions.uniform(rng, 2048)) for _ in range(2))
         if np.any(self.eval(wo, wi, precision="float32") > 0.0):
             return True
         try:
             drawn = self.sample(wo, directions.numbers(rng, 2048), precision="float32")
-        except Fault:  # for the laws of sampling to report
+        except Fault:  # the laws of sampling report it
             return True
         return bool(np.any((drawn.pdf > 0.0) & ~drawn.delta))
 
     @functools.cached_property
     def steady(self) -> bool:
-        """Whether `eval` and `sample` answer as before when they are asked again, `eval` among fewer pairs too."""
+        """Whether repeated calls of `eval` and `sample` give the same results, `eval` with fewer pairs too."""
         rng = np.random.default_rng(7)
         wo, wi = (directions.single(directions.uniform(rng, 512)) for _ in range(2))
         first = self.eval(wo, wi)
-        again = [self.eval(wo, wi), self.eval(wo[256:], wi[256:])]
+        repeated = [self.eval(wo, wi), self.eval(wo[256:], wi[256:])]
         u = directions.numbers(rng, len(wo))
         if not np.allclose(self.sample(wo, u).wi, self.sample(wo, u).wi, atol=1e-5, equal_nan=True):
             return False
         return all(
-            np.allclose(v, w, rtol=1e-5, equal_nan=True) for v, w in zip(again, (first, first[256:]), strict=True)
+            np.allclose(v, w, rtol=1e-5, equal_nan=True) for v, w in zip(repeated, (first, first[256:]), strict=True)
         )
-
-    @functools.cached_property
-    def light(self) -> severity.Estimates:
-        """The albedos that integrators find, each in its way: computed when a law fails, once for all laws."""
-        return severity.estimates(self)
 
     def replace(self, **values: Any) -> Subject:
         """The same BSDF with other parameter values, by path: "alpha", "base.alpha"."""
@@ -174,12 +170,12 @@ class Subject:
         return Subject(changed, self.target, {**self.settings, **values})
 
     def anew(self) -> Subject | None:
-        """The same BSDF made again, which has answered nobody; None where that cannot be done."""
+        """A new object of the same BSDF, which has not been called; None where it cannot be made."""
         make = getattr(self.model, "anew", None)
         return None if make is None else Subject(make(), self.target, self.settings)
 
     def command(self, *more: str) -> str:
-        """A command line that puts this BSDF on trial again."""
+        """The command line that judges this BSDF."""
         parts = ["gonio", "verify", self.target]
         for name, value in self.settings.items():
             # a file of the user's as it is named from here
@@ -226,7 +222,7 @@ class Subject:
         return np.divide(value, cos, out=np.zeros_like(value), where=cos > 0.0)
 
     def bound(self, precision: Precision = "float32") -> Any:
-        """The model for wavefronts of Dr.Jit arrays of that precision; a new value compiles nothing."""
+        """The model for wavefronts of Dr.Jit arrays of that precision; new values do not recompile kernels."""
         if isinstance(self.model, BSDF):
             return self.model.bind(backend.types(precision))
         return self.model
@@ -235,7 +231,7 @@ class Subject:
         """`eval` of power (mode "importance") as a function of Dr.Jit vectors of 64 bits, in the best precision."""
         own, exact = backend.types(self.best), backend.types("float64")
         model = self.bound(self.best)
-        mode: Mode = "importance" if self.transmits else "radiance"  # one and the same, and one kernel is enough
+        mode: Mode = "importance" if self.transmits else "radiance"  # both are the same, and one kernel is enough
 
         def eval(wo: Direction, wi: Direction) -> Spectrum:
             value = guarded(self.model, "eval", lambda: model.eval(own.vec3(wo), own.vec3(wi), mode))
@@ -245,7 +241,7 @@ class Subject:
 
     def _call(self, method: str, first: np.ndarray, second: np.ndarray, **more: Any) -> Any:
         if not (self.transmits or method == "sample" or "mode" not in more):
-            more["mode"] = "radiance"  # both modes are one, and one kernel is enough
+            more["mode"] = "radiance"  # both modes are the same, and one kernel is enough
         takes = inspect.signature(getattr(self.model, method)).parameters
         if "mode" in more and "mode" not in takes and not isinstance(self.model, BSDF):
             del more["mode"]
@@ -266,7 +262,7 @@ class Subject:
 
 @dataclasses.dataclass(frozen=True)
 class Described(Subject):
-    """A subject that was judged in another process: its names, and no model."""
+    """A subject judged in another process: its names, without the model."""
 
     heading: str = ""
 
@@ -281,7 +277,7 @@ class Described(Subject):
 
 
 def guarded(model: Any, method: str, run: Any) -> Any:
-    """What `run` returns; an exception inside the model comes out as a Fault that names its line."""
+    """The result of `run`; an exception inside the model becomes a Fault that names its line."""
     try:
         with watch.calling(model, method) if watch.calling else contextlib.nullcontext():
             return run()
@@ -312,7 +308,7 @@ def _place(model: Any, method: str) -> str:
 
 
 def of(model: Any) -> Subject:
-    """The subject of a model that Python holds: named by its class, with the parameters that are not the default."""
+    """The subject of a Python object: named by its class, with the parameters that are not the default."""
     if isinstance(model, Subject):
         return model
     if not isinstance(model, BSDF):

@@ -1,4 +1,4 @@
-"""From what the user names to subjects: a model, a class in a file, a Mitsuba plugin, a Mitsuba file, a measurement.
+"""Subjects from the targets that a user names:
 
 conductor                a model's name; a material in it is a name again: --param a=lambert
 glass.py:Glass           a class in a Python file, which runs because the user named it
@@ -51,9 +51,9 @@ def _sweep(text: str) -> tuple[str, list[str]]:
     try:
         low, high = float(ends[1]), float(ends[2])
     except ValueError:
-        raise InputError(f"'{value}' is no range", "--sweep", "such as --sweep alpha=0.01..1") from None
+        raise InputError(f"'{value}' is not a range", "--sweep", "such as --sweep alpha=0.01..1") from None
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InputError(f"'{value}' is no rising range", "--sweep", "such as --sweep alpha=0.01..1")
+        raise InputError(f"'{value}' is not an increasing range", "--sweep", "such as --sweep alpha=0.01..1")
     many = np.geomspace(low, high, STEPS) if low > 0.0 and high >= 10.0 * low else np.linspace(low, high, STEPS)
     return name, [f"{v:.6g}" for v in many]
 
@@ -84,11 +84,11 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     return Subject(bsdf, head, {name: value for name, value in values.items() if name in beside})
 
 
-# --------------------------------------------------------------------------- Mitsuba's
+# --------------------------------------------------------------------------- Mitsuba
 
 
 def _property(text: str) -> Any:
-    """A plugin's property from the command line: number, true or false, colour, or a name."""
+    """A plugin's property from the command line: number, true or false, color, or a name."""
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     try:
@@ -116,7 +116,7 @@ def _from_file(target: str, given: dict[str, str]) -> Subject:
     try:
         description = json.loads(text)
     except ValueError as error:
-        raise InputError(f"no JSON: {error}", target) from None
+        raise InputError(f"invalid JSON: {error}", target) from None
     if not isinstance(description, dict) or "type" not in description:
         raise InputError('an object with a "type" expected', target, 'such as {"type": "roughplastic", "alpha": 0.2}')
     if path is not None:

@@ -24,7 +24,7 @@ MARKS = {
 
 
 def show_card(card: Card, console: Console) -> None:
-    """Print the verdicts as a table, then for each failure why, what it means, and how to see it again."""
+    """Print the verdicts as a table, then the explanation of each failure."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table
@@ -44,7 +44,7 @@ def show_card(card: Card, console: Console) -> None:
 
 
 def _mark(verdict: Verdict) -> str:
-    """The status, and what a failure is worth: FAIL visible."""
+    """The status, and the severity of a failure: FAIL visible."""
     return f"{MARKS[verdict.status]} {verdict.grade}" if verdict.grade else MARKS[verdict.status]
 
 
@@ -70,12 +70,13 @@ def _explain(verdict: Verdict, console: Console) -> None:
     from rich.text import Text
 
     console.print(Text(f"{verdict.law}: ", style="bold red").append(verdict.title, style="default not bold"))
-    rows = [("why", line) for line in verdict.why] + [("note", line) for line in verdict.notes]
+    follows = verdict.figure is None and verdict.cause.startswith("follows")  # the exception of another law
+    rows = [("why", line) for line in verdict.why if not follows] + [("note", line) for line in verdict.notes]
     rows += [
         ("in a picture", verdict.bias.words if verdict.bias else ""),
         ("cause", verdict.cause),
         ("worst", verdict.worst),
-        ("means", verdict.meaning),
+        ("means", "" if follows else verdict.meaning),
         ("tolerance", verdict.reason),
         ("again", verdict.command),
     ]
@@ -91,7 +92,7 @@ def _explain(verdict: Verdict, console: Console) -> None:
 
 
 class Values(TypedDict):
-    """What a subject answers for one pair."""
+    """The values of a subject for one pair."""
 
     f: list[float]
     eval: list[float]
@@ -99,7 +100,7 @@ class Values(TypedDict):
 
 
 def pair(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> dict[str, object]:
-    """What the subject says of one pair, both ways round and in each precision, as plain numbers."""
+    """The values of a subject for one pair, both ways and in each precision, as plain numbers."""
     answers = {
         label: {"fault": str(answer)} if isinstance(answer, Fault) else answer
         for label, answer in _answers(subject, wo, wi).items()

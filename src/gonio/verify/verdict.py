@@ -1,7 +1,7 @@
-"""What a law finds on a subject, and the verdicts and cards that are made of it.
+"""The findings of laws on a subject, and the verdicts and cards made of them.
 
-A law returns a `Finding`: figures, and the p-values of its statistical tests. Only once it is known how many such tests
-a whole report holds can it be decided what they mean: `gonio.verify.run`.
+A law returns a `Finding`: a figure, and the p-values of its statistical tests. They are decided once the number of such
+tests in the whole report is known: `gonio.verify.run`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from .severity import Bias, Grade
 from .subject import Subject
 
 PASS, FAIL, DECLARED, NOT_APPLICABLE = ("pass", "fail", "breaks as declared", "does not apply")
-KNOWN = "known"  # fails, as it did when a baseline was written
+KNOWN = "known"  # fails, as when the baseline was written
 
 
 class Evidence(Protocol):
-    """What a law saw, for the report's picture."""
+    """The observations of a law, for the report's figure."""
 
     def draw(self) -> tuple[str, str]:
         """(SVG, caption)."""
@@ -31,33 +31,35 @@ class Evidence(Protocol):
 
 @dataclasses.dataclass
 class Trial:
-    """One statistical test: its p-value, what it was about, and how to repeat it with another seed."""
+    """One statistical test: its p-value, its subject in words, and how to repeat it with another seed."""
 
     p: float
     where: str
-    again: Callable[[], float]
+    repeat: Callable[[], float]
     second: float | None = None
 
 
 @dataclasses.dataclass
 class Finding:
-    """What a law found.
+    """The result of a law.
 
     figure     the measured size of the violation; compared with `tolerance`
-    tolerance  the largest figure that passes, and `reason`, why that one
-    shown      the figure in words, where a number alone says little
-    worst      where it was found, in words; `at` the pair of directions, for the command that shows it again
-    problems   what fails the law whatever the figure
-    notes      what else is worth knowing
-    breach     the size to hold against a declared breach, where that is not the figure
-    evidence   what the report draws of it
-    details    what the law wants back when it is asked for a bias or a cause
+    tolerance  the largest figure that passes, and `reason`, its justification
+    shown      the figure in words, where a number alone is unclear; `allowed` the tolerance in the same unit
+    worst      the worst case in words; `at` its pair of directions, for the command that repeats it
+    settings   the parameter values of the worst case, where they are not the given ones
+    problems   violations that fail the law whatever the figure
+    notes      further information
+    breach     the size to compare with a declared breach, where that is not the figure
+    evidence   data of the report's figure
+    details    data for the law's own `bias` and `ratios`
     """
 
     figure: float
     tolerance: float
     reason: str
     shown: str = ""
+    allowed: str = ""
     worst: str = ""
     at: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     settings: dict[str, object] = dataclasses.field(default_factory=dict)
@@ -70,17 +72,17 @@ class Finding:
 
 
 class DoesNotApply(Exception):
-    """Raised by a law that cannot be asked of a subject; the text says why."""
+    """Raised by a law that does not apply to a subject; the text gives the reason."""
 
 
 @dataclasses.dataclass
 class Verdict:
-    """A law's word on one subject.
+    """A law's verdict on one subject.
 
-    places  values of the parameters at which it was asked, the given ones among them
-    bias    of a failure or a declared breach, what it does to a picture; None where the law cannot say
-    grade   what that is worth; None likewise
-    cause   of a failure, what it probably comes from; "" where nothing is clean
+    places  number of parameter settings at which it was judged, the given one included
+    bias    of a failure or a declared breach, the effect on a picture; None where it is unknown
+    grade   the severity of that; None likewise
+    cause   of a failure, the probable mistake; "" where none is clear
     reproduction  of a failure of one of Mitsuba's plugins, a program that shows it without Gonio
     """
 
@@ -111,7 +113,7 @@ class Verdict:
         return self.status == FAIL
 
     def as_dict(self) -> dict[str, object]:
-        """All but the evidence; numbers that JSON does not know become null."""
+        """All fields but the evidence; numbers that JSON cannot hold become null."""
         names = [field.name for field in dataclasses.fields(self) if field.name != "evidence"]
         return {name: _plain(getattr(self, name)) for name in names}
 
@@ -120,9 +122,10 @@ class Verdict:
 class Card:
     """All verdicts on one subject.
 
-    covered  at which values of its parameters
-    notes    how it behaved: what it printed, what brought it down
-    quality  how well it samples; None where it could not be measured
+    covered    the parameter values at which it was judged
+    notes      its behavior: what it printed, what ended its process
+    quality    of its sampling; None where it could not be measured
+    p_values   of its statistical tests, and `threshold` below which they rejected
     """
 
     subject: Subject
@@ -130,6 +133,13 @@ class Card:
     covered: str = ""
     notes: list[str] = dataclasses.field(default_factory=list)
     quality: Quality | None = None
+    p_values: list[float] = dataclasses.field(default_factory=list, repr=False)
+    threshold: float = 0.0
+
+    def decided_by(self, threshold: float) -> bool:
+        """Whether the verdicts are the same with another threshold: no p-value lies between the two."""
+        low, high = sorted((self.threshold, threshold))
+        return not any(low <= p < high for p in self.p_values)
 
     @property
     def title(self) -> str:

@@ -2,5 +2,5 @@
 
     gonio verify glass.py:Glass --junit laws.xml --sarif laws.sarif --baseline laws.json
 
-One format a file. Each takes a report and gives text; who writes it where is the command line's business.
+One format per file: each turns a report into text, and `outputs` writes it.
 """

@@ -1,4 +1,4 @@
-"""A baseline: what fails already and is not to stop anybody. Only what is new fails.
+"""A baseline: the known failures. Only new ones fail a report.
 
 A law of a card is known where it failed when the baseline was written, and its figure is at most a tenth worse now. Any
 report.json is a baseline; `text` writes the short form, to be kept beside the code.
@@ -16,19 +16,19 @@ from ..report import Report
 from ..verdict import FAIL, KNOWN, Verdict
 
 SCHEMA = "gonio-baseline/1"
-WORSE = 1.1  # by more than a tenth is new: rounding and other machines move a figure by less
+WORSE = 1.1  # ratio of figures beyond which a failure is new: rounding and other machines change less
 
 Known = Mapping[tuple[str, str], float | None]
 
 
 def read(path: Path) -> Known:
-    """The figures of what is known, by title and law; None where it failed without one. InputError where it is none."""
+    """The figures of known failures, by title and law; None where there is no figure. InputError for other files."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"no file '{path}'", "--baseline", "write one with --write-baseline FILE") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"no JSON: {error}", str(path), "write one with --write-baseline FILE") from None
+        raise InputError(f"invalid JSON: {error}", str(path), "write one with --write-baseline FILE") from None
     try:
         return dict(_failures(data))
     except (KeyError, TypeError, AttributeError):
@@ -52,7 +52,7 @@ def _number(value: Any) -> float | None:
 
 
 def text(report: Report) -> str:
-    """The baseline that a report makes."""
+    """The baseline of a report."""
     failures = [
         {"title": card.title, "law": verdict.law, "figure": verdict.as_dict()["figure"], "why": verdict.why[:1]}
         for card in report.cards
@@ -64,7 +64,7 @@ def text(report: Report) -> str:
 
 
 def apply(report: Report, known: Known) -> list[str]:
-    """Mark what is known in a report, which then fails no more because of it; what the baseline holds needlessly."""
+    """Mark known failures in a report, which they no longer fail; returns those that no longer occur, in words."""
     mended = []
     for card in report.cards:
         for verdict in card.verdicts:

@@ -12,12 +12,12 @@ _KINDS = {"error": "error", "warning": "warning", "note": "notice"}
 
 
 def wanted() -> bool:
-    """Whether a runner of GitHub Actions reads what is printed."""
+    """Whether a runner of GitHub Actions reads the output."""
     return os.environ.get("GITHUB_ACTIONS") == "true"
 
 
 def text(report: Report) -> str:
-    """A line for each law that is not kept, for its file where there is one; "" where all hold."""
+    """A line per violated law, for its file where there is one; "" where all hold."""
     lines = []
     for card in report.cards:
         for verdict in card.verdicts:

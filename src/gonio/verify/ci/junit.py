@@ -1,4 +1,4 @@
-"""JUnit's XML, which Jenkins, GitLab, Azure and others show: a suite for each card, a case for each law."""
+"""JUnit's XML, which Jenkins, GitLab, Azure and others display: a suite per card, a case per law."""
 
 from __future__ import annotations
 

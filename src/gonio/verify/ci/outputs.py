@@ -1,4 +1,4 @@
-"""The files that a trial leaves, for people and for machines, and the baseline that it is held against."""
+"""The files that a trial writes, and the baseline with which it is compared."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Name = str | Path | None
 
 @dataclass(frozen=True)
 class Outputs:
-    """What to write, and what is known; None where not asked for.
+    """The files to write, and the baseline; None for files that are not wanted.
 
     report          folder for report.html and report.json
     junit, sarif    files
-    baseline        file of failures that are known; a report.json will do
-    write_baseline  file for what fails, which is known from then on
+    baseline        file of known failures; a report.json will do
+    write_baseline  file for the failures, which are known from then on
     """
 
     report: Name = None
@@ -32,7 +32,7 @@ class Outputs:
     write_baseline: Name = None
 
     def check(self) -> Known:
-        """What is known to fail. Raises InputError for what cannot be read or written, before anything is computed."""
+        """The known failures. InputError where a file cannot be read or written, before anything is computed."""
         if self.report is not None:
             files.check_folder(self.report)
         for file in (self.junit, self.sarif, self.write_baseline):
@@ -44,21 +44,21 @@ class Outputs:
 
         return baseline.read(Path(self.baseline))
 
-    def write(self, found: Report, known: Known) -> None:
-        """Mark what is known in the report, and write the files, each whole or not at all."""
+    def write(self, report: Report, known: Known) -> None:
+        """Mark known failures in the report, and write the files, each complete or not at all."""
         from .. import page
         from . import baseline, junit, sarif
 
-        found.mended = baseline.apply(found, known)
+        report.mended = baseline.apply(report, known)
         if self.write_baseline is not None:
-            files.write_whole(self.write_baseline, baseline.text(found).encode())
-            baseline.apply(found, baseline.read(Path(self.write_baseline)))
+            files.write_whole(self.write_baseline, baseline.text(report).encode())
+            baseline.apply(report, baseline.read(Path(self.write_baseline)))
         if self.report is not None:
-            page.write(found, Path(self.report))
+            page.write(report, Path(self.report))
         if self.junit is not None:
-            files.write_whole(self.junit, junit.text(found).encode())
+            files.write_whole(self.junit, junit.text(report).encode())
         if self.sarif is not None:
-            files.write_whole(self.sarif, sarif.text(found).encode())
+            files.write_whole(self.sarif, sarif.text(report).encode())
 
 
 __all__ = ["Outputs"]

@@ -1,4 +1,4 @@
-"""Where in a source file a verdict belongs, and how serious it is: what all formats ask."""
+"""The place of a verdict in a source file, and its level, for all formats."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
         return Place(_relative(file), 1) if known else None
     file = Path(named["file"]).expanduser()
     for text in verdict.why if verdict else ():
-        for found in _LINE.finditer(text):
-            if found["file"] == file.name:
-                return Place(_relative(file), int(found["line"]))
+        for match in _LINE.finditer(text):
+            if match["file"] == file.name:
+                return Place(_relative(file), int(match["line"]))
     return Place(_relative(file), _class_line(file, named["name"]))
 
 
@@ -47,7 +47,7 @@ def level(verdict: Verdict) -> str:
 
 
 def grade(verdict: Verdict) -> str:
-    """How much of it shows in a picture, in a word; "" where nobody said."""
+    """The severity in a word; "" where it is unknown."""
     return str(getattr(verdict, "grade", "") or "")
 
 
@@ -57,7 +57,7 @@ def cause(verdict: Verdict) -> str:
 
 
 def words(verdict: Verdict) -> list[str]:
-    """What happened, what it means, and how to see it again, a line each."""
+    """The failure, its meaning, and the command that repeats it, one line each."""
     lines = list(verdict.why) or ([verdict.notes[0]] if verdict.notes else [])
     for name, text in (
         ("likely cause", cause(verdict)),
@@ -76,17 +76,17 @@ def _settings(card: Card) -> list[str]:
 
 
 def _relative(file: Path) -> str:
-    """From the repository's root, which CI names or which is the current folder; else the whole path."""
-    whole = file.absolute()
+    """The path from the repository's root, by CI or the current folder; else the absolute path."""
+    path = file.absolute()
     root = Path(os.environ.get("GITHUB_WORKSPACE") or Path.cwd())
     for base in (root, Path.cwd()):
-        if whole.resolve().is_relative_to(base.resolve()):
-            return whole.resolve().relative_to(base.resolve()).as_posix()
-    return whole.as_posix()
+        if path.resolve().is_relative_to(base.resolve()):
+            return path.resolve().relative_to(base.resolve()).as_posix()
+    return path.as_posix()
 
 
 def _class_line(file: Path, name: str) -> int:
-    """Without running the file: it ran where it was judged."""
+    """The line on which a class begins, without running the file."""
     try:
         tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):

@@ -1,4 +1,4 @@
-"""SARIF 2.1.0, the standard form of what a checker finds: a rule for each law, a result for each that is not kept."""
+"""SARIF 2.1.0, the standard format of checkers: a rule per law, a result per violation."""
 
 from __future__ import annotations
 

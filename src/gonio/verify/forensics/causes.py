@@ -1,8 +1,8 @@
-"""What a failure probably comes from: named where the ratio of two values is clean, and not at all where it is not.
+"""The probable cause of a failure: named where the ratio of two values fits a formula, and not at all where none does.
 
-Two values that should be one have a ratio of 1. A forgotten Jacobian, cosine or pi leaves its trace in it: the first
-factor that fits is named, the simplest first. A ratio that is 1 in most places and not in a region, one side or one
-channel, is named by that region.
+Two values that should be equal have a ratio of 1. A missing Jacobian, cosine or pi leaves its trace in it: the first
+factor that fits is named, the simplest first. A ratio that is 1 except in a region, on a side or in a channel is named
+by that region.
 
     cause = named(Ratio("weight x pdf", "eval", wo, wi, top, bottom, subject))
 """
@@ -13,36 +13,37 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .factors import FEWEST, fitted, half_vector
+from .factors import half_vector
+from .fits import FEWEST, fitted
 from .ratio import COVER, Cause, Fit, Ratio, factor_key, tolerance
 
-ROWS = 4096  # pairs that are looked at
+ROWS = 4096  # pairs of directions at most
 
 
 def named(ratio: Ratio) -> Cause | None:
-    """The cause that a ratio names, None where it is not clean."""
-    astray = nothing_below(ratio.top, ratio.bottom, ratio.wo, ratio.wi, ratio.above, ratio.below)
+    """The cause that a ratio names, None where it fits no formula."""
+    unsupported = nothing_below(ratio.top, ratio.bottom, ratio.wo, ratio.wi, ratio.above, ratio.below)
     ratio = _telling(ratio)
     if len(ratio.wo) < FEWEST:
-        return astray
+        return unsupported
     off = _off(ratio)
     if not off.any():
-        return astray
+        return unsupported
     words = ""
     channels = np.flatnonzero(off.mean(0) > 0.02)
     if len(channels) in (1, 2) and off.shape[1] == 3 and not off[:, [c for c in range(3) if c not in channels]].any():
         words = f"only in {' and '.join(('red', 'green', 'blue')[c] for c in channels)}"
         ratio = ratio.take(np.arange(len(ratio.wo)), channels)
         off = off[:, channels]
-    whole = fitted(ratio)
-    if whole is not None:
-        return _cause(ratio, whole, words)
+    everywhere = fitted(ratio)
+    if everywhere is not None:
+        return _cause(ratio, everywhere, words)
     bad: np.ndarray = np.any(off, axis=1)
     region = _region(ratio, bad)
-    if region is None and astray is not None:
-        return astray
+    if region is None and unsupported is not None:
+        return unsupported
     if region is None:
-        # a channel alone is a place as well
+        # a single channel is a region as well
         text = f"{ratio.name} is 1 but {words}"
         return Cause(text, text) if words and bad.mean() > COVER else _part(ratio)
     place, rows = region
@@ -55,13 +56,13 @@ def named(ratio: Ratio) -> Cause | None:
 
 
 def _part(ratio: Ratio) -> Cause | None:
-    """Of two densities one that is never more than the other: it knows fewer lobes."""
+    """Of two densities, one that never exceeds the other: it includes fewer lobes."""
     if "pdf" not in ratio.top or "pdf" not in ratio.bottom or "weight" in ratio.top:
         return None
     above, below = ratio.above[:, 0], ratio.below[:, 0]
     for less, more, name, other in ((above, below, ratio.top, ratio.bottom), (below, above, ratio.bottom, ratio.top)):
         if np.mean(less > more * (1.0 + 10.0 * tolerance(ratio))) < 1e-3 and np.mean(less < 0.95 * more) > 0.2:
-            text = f"{name} is nowhere more than {other}, and less at many directions: a lobe of a mixture left out?"
+            text = f"{name} never exceeds {other}, and is less for many directions: a missing lobe of a mixture?"
             return Cause(text, f"{name} part")
     return None
 
@@ -75,9 +76,9 @@ def _cause(ratio: Ratio, fit: Fit, place: str) -> Cause:
 
 
 def _telling(ratio: Ratio) -> Ratio:
-    """The pairs at which both values are numbers and the denominator is something."""
+    """The pairs at which both values are finite and the denominator is not negligible."""
     finite = np.isfinite(ratio.above).all(1) & np.isfinite(ratio.below).all(1)
-    # within .06 degrees of the horizon a ratio of cosines says little
+    # within 0.06 degrees of the horizon a ratio of cosines is unreliable
     finite &= np.minimum(np.abs(ratio.wo[:, 2]), np.abs(ratio.wi[:, 2])) > 1e-3
     size = np.abs(ratio.below).max(1)
     largest = float(np.percentile(size[finite], 99.0)) if finite.any() else 0.0
@@ -90,14 +91,14 @@ def _telling(ratio: Ratio) -> Ratio:
 def nothing_below(
     top: str, bottom: str, wo: np.ndarray, wi: np.ndarray, above: np.ndarray, below: np.ndarray
 ) -> Cause | None:
-    """A numerator where there is no denominator, in a place that can be named: samples that eval knows nothing of."""
+    """A numerator without a denominator in a region that has a name: samples where eval is 0."""
     dark = np.all(below == 0.0, axis=1)
     lit: np.ndarray = np.any(above > 0.0, axis=1)
     bad = dark & lit
     if bad.sum() < max(FEWEST, 5e-3 * len(bad)):
         return None
     place = place_of(wo[lit], wi[lit], bad[lit])
-    words = f"{top} is there and {bottom} is 0 {place}"
+    words = f"{top} is positive and {bottom} is 0 {place}"
     return Cause(f"{words}, at {bad[lit].mean():.2g} of the directions", words) if place else None
 
 
@@ -112,18 +113,14 @@ def _off(ratio: Ratio) -> np.ndarray:
 
 
 def _region(ratio: Ratio, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """Where alone a ratio is wrong: in words, and the rows; None where no simple place holds just the wrong ones."""
+    """The region outside which a ratio is right: in words, and the rows; None where no simple region fits."""
     share = float(bad.mean())
     if not 0.003 < share < 0.97 or bad.sum() < FEWEST:
         return None
     size = np.abs(np.log(np.maximum(np.abs(_first(ratio)), 1e-9)))[bad]
     if np.percentile(size, 5.0) < 0.05 * np.median(size):
-        return None  # it grows from nothing: there is no edge
-    for words, rows in _places(ratio.wo, ratio.wi, bad):
-        inside, outside = rows & bad, rows & ~bad
-        if inside.sum() >= 0.995 * bad.sum() and outside.sum() <= 0.005 * rows.sum() + 0.5:
-            return words, rows
-    return None
+        return None  # the error grows from 0: the region has no edge
+    return _place(ratio.wo, ratio.wi, bad)
 
 
 def _first(ratio: Ratio) -> np.ndarray:
@@ -150,7 +147,7 @@ def _places(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> Iterator[tuple[s
             yield f"where {name}.{axis} > 0", w[:, k] > 0.0
             yield f"where {name}.{axis} < 0", w[:, k] < 0.0
     for name, values in _angles(wo, wi):
-        # the edge lies between the outermost right row and the innermost wrong one
+        # the edge lies between the outermost good pair and the innermost bad one
         lowest, highest = values[bad].min(), values[bad].max()
         if highest > values[~bad].max():
             edge = np.quantile(values[bad], 0.002, method="lower")
@@ -172,9 +169,15 @@ def _angles(wo: np.ndarray, wi: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     yield ("the half vector's angle to the normal", degrees(np.abs(half_vector(wo, wi)[:, 2])))
 
 
-def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
-    """In words where alone some pairs are wrong, "" where no simple place holds just them."""
-    for words, rows in _places(wo, wi, bad) if bad.any() and not bad.all() else ():
+def _place(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> tuple[str, np.ndarray] | None:
+    """The first simple region that holds the bad pairs and no others: in words, and its rows."""
+    for words, rows in _places(wo, wi, bad):
         if (rows & bad).sum() >= 0.995 * bad.sum() and (rows & ~bad).sum() <= 0.005 * rows.sum() + 0.5:
-            return words
-    return ""
+            return words, rows
+    return None
+
+
+def place_of(wo: np.ndarray, wi: np.ndarray, bad: np.ndarray) -> str:
+    """The region of the bad pairs in words, "" where no simple region holds just them."""
+    place = _place(wo, wi, bad) if bad.any() and not bad.all() else None
+    return place[0] if place else ""

@@ -1,10 +1,11 @@
-"""Failures explained: what each does to a picture, what it probably comes from, and which of them come first.
+"""The explanation of failures: their effect on a picture, their probable cause, and which follow from others.
 
-It runs after all laws were asked, and only for those that fail; a report in which all holds costs nothing more.
+It runs after all laws, and only for those that fail; a report without failures costs no more.
 """
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,16 +23,16 @@ from .ratio import Cause, Ratio
 if TYPE_CHECKING:
     from ..severity import Bias
 
-# What breaks these comes first: a NaN spoils every figure, a weight spoils the pdf's and the energy's.
+# These come first: a NaN affects every figure, and weights affect those of pdf and energy.
 ORDER = ("positivity", "calls", "delta", "weight", "pdf", "reciprocity", "energy")
 AFTER = ("isotropy", "linearity", "precision", "gradients")
-# Failures that another one brings along: the quadrature and the samples of the energy disagree where weights are wrong.
+# Failures that follow from others: quadrature and sampling of the energy disagree where weights are wrong.
 FOLLOWS = {"energy": ("calls", "delta", "weight", "pdf"), "pdf": ("calls", "weight")}
-LIMIT = 60.0  # seconds a law; it takes less than one unless the BSDF loops
+LIMIT = 60.0  # seconds per law; it takes less than one unless the BSDF loops
 
 
 class Answer(NamedTuple):
-    """A law's verdict, where it was found, and what was found there."""
+    """A law's verdict, and the subject and the finding behind it."""
 
     law: Law
     verdict: Verdict
@@ -42,18 +43,23 @@ class Answer(NamedTuple):
 def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callable[[Law, Subject], Verdict]) -> None:
     """Set `bias`, `grade` and `cause` of the verdicts of one card that fail, or break as declared.
 
-    judge  asks a law of another subject, at less cost
+    judge  judges another subject by a law, at less cost
     """
     failed = [answer for answer in answers if answer.verdict.status in (FAIL, DECLARED)]
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     named: dict[str, str] = {}  # a cause's key, and the law that named it
-    nan = False  # whether values are no numbers at more than single directions: every other figure suffers
-    felt: set[str] = set()  # laws whose failure changes a picture
+    faults: dict[str, str] = {}  # an exception without its numbers, and the law that met it first
+    nan = False  # whether values are NaN at more than single directions, which affects every other figure
+    visible: set[str] = set()  # laws whose failure changes a picture
     for law, verdict, subject, finding in sorted(failed, key=lambda a: rank.get(a.law.name, len(rank))):
         if finding is None:
-            continue  # an exception, or no end: the verdict says so
+            # an exception or a timeout; the same one in several laws is one failure
+            first = faults.setdefault(re.sub(r"\d+", "", verdict.why[0]), law.name)
+            if first != law.name:
+                verdict.cause = f"follows from {first.upper()}'s"
+            continue
         if verdict.status == DECLARED and effort.name == "quick":
-            continue  # what is known needs no half second of a first look
+            continue  # a first check spends no time on declared breaches
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", GonioWarning)
             _measure(law, verdict, subject, finding, effort, seed)
@@ -67,17 +73,17 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
             cause = _cause(law, subject, finding, effort, seed)
         leader = named.get(cause.key) if cause is not None else None
         if law.name == "energy" and "reciprocity" in named.values():
-            leader = "reciprocity"  # a cosine too many or too few changes what is reflected, by a constant maybe
+            leader = "reciprocity"  # an extra or missing cosine changes the reflected light, possibly by a constant
         if leader is None:
-            # a disagreement of two estimates; a gain of eval itself follows from nothing
+            # a disagreement of two estimates; a gain of eval itself follows from no other law
             follows = FOLLOWS.get(law.name, ()) if cause is None and finding.figure <= finding.tolerance else ()
-            leader = next((name for name in follows if name in felt), None)
+            leader = next((name for name in follows if name in visible), None)
             if cause is None and nan:
                 leader = "positivity"
         if verdict.grade is Grade.NAN and verdict.bias is not None and verdict.bias.average > 0.0:
             nan = True
         if verdict.grade not in (None, Grade.INVISIBLE, Grade.NOISE):
-            felt.add(law.name)
+            visible.add(law.name)
         if leader is not None:
             verdict.cause = f"follows from {leader.upper()}'s"
         elif cause is not None:
@@ -86,18 +92,19 @@ def explain(answers: Sequence[Answer], effort: Effort, seed: int, judge: Callabl
 
 
 def in_order(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """The failures, those that others follow from first."""
+    """The failures, with those that others follow from first."""
     rank = {name: k for k, name in enumerate(ORDER + AFTER)}
     failed = [verdict for verdict in verdicts if verdict.failed]
     return sorted(failed, key=lambda v: (v.cause.startswith("follows"), rank.get(v.law, len(rank))))
 
 
-# What goes wrong in a BSDF that failed a law already is no reason to lose the report.
-_SICK = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexError, KeyError, MemoryError)
+# Errors of a BSDF that already failed a law must not cost the report.
+_ERRORS = (Fault, GonioError, TimeoutError, ArithmeticError, ValueError, IndexError, KeyError, MemoryError)
 
 
 UNSTEADY = Cause(
-    "asked again, or among other rays, it answers otherwise: state, chance, or a sum over all rays?", "unsteady"
+    "repeated, or among other rays, a call has another result: state, random values, or a sum over all rays?",
+    "unsteady",
 )
 
 
@@ -105,8 +112,8 @@ def _measure(law: Law, verdict: Verdict, subject: Subject, finding: Finding, eff
     try:
         with limited(law.name, LIMIT):
             bias: Bias | None = law.bias(subject, finding, effort, seed)
-    except _SICK as error:
-        verdict.notes.append(f"what it does to a picture could not be measured: {error}")
+    except _ERRORS as error:
+        verdict.notes.append(f"the effect on a picture could not be measured: {error}")
         return
     if bias is not None:
         verdict.bias, verdict.grade = bias, bias.grade
@@ -116,29 +123,29 @@ def _cause(law: Law, subject: Subject, finding: Finding, effort: Effort, seed: i
     try:
         with limited(law.name, LIMIT):
             if not (subject.stochastic or subject.steady):
-                return UNSTEADY  # and no ratio of two calls means anything
+                return UNSTEADY  # a ratio of two calls has no meaning
             for one in law.ratios(subject, finding, effort, seed):
                 cause = causes.named(one) if isinstance(one, Ratio) else one
                 if cause is not None:
                     return cause
-    except _SICK:
+    except _ERRORS:
         pass
     return None
 
 
 def _convention(law: Law, subject: Subject, judge: Callable[[Law, Subject], Verdict]) -> tuple[Grade, str] | None:
-    """Whether a law is broken by what a material is meant to be, or by what it holds."""
+    """The grade and reason where a material violates a law by nature, or where a material inside it does."""
     reason = subject.by_nature.get(law.name)
     if reason:
         return Grade.BY_NATURE, reason
-    held = subject.inner
-    if not held:
+    inner = subject.inner
+    if not inner:
         return None
-    wrong = [one.target for one in held if judge(law, one).status == FAIL]
+    wrong = [one.target for one in inner if judge(law, one).status == FAIL]
     sound = subject.around_sound() if wrong else None
     if sound is None or judge(law, sound).status == FAIL:
         return None
     return (
         Grade.INNER,
-        f"{' and '.join(dict.fromkeys(wrong))} inside fails this law alone; around a sound one it holds",
+        f"{' and '.join(dict.fromkeys(wrong))} fails this law by itself; around a sound one it holds",
     )

@@ -1,143 +1,68 @@
-"""Factors that may be forgotten, doubled or misplaced, the simplest first: constants, products of cosines, indices,
-widths, Fresnel's term. Each is a field over (wo, wi), or the same value computed otherwise; divided by the right one, a
-ratio of two values that should be one is 1 for nearly every pair of directions.
+"""The table of factors that may be missing, doubled or misplaced: products of cosines, powers of the index, widths of
+a distribution, Fresnel's term. A factor is a field over (wo, wi): `fits` looks for the one by which the ratio of two
+values must be divided, `crowding` for the one that must multiply a pdf to give the density of the samples.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import itertools
-from collections.abc import Iterator
-from typing import ClassVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...errors import GonioError
 from .. import directions
 from ..subject import Subject
-from .ratio import COVER, NUMBERS, SPREAD, Fit, Ratio, holds, scalar, tolerance, written
+from .ratio import written
 
-FEWEST = 64  # pairs that say anything
-
-
-def fitted(ratio: Ratio) -> Fit | None:
-    """The first candidate that explains a ratio everywhere."""
-    if len(ratio.wo) < FEWEST:
-        return None
-    for candidate in CANDIDATES:
-        fit = candidate.fit(ratio)
-        if fit is not None:
-            return fit
-    return None
+Field: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of (wo, wi), (N, 3) each: (N,)
 
 
-class Candidate:
-    """A factor that may be forgotten, doubled or misplaced."""
+class Factor(NamedTuple):
+    """A factor: its formula, the mistake that it suggests, and its values."""
 
-    def fit(self, ratio: Ratio) -> Fit | None:
-        """How it explains the ratio, or None."""
-        raise NotImplementedError
-
-
-class Constant(Candidate):
-    """The same factor everywhere: pi, 2, 4, or one without a name; 0 and -1 too."""
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        r = scalar(ratio)
-        if r is None:
-            return None
-        middle = float(np.median(r))
-        if abs(middle) < 1e-9:
-            flat = float(np.mean(np.abs(r) < 1e-9))
-            return Fit("0", ratio.zero, 0.0, flat) if flat > COVER else None
-        held = holds(ratio, r / middle)
-        if held is None or abs(middle - 1.0) < max(SPREAD, 2.0 * tolerance(ratio)):
-            return None
-        if abs(middle + 1.0) < SPREAD:
-            return Fit("-1", "a sign", *held)
-        for name, number in ratio.numbers.items():
-            if abs(middle / number - 1.0) < SPREAD:
-                return Fit(f"{name} = {middle:.5g}", "the chain rule, forgotten or applied twice", *held)
-        text = written(middle) if middle > 0.0 else f"-{written(-middle)}"
-        known = text.lstrip("-") in NUMBERS
-        guess = "a constant that one of the two lacks" if known else "a constant factor"
-        return Fit(text, guess, *held, middle)
+    formula: str
+    guess: str
+    field: Field
 
 
-def half_vector(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-    """The half vector of a reflection, on wo's side."""
-    m = wo + wi
+class Cosine(NamedTuple):
+    """A cosine or sine of a factor's formula: the mistake that it suggests, and its values over (wo, wi, m)."""
+
+    guess: str
+    field: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(np.sum(a * b, axis=1))
+
+
+COSINES = {
+    "(o.m)": Cosine("the Jacobian of the half vector, 4 (o.m), missing or doubled", lambda o, i, m: _dot(o, m)),
+    "cos_m": Cosine("the cosine of the half vector, m.z, missing or doubled in its density", lambda o, i, m: m[:, 2]),
+    "cos_i": Cosine("the cosine of wi, missing or doubled", lambda o, i, m: i[:, 2]),
+    "cos_o": Cosine("the cosine of wo, missing or doubled", lambda o, i, m: o[:, 2]),
+    "sin_i": Cosine("the sine of wi, the Jacobian of spherical angles", lambda o, i, m: np.hypot(i[:, 0], i[:, 1])),
+    "sin_o": Cosine("the sine of wo", lambda o, i, m: np.hypot(o[:, 0], o[:, 1])),
+    "(i.m)": Cosine("the Jacobian of refraction", lambda o, i, m: _dot(i, m)),
+}
+
+
+def half_vector(wo: np.ndarray, wi: np.ndarray, eta: np.ndarray | float = 1.0) -> np.ndarray:
+    """The half vector of a reflection, on wo's side; with an index on wi's side over that on wo's, of a refraction."""
+    m = wo + (eta[:, None] if isinstance(eta, np.ndarray) else eta) * wi
     m = m / np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
     return m * np.copysign(1.0, np.sum(m * wo, axis=1, keepdims=True))
 
 
-class Cosines(Candidate):
-    """Powers of the cosines that reflection knows, times a known number: 4 (o.m), cos_i, cos_o / cos_i, sin_i ..."""
-
-    NAMES = ("(o.m)", "cos_m", "cos_i", "cos_o", "sin_i", "sin_o")
-    GUESSES: ClassVar[dict[str, str]] = {
-        "(o.m)": "the Jacobian of the half vector, 4 (o.m), missing or doubled",
-        "cos_m": "the cosine of the half vector, m.z, missing or doubled in its density",
-        "cos_i": "the cosine of wi, missing or doubled",
-        "cos_o": "the cosine of wo, missing or doubled",
-        "sin_i": "the sine of wi, the Jacobian of spherical angles",
-        "sin_o": "the sine of wo",
-    }
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        r = scalar(ratio)
-        if r is None or not np.all(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0):
-            return None
-        logs = np.log(self._values(ratio.wo, ratio.wi))
-        names = list(self.NAMES)
-        if ratio.antisymmetric:  # only what differs between the two directions is left
-            logs, names = logs[:, [2, 4]] - logs[:, [3, 5]], ["cos_i", "sin_i"]
-        positive = np.isfinite(r) & (r > 0.0)
-        if positive.mean() < COVER:
-            return None
-        # most exponents are 0: one or two cosines at a time, so that a few rows off the rule do not spoil the rest
-        for count in (1, 2):
-            for which in itertools.combinations(range(len(names)), count):
-                fit = self._tried(ratio, r, logs[:, which], [names[k] for k in which], positive)
-                if fit is not None:
-                    return fit
-        return None
-
-    def _tried(
-        self, ratio: Ratio, r: np.ndarray, logs: np.ndarray, names: list[str], positive: np.ndarray
-    ) -> Fit | None:
-        if np.any(np.ptp(np.percentile(logs, [5.0, 95.0], axis=0), axis=0) < 0.05):
-            return None  # it hardly varies, and says nothing
-        rows = np.flatnonzero(positive)
-        columns = np.column_stack([logs[rows], np.ones(len(rows))])
-        solved = np.linalg.lstsq(columns, np.log(r[rows]), rcond=None)[0]
-        powers = np.round(solved[:-1])
-        if np.any(powers == 0.0) or np.abs(powers).max() > 4.0 or np.abs(solved[:-1] - powers).max() > 0.2:
-            return None
-        quotient = r / np.exp(logs @ powers)
-        scale = float(np.median(quotient))
-        number = written(scale)
-        plain = abs(scale - 1.0) < SPREAD
-        if not plain and number not in NUMBERS:
-            return None  # a clamp leaves such a ratio, and any number can be had of it
-        held = holds(ratio, quotient / scale)
-        if held is None:
-            return None
-        powers_of = dict(zip(names, powers.astype(int).tolist(), strict=True))
-        if ratio.antisymmetric:
-            powers_of |= {name.replace("_i", "_o"): -power for name, power in powers_of.items()}
-        guess = " and ".join(self.GUESSES[name] for name in names)
-        return Fit(product("" if plain else scale, powers_of), guess, *held)
-
-    @staticmethod
-    def _values(wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-        m = half_vector(wo, wi)
-        sines = [np.hypot(w[:, 0], w[:, 1]) for w in (wi, wo)]
-        found = [np.sum(wo * m, axis=1), m[:, 2], wi[:, 2], wo[:, 2], *sines]
-        return np.maximum(np.abs(np.stack(found, axis=1)), 1e-9)
+def values_of(names: Sequence[str], wo: np.ndarray, wi: np.ndarray, m: np.ndarray) -> np.ndarray:
+    """Some of COSINES, (N, names), never quite 0, so that they have logarithms."""
+    return np.maximum(np.abs(np.stack([COSINES[name].field(wo, wi, m) for name in names], axis=1)), 1e-9)
 
 
-def product(scale: float | str, powers: dict[str, int]) -> str:
+def product(scale: float | str, powers: Mapping[str, int]) -> str:
     """ "4 (o.m)", "1 / (4 (o.m))", "cos_i / cos_o"."""
 
     def joined(sign: int) -> list[str]:
@@ -155,80 +80,31 @@ def product(scale: float | str, powers: dict[str, int]) -> str:
     return " ".join(over) or "1" if not under else f"{' '.join(over) or '1'} / {below}"
 
 
-class Colour(Candidate):
-    """A constant of each channel's own: an albedo or a tint that one of the two lacks."""
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        if ratio.above.shape[1] != 3 or ratio.antisymmetric or np.any(ratio.below <= 0.0):
-            return None
-        r = ratio.above / ratio.below
-        middle = np.median(r, axis=0)
-        if np.any(middle <= 0.0) or np.ptp(middle) < 0.01 * middle.max():
-            return None
-        helds = [holds(ratio, column / m) for column, m in zip(r.T, middle, strict=True)]
-        spreads = [held for held in helds if held is not None]
-        if len(spreads) < 3:
-            return None
-        text = ", ".join(f"{m:.4g}" for m in middle)
-        guess = "a colour that one of the two lacks"
-        return Fit(f"({text})", guess, max(s for s, _ in spreads), min(c for _, c in spreads))
+def guess_of(names: Sequence[str]) -> str:
+    """The mistakes that some of COSINES suggest."""
+    return " and ".join(COSINES[name].guess for name in names)
 
 
-class Refraction(Candidate):
-    """Powers of the cosines of a refraction, about the half vector of the index that samples tell."""
+def cosines(names: Sequence[str]) -> Iterator[Factor]:
+    """One or two cosines of a reflection, each to the power 1 or -1."""
+    for count in (1, 2):
+        for which in itertools.combinations(names, count):
+            for powers in itertools.product((1, -1), repeat=count):
 
-    NAMES = ("|o.m|", "|i.m|", "cos_i", "cos_o", "cos_m")
+                def field(
+                    o: np.ndarray, i: np.ndarray, which: Sequence[str] = which, powers: Sequence[int] = powers
+                ) -> np.ndarray:
+                    values = values_of(which, o, i, half_vector(o, i))
+                    return np.asarray(np.prod(values ** np.array(powers, float), axis=1))
 
-    def fit(self, ratio: Ratio) -> Fit | None:
-        if np.any(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0):
-            return None
-        r = scalar(ratio)
-        if r is None or np.any(~(r > 0.0)):
-            return None
-        for eta in [*index_below(ratio.subject)] or [1.0]:
-            side = np.where(ratio.wo[:, 2] > 0.0, eta, 1.0 / eta)
-            m = ratio.wo + side[:, None] * ratio.wi
-            m /= np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
-            cosines = [np.sum(ratio.wo * m, 1), np.sum(ratio.wi * m, 1), ratio.wi[:, 2], ratio.wo[:, 2], m[:, 2]]
-            values = np.maximum(np.abs(np.stack(cosines, axis=1)), 1e-9)
-            singles = [(k, power) for k in range(len(self.NAMES)) for power in (1, -1, 2, -2)]
-            pairs = [*itertools.combinations([(k, power) for k, power in singles if abs(power) == 1], 2)]
-            pairs += [((a, p), (b, -p)) for a, b in ((0, 1), (2, 3)) for p in (2, -2)]
-            for which in (*((one,) for one in singles), *pairs):
-                field = np.prod([values[:, k] ** float(power) for k, power in which], axis=0)
-                for over in (0, 2, -2):
-                    held = holds(ratio, r / (field * side**over))
-                    if held is None:
-                        continue
-                    powers = {self.NAMES[k]: power for k, power in which} | ({"eta": over} if over else {})
-                    facet = any("m" in name for name in powers)
-                    guess = (
-                        "the Jacobian of refraction" if facet or over else "the cosine of wi or wo, of the other side"
-                    )
-                    return Fit(product("", powers), guess, *held)
-        return None
+                yield Factor(product("", dict(zip(which, powers, strict=True))), guess_of(which), field)
 
 
-class Index(Candidate):
-    """Powers of the index of refraction in transmission, inverted from the other side."""
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        through = ratio.wo[:, 2] * ratio.wi[:, 2] < 0.0
-        r = scalar(ratio) if through.any() else None
-        if r is None:
-            return None
-        for eta in index_below(ratio.subject):
-            side = np.where(ratio.wo[:, 2] > 0.0, eta, 1.0 / eta)
-            for power in (2, -2, 1, -1, 4, -4, 3, -3):
-                held = holds(ratio, r / np.where(through, side**power, 1.0))
-                if held is not None:
-                    guess = "the factor (eta_o / eta_i)^2 of radiance, missing, doubled or upside down"
-                    return Fit(product("", {"eta": power}) + " in transmission", guess, *held)
-        return None
+# --------------------------------------------------------------------------- refraction
 
 
 def index_below(subject: Subject) -> Iterator[float]:
-    """Index below over index above: what samples say, and what a parameter named eta says."""
+    """Index below over index above, by the samples and by a parameter named eta, where it is not 1."""
     if not subject.transmits:
         return
     wo = directions.on_side(directions.uniform(np.random.default_rng(4), 2048), 1)
@@ -236,52 +112,70 @@ def index_below(subject: Subject) -> Iterator[float]:
     through = (s.pdf > 0.0) & (s.wi[:, 2] < 0.0)
     if np.any(through & ~s.delta):
         through &= ~s.delta
-    told = float(np.median(s.eta[through])) if through.any() else 1.0
-    values = [told]
+    values = [float(np.median(s.eta[through])) if through.any() else 1.0]
     declared = getattr(subject.model, "eta", None)
     if isinstance(declared, int | float):
         values.append(float(declared))
     yield from (v for v in dict.fromkeys(values) if np.isfinite(v) and v > 0.0 and abs(v - 1.0) > 0.02)
 
 
-class Otherwise(Candidate):
-    """The denominator computed in another way is the numerator: arguments swapped, the other mode, another width."""
+def _across(wo: np.ndarray, eta: float) -> np.ndarray:
+    """The index on the other side of the surface over that on wo's side, (N,)."""
+    return np.where(wo[:, 2] > 0.0, eta, 1.0 / eta)
 
-    def fit(self, ratio: Ratio) -> Fit | None:
-        if ratio.again is None:
-            return None
-        subject, wo, wi = ratio.subject, ratio.wo, ratio.wi
-        ways: list[tuple[str, str, tuple[Subject, np.ndarray, np.ndarray, str]]] = []
-        if not ratio.antisymmetric:
-            ways.append(("with wo and wi exchanged", "swapped arguments", (subject, wi, wo, "radiance")))
-        if subject.transmits:
-            for mode in ("radiance", "importance"):
-                ways.append((f"in mode {mode}", "`mode` is ignored, or turned", (subject, wo, wi, mode)))
-        for text, guess, other in widths(subject):
-            ways.append((f"with {text}", guess, (other, wo, wi, "radiance")))
-        for words, guess, arguments in ways:
-            try:
-                below = ratio.again(*arguments)
-            except (GonioError, ValueError):
-                continue
-            if below.shape[1] != ratio.below.shape[1]:
-                continue
-            r = scalar(dataclasses.replace(ratio, below=below)) if np.all(np.isfinite(below)) else None
-            held = holds(ratio, r) if r is not None else None
-            if held is not None:
-                return Fit(f"1 {words}", guess, *held)
-        return None
 
+SIDES = {"": 0.0, " from outside": 1.0, " from inside": -1.0}
+
+
+def indices(subject: Subject, powers: Sequence[int], guess: str, sides: Sequence[str] = ("",)) -> Iterator[Factor]:
+    """Powers of the index in transmission, inverted from the other side; from both sides, or from one of SIDES."""
+    for eta in index_below(subject):
+        for place in sides:
+            for power in powers:
+
+                def field(
+                    o: np.ndarray, i: np.ndarray, eta: float = eta, side: float = SIDES[place], power: int = power
+                ) -> np.ndarray:
+                    through = (o[:, 2] * i[:, 2] < 0.0) & (o[:, 2] * side >= 0.0)
+                    return np.where(through, _across(o, eta) ** float(power), 1.0)
+
+                yield Factor(f"{product('', {'eta': power})} in transmission{place}", guess, field)
+
+
+def refractions(subject: Subject) -> Iterator[Factor]:
+    """Powers of the cosines of a refraction and of its index."""
+    names = ("(o.m)", "(i.m)", "cos_i", "cos_o", "cos_m")
+    singles = [{name: power} for name in names for power in (1, -1, 2, -2)]
+    pairs = [{a: p, b: q} for a, b in itertools.combinations(names, 2) for p in (1, -1) for q in (1, -1)]
+    pairs += [{a: p, b: -p} for a, b in (names[:2], names[2:4]) for p in (2, -2)]
+    for eta in [*index_below(subject)] or [1.0]:
+        for powers in singles + pairs:
+            for over in (0, 2, -2):
+
+                def field(
+                    o: np.ndarray, i: np.ndarray, eta: float = eta, p: dict[str, int] = powers, over: int = over
+                ) -> np.ndarray:
+                    side = _across(o, eta)
+                    values = values_of([*p], o, i, half_vector(o, i, side))
+                    return np.asarray(np.prod(values ** np.array([*p.values()], float), axis=1) * side ** float(over))
+
+                facet = over or any("m" in name for name in powers)
+                guess = COSINES["(i.m)"].guess if facet else "the cosine of wi in place of that of wo, or the reverse"
+                yield Factor(product("", powers | ({"eta": over} if over else {})), guess, field)
+
+
+# --------------------------------------------------------------------------- widths
 
 POWERS = {"alpha^2": 2.0, "sqrt(alpha)": 0.5}
+WIDTH = "alpha in place of alpha^2, or the reverse"
 
 
 def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
-    """The subject at alpha^2, at sqrt(alpha) and with its two widths exchanged, where that changes anything."""
+    """The subject with its two widths exchanged, at alpha^2, and at sqrt(alpha), where that changes anything."""
     pair = getattr(subject.model, "alpha", None)
     if isinstance(pair, tuple | list) and len(pair) == 2 and np.ndim(pair[0]) == 0 and pair[0] != pair[1]:
         exchanged = subject.replace(alpha=(pair[1], pair[0]))
-        yield ("alpha_x and alpha_y exchanged", "alpha_x where alpha_y belongs", exchanged)
+        yield "alpha_x and alpha_y exchanged", "alpha_x in place of alpha_y", exchanged
     for text, power in POWERS.items():
         for name, parameter in subject.parameters.items():
             value = getattr(subject.model, name, None)
@@ -292,177 +186,86 @@ def widths(subject: Subject) -> Iterator[tuple[str, str, Subject]]:
                 continue
             changed = numbers**power
             try:
-                yield (
-                    f"{text} in place of alpha",
-                    "alpha against alpha^2",
-                    subject.replace(**{name: float(changed) if changed.ndim == 0 else tuple(changed.tolist())}),
-                )
+                other = subject.replace(**{name: float(changed) if changed.ndim == 0 else tuple(changed.tolist())})
             except GonioError:
                 continue
+            yield f"{text} in place of alpha", WIDTH, other
 
 
-class Distribution(Candidate):
-    """D of another width, alpha^2 or sqrt(alpha) in place of alpha, of GGX or Beckmann, and nothing else."""
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        r = scalar(ratio)
-        width = width_of(ratio.subject)
-        if r is None or width is None or not np.all(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0):
-            return None
-        m = half_vector(ratio.wo, ratio.wi)
-        for name, D in (("GGX", ggx), ("Beckmann", _beckmann)):
-            for text, power in POWERS.items():
-                field = D(m, width**power) / D(m, width)
-                for formula, quotient in ((f"D({text}) / D(alpha)", r / field), (f"D(alpha) / D({text})", r * field)):
-                    held = holds(ratio, quotient)
-                    if held is not None:
-                        return Fit(f"{formula} of {name}", "alpha against alpha^2", *held)
-        return None
-
-
-def width_of(subject: Subject) -> np.ndarray | None:
-    """(alpha_x, alpha_y) of a subject with a width that squaring changes."""
+def distributions(subject: Subject) -> Iterator[Factor]:
+    """D of another width, alpha^2 or sqrt(alpha) in place of alpha, of GGX or Beckmann."""
     value = getattr(subject.model, "alpha", None)
     if not isinstance(value, int | float | tuple | list) or np.size(value) > 2:
-        return None
+        return
     width = np.broadcast_to(np.asarray(value, float), 2)
-    return width if np.all((width > 0.0) & (width < 0.99)) else None
+    if not np.all((width > 0.0) & (width < 0.99)):
+        return
+    for name, D in (("GGX", _ggx), ("Beckmann", _beckmann)):
+        for text, power in POWERS.items():
+            for formula, above, below in (
+                (f"D({text}) / D(alpha)", width**power, width),
+                (f"D(alpha) / D({text})", width, width**power),
+            ):
+
+                def field(
+                    o: np.ndarray,
+                    i: np.ndarray,
+                    D: Callable[[np.ndarray, np.ndarray], np.ndarray] = D,
+                    above: np.ndarray = above,
+                    below: np.ndarray = below,
+                ) -> np.ndarray:
+                    m = half_vector(o, i)
+                    return D(m, above) / D(m, below)
+
+                yield Factor(f"{formula} of {name}", WIDTH, field)
 
 
-def ggx(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+def _ggx(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """Heitz2014, eq. 85."""
     q = (m[:, 0] / alpha[0]) ** 2 + (m[:, 1] / alpha[1]) ** 2 + m[:, 2] ** 2
-    return 1.0 / (np.pi * alpha[0] * alpha[1] * q**2)
+    return np.asarray(1.0 / (np.pi * alpha[0] * alpha[1] * q**2))
 
 
 def _beckmann(m: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Heitz2014, eq. 81; never quite 0, so that ratios stay numbers."""
+    """Heitz2014, eq. 81; never quite 0, so that ratios stay finite."""
     q = ((m[:, 0] / alpha[0]) ** 2 + (m[:, 1] / alpha[1]) ** 2) / m[:, 2] ** 2
-    return np.exp(-np.minimum(q, 600.0)) / (np.pi * alpha[0] * alpha[1] * m[:, 2] ** 4)
+    return np.asarray(np.exp(-np.minimum(q, 600.0)) / (np.pi * alpha[0] * alpha[1] * m[:, 2] ** 4))
 
 
-class Fresnel(Candidate):
-    """Schlick's F at another cosine: at n.o in place of o.m. R0, one a channel, is solved for."""
+# --------------------------------------------------------------------------- Fresnel's term
 
-    NAMES = ("n.o", "n.i", "o.m", "n.m")
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        if not np.all(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0):
-            return None
-        m = half_vector(ratio.wo, ratio.wi)
-        cosines = [ratio.wo[:, 2], ratio.wi[:, 2], np.sum(ratio.wo * m, 1), m[:, 2]]
-        powers = [(1.0 - np.clip(np.abs(c), 0.0, 1.0)) ** 5 for c in cosines]
-        r = ratio.above / np.where(ratio.below == 0.0, np.nan, ratio.below)
-        if not ratio.antisymmetric:
-            # F of (1 - cos)^5 = 1 is 1: a term that one of the two lacks
-            one = np.ones(len(r))
-            for name, x in zip(self.NAMES, powers, strict=True):
-                for formula, held in (
-                    (f"F({name})", self._held(ratio, r, x, one)),
-                    (f"1 / F({name})", self._held(ratio, r, one, x)),
-                ):
-                    if held is not None:
-                        return Fit(formula, "Fresnel's term, forgotten in one of the two or there twice", *held)
-        order = [(0, 1), (1, 0)] if ratio.antisymmetric else itertools.permutations(range(4), 2)
-        for a, b in order:
-            held = self._held(ratio, r, powers[a], powers[b])
-            if held is not None:
-                formula = f"F({self.NAMES[a]}) / F({self.NAMES[b]})"
-                return Fit(formula, "Fresnel's term at the normal, where the half vector belongs", *held)
-        return None
-
-    def _held(self, ratio: Ratio, r: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[float, float] | None:
-        spread, cover = 0.0, 1.0
-        for column in r.T:
-            # column = (R0 + (1 - R0) x) / (R0 + (1 - R0) y), which is linear in R0
-            a, b = column * (1.0 - y) - (1.0 - x), x - column * y
-            good = np.isfinite(a) & np.isfinite(b)
-            if not good.any() or np.sum(a[good] ** 2) < 1e-12:
-                return None
-            r0 = float(np.sum(a[good] * b[good]) / np.sum(a[good] ** 2))
-            if not 0.0 <= r0 < 0.99:
-                return None
-            field = (r0 + (1.0 - r0) * x) / (r0 + (1.0 - r0) * y)
-            if np.ptp(np.percentile(field, [5.0, 95.0])) < 0.01:
-                return None
-            held = holds(ratio, column / field)
-            if held is None:
-                return None
-            spread, cover = max(spread, held[0]), min(cover, held[1])
-        return spread, cover
+AT_NORMAL = "Fresnel's term at the normal in place of the half vector"
 
 
-class DielectricFresnel(Candidate):
-    """The exact F of a dielectric at n.o in place of o.m: F where light is reflected, 1 - F where it goes through."""
+def dielectrics(subject: Subject, antisymmetric: bool) -> Iterator[Factor]:
+    """The exact F of a dielectric at n.o in place of o.m, or of n.i: F in reflection, 1 - F in transmission."""
+    for eta in index_below(subject):
 
-    def fit(self, ratio: Ratio) -> Fit | None:
-        r = scalar(ratio)
-        if r is None:
-            return None
-        o, i = ratio.wo[:, 2], ratio.wi[:, 2]
-        through = o * i < 0.0
-        for eta in index_below(ratio.subject):
-            side = np.where(o > 0.0, eta, 1.0 / eta)
-            m = ratio.wo + np.where(through, side, 1.0)[:, None] * ratio.wi
-            m /= np.maximum(np.linalg.norm(m, axis=1, keepdims=True), 1e-12)
+        def field(o: np.ndarray, i: np.ndarray, eta: float = eta) -> np.ndarray:
+            through = o[:, 2] * i[:, 2] < 0.0
+            side = _across(o, eta)
 
-            def share(cosine: np.ndarray, index: np.ndarray, through: np.ndarray = through) -> np.ndarray:
-                F = _dielectric(np.abs(cosine), index)
+            def share(cosine: np.ndarray, index: np.ndarray) -> np.ndarray:
+                F = dielectric(np.abs(cosine), index)
                 return np.where(through, 1.0 - F, F)
 
-            if ratio.antisymmetric:
-                other, words = (share(i, np.where(i > 0.0, eta, 1.0 / eta)), "F(n.o) / F(n.i)")
-            else:
-                other, words = (share(np.sum(ratio.wo * m, axis=1), side), "F(n.o) / F(o.m)")
-            at_normal = share(o, side)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                quotients = {words: r * other / at_normal, f"1 / ({words})": r * at_normal / other}
-            for formula, quotient in quotients.items():
-                held = holds(ratio, quotient)
-                if held is not None:
-                    text = f"{formula} of index {eta:.4g}"
-                    return Fit(text, "Fresnel's term at the normal, where the half vector belongs", *held)
-        return None
+            m = half_vector(o, i, np.where(through, side, 1.0))
+            other = share(i[:, 2], _across(i, eta)) if antisymmetric else share(_dot(o, m), side)
+            return np.asarray(share(o[:, 2], side) / other)
+
+        formula = "F(n.o) / F(n.i)" if antisymmetric else "F(n.o) / F(o.m)"
+        yield Factor(f"{formula} of index {eta:.4g}", AT_NORMAL, field)
+        yield Factor(f"1 / ({formula}) of index {eta:.4g}", AT_NORMAL, functools.partial(_inverse, field))
 
 
-def _dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
+def _inverse(field: Field, o: np.ndarray, i: np.ndarray) -> np.ndarray:
+    return np.asarray(1.0 / field(o, i))
+
+
+def dielectric(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
     """Reflectance of unpolarized light, by the cosine >= 0 and the index beyond over that here (Walter2007, eq. 22)."""
     square = eta**2 - 1.0 + cosine**2
     g = np.sqrt(np.maximum(square, 0.0))
     plus = np.maximum(g + cosine, 1e-12)
     a, b = (g - cosine) / plus, (cosine * plus - 1.0) / (cosine * (g - cosine) + 1.0)
     return np.where(square > 0.0, 0.5 * a**2 * (1.0 + b**2), 1.0)
-
-
-class OneDirection(Candidate):
-    """f(wo, wi) / f(wi, wo) = g(cos_o) / g(cos_i): a term that knows one of the two directions only."""
-
-    DEGREE = 9
-
-    def fit(self, ratio: Ratio) -> Fit | None:
-        r = scalar(ratio) if ratio.antisymmetric else None
-        if r is None or not np.all(ratio.wo[:, 2] * ratio.wi[:, 2] > 0.0) or not np.all(r > 0.0):
-            return None
-        o, i = (np.abs(w[:, 2:]) for w in (ratio.wo, ratio.wi))
-        powers = np.arange(1, self.DEGREE + 1)
-        columns = np.column_stack([o**powers - i**powers, np.log(o / i)])
-        solved = np.linalg.lstsq(columns, np.log(r), rcond=None)[0]
-        held = holds(ratio, r / np.exp(columns @ solved))
-        if held is None:
-            return None
-        guess = "a term of one direction alone, where the half vector or both directions belong"
-        return Fit("g(wo) / g(wi), with g of one cosine", guess, *held)
-
-
-CANDIDATES: tuple[Candidate, ...] = (
-    Constant(),
-    Colour(),
-    Cosines(),
-    Index(),
-    Refraction(),
-    Otherwise(),
-    Distribution(),
-    Fresnel(),
-    DielectricFresnel(),
-    OneDirection(),
-)

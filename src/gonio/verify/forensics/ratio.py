@@ -1,6 +1,4 @@
-"""A ratio of two values that should be one, and what can be read from it: `factors` says what it may be, `causes` what
-that means.
-"""
+"""A ratio of two values that should be equal: `fits` finds its formula, `causes` the probable mistake."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ import numpy as np
 if TYPE_CHECKING:
     from ..subject import Subject
 
-SPREAD = 1e-3  # largest 5..95 % spread of a ratio that is called clean
+SPREAD = 1e-3  # largest 5 % to 95 % spread of a ratio that fits
 COVER = 0.97  # share of the pairs that must follow
 
 # (subject, wo, wi): the denominator of a ratio, of another subject or with other arguments
@@ -25,8 +23,8 @@ Denominator: TypeAlias = "Callable[[Subject, np.ndarray, np.ndarray, str], np.nd
 class Cause:
     """A probable cause.
 
-    words   what it looks like, as a sentence of the report
-    key     the same without figures: failures with one key have one cause
+    words   a sentence of the report
+    key     the same without figures: failures with the same key have the same cause
     """
 
     words: str
@@ -35,15 +33,15 @@ class Cause:
 
 @dataclasses.dataclass(frozen=True)
 class Ratio:
-    """Two values that should be one, over pairs of directions.
+    """Two values that should be equal, over pairs of directions.
 
     top, bottom    their names, "weight x pdf" and "eval"
     wo, wi         (N, 3)
     above, below   the values, (N, channels)
-    again          computes `below` anew for another subject, other directions or the other mode
-    numbers        constants that this ratio may be, beside the usual ones: "2 alpha"
-    zero           what a ratio of 0 suggests
-    antisymmetric  whether exchanging wo and wi inverts the ratio: what two directions share cancels
+    recompute      computes `below` for another subject, other directions or the other mode
+    numbers        constants that this ratio may equal, besides the usual ones: "2 alpha"
+    zero           the mistake that a ratio of 0 suggests
+    antisymmetric  whether exchanging wo and wi inverts the ratio: factors of both directions cancel
     """
 
     top: str
@@ -53,10 +51,10 @@ class Ratio:
     above: np.ndarray
     below: np.ndarray
     subject: Subject
-    again: Denominator | None = None
+    recompute: Denominator | None = None
     antisymmetric: bool = False
     numbers: dict[str, float] = dataclasses.field(default_factory=dict)
-    zero: str = "a value that never arrives"
+    zero: str = "a value that is never used"
 
     @property
     def name(self) -> str:
@@ -71,7 +69,7 @@ class Ratio:
 
 
 class Fit(NamedTuple):
-    """What a ratio is: as a formula, what that suggests, and how well it holds; of a constant, the constant."""
+    """The formula of a ratio, the mistake that it suggests, and how well it holds; of a constant, the constant."""
 
     formula: str
     guess: str
@@ -80,7 +78,6 @@ class Fit(NamedTuple):
     number: float | None = None
 
 
-# what numbers are written as, and what leaves them behind
 NUMBERS = {
     "pi": np.pi,
     "2 pi": 2.0 * np.pi,
@@ -106,21 +103,21 @@ def written(value: float, allowed: float = SPREAD) -> str:
 
 
 def factor_key(number: float) -> str:
-    """One key for a factor and its inverse: which of two values lacks it, the ratio does not say."""
+    """One key for a factor and its inverse: the ratio does not tell which of the two values lacks it."""
     return f"factor {max(number, 1.0 / number):.3g}" if number > 0.0 else f"factor {number:.3g}"
 
 
 def tolerance(ratio: Ratio) -> float:
-    """What two values may differ by and still be the same."""
+    """The relative difference of two values that count as equal."""
     return 1e-5 if ratio.subject.best == "float64" else 5e-3
 
 
 def scalar(ratio: Ratio) -> np.ndarray | None:
-    """One number a pair (N,), where all channels have the same ratio; None where they have not."""
+    """One number per pair (N,), where all channels have the same ratio; None where they have not."""
     lit = np.abs(ratio.below) > 1e-3 * np.abs(ratio.below).max(1, keepdims=True)
     r = np.divide(ratio.above, ratio.below, out=np.full_like(ratio.above, np.nan), where=lit)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # rows in which nothing is lit stay no number
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows without light stay NaN
         middle = np.nanmedian(r, axis=1)
         spread = np.nanmax(np.abs(r - middle[:, None]), axis=1)
     apart = ~(spread <= max(SPREAD, tolerance(ratio)) * np.abs(middle))
@@ -128,7 +125,7 @@ def scalar(ratio: Ratio) -> np.ndarray | None:
 
 
 def holds(ratio: Ratio, quotient: np.ndarray) -> tuple[float, float] | None:
-    """(spread, cover) of values that should be 1; None where they are not, cleanly."""
+    """(spread, cover) of values that should be 1; None where too many are not."""
     allowed = max(SPREAD, tolerance(ratio))
     good = np.isfinite(quotient)
     cover = float(np.mean(good & (np.abs(quotient - 1.0) < allowed)))

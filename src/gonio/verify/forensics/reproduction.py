@@ -1,8 +1,8 @@
-"""A failure of a Mitsuba plugin as a program of a few lines that needs Mitsuba alone: for its authors to run.
+"""A failure of a Mitsuba plugin as a short program that needs Mitsuba alone, for its authors.
 
-The program ends with an AssertionError, which says by how much, for as long as the fault is there.
+The program ends with an AssertionError that tells the figure, as long as the fault exists.
 
-    script("energy", subject, finding)     "" where the BSDF is no plugin of Mitsuba's own, or nothing of it is known
+    script("energy", subject, finding)     "" where the BSDF is not one of Mitsuba's plugins, or the law has no program
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ si.sh_frame, si.n, si.uv = mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1]), [0, 0, 1
 si.dp_du, si.dp_dv, si.t, si.prim_index = [1, 0, 0], [0, 1, 0], 1, 0
 si.wi = {wo}
 """
-# a grid of directions that is finer towards the horizon, and the solid angle of each
+# a grid of directions, finer toward the horizon, and the solid angle of each
 GRID = """i = dr.arange(mi.UInt32, n)
 t, phi = (mi.Float(i >> 12) + 0.5) / 2048 - 1, (mi.Float(i & 4095) + 0.5) * (dr.pi / 2048)
 z = t * dr.abs(t)
@@ -42,10 +42,10 @@ SAMPLE = "bs, weight = bsdf.sample(ctx, si, rng.next_float32(), mi.Point2f(rng.n
 def script(law: str, subject: Subject, finding: Finding) -> str:
     """The program for a law's finding."""
     make = MAKERS.get(law)
-    there = where_found(subject, finding)
-    if make is None or getattr(there.model, "plugin", None) is None:
+    subject = where_found(subject, finding)
+    if make is None or getattr(subject.model, "plugin", None) is None:
         return ""
-    return make(there, finding)
+    return make(subject, finding)
 
 
 def _head(subject: Subject, wo: np.ndarray) -> str:
@@ -57,7 +57,7 @@ def _vector(w: np.ndarray) -> str:
 
 
 def _literal(value: object) -> str:
-    """A property of a plugin as Python writes it."""
+    """A property of a plugin as a Python literal."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{json.dumps(name)}: {_literal(one)}" for name, one in value.items()) + "}"
     if isinstance(value, list | tuple):
@@ -71,18 +71,18 @@ def _literal(value: object) -> str:
     return str(value)
 
 
-# --------------------------------------------------------------------------- one a law
+# --------------------------------------------------------------------------- one per law
 
 
 def _energy(subject: Subject, finding: Finding) -> str:
-    """What it reflects, by a grid of directions; and where that is no gain, what its samples say."""
-    from ..laws.energy import white_twin
+    """The albedo by a grid of directions; without a gain, against that of the samples."""
+    from ..laws.energy import lossless_variant
 
     mode = "ctx.mode = mi.TransportMode.Importance  # power, without the factor eta^2 of radiance\n"
     curves = finding.evidence
     wo, gain = curves.wo, curves.quadrature.max(1)  # type: ignore[union-attr]
     if finding.figure > finding.tolerance:
-        white = white_twin(subject) if finding.worst.startswith("white furnace") else None
+        white = lossless_variant(subject) if finding.worst.startswith("white furnace") else None
         furnace = curves.furnace.max(1) if white is not None else gain  # type: ignore[union-attr]
         row = int(np.argmax(furnace))
         text = _head(white or subject, wo[row]) + (mode if subject.transmits else "")
@@ -91,7 +91,7 @@ def _energy(subject: Subject, finding: Finding) -> str:
         else:  # a delta lobe has no values
             text += SAMPLE + "albedo = dr.max(dr.mean(weight, axis=1))\n"
         return text + (
-            f'assert albedo < {1.0 + 0.5 * (furnace[row] - 1.0):.5g}, f"reflects {{albedo}} times the light it gets"\n'
+            f'assert albedo < {1.0 + 0.5 * (furnace[row] - 1.0):.5g}, f"reflects {{albedo}} times the incident light"\n'
         )
     off = np.abs(curves.quadrature - curves.sampling).mean(1)  # type: ignore[union-attr]
     row = int(np.argmax(off))
@@ -99,37 +99,37 @@ def _energy(subject: Subject, finding: Finding) -> str:
     return text + (
         "values, samples = dr.sum(bsdf.eval(ctx, si, wo) * area, axis=1), dr.mean(weight, axis=1)\n"
         f"assert dr.all(dr.abs(values - samples) < {0.5 * off[row]:.2g}), "
-        'f"values reflect {values}, samples {samples}"\n'
+        'f"albedo {values} by eval, {samples} by sample"\n'
     )
 
 
 def _pdf(subject: Subject, finding: Finding) -> str:
-    """The share of samples that the pdf claims somewhere, against those that fall there."""
+    """The share of samples in a region by the pdf, against that of the samples themselves."""
     cells = finding.evidence
     if not isinstance(cells, SampleCells) or cells.wo is None:
         return ""
-    claimed, found = cells.expected / cells.drawn, cells.observed / cells.drawn
+    claimed, drawn = cells.expected / cells.drawn, cells.observed / cells.drawn
     sides = [(f"{{}}.z {'>' if side > 0 else '<'} 0", k) for k, side in enumerate(cells.sides)]
-    places = {"True": float(claimed.sum() - found.sum())}
-    places |= {where: float(claimed[k].sum() - found[k].sum()) for where, k in sides}
+    places = {"True": float(claimed.sum() - drawn.sum())}
+    places |= {where: float(claimed[k].sum() - drawn[k].sum()) for where, k in sides}
     where, off = max(places.items(), key=lambda item: abs(item[1]))
     held = crowding.blocks(cells)
-    if held is not None and abs(off) < 2e-3:  # nothing as a whole: the cap in which most is missing
+    if held is not None and abs(off) < 2e-3:  # none in total: the cap with the largest difference
         expected = held.joined(held.expected) / held.drawn
         middle = np.stack([held.joined(held.wi[:, k] * held.expected) for k in range(3)], -1)
         middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)
         for cosine in (0.9999, 0.999, 0.99, 0.95, 0.8):
-            near = (middle @ middle.T > cosine) @ (expected - held.seen / held.drawn)
-            row = int(np.argmax(np.abs(near)))
-            if abs(near[row]) > 1.2 * abs(off):
-                where, off = f"dr.dot({{}}, {_vector(middle[row])}) > {cosine}", float(near[row])
+            missing = (middle @ middle.T > cosine) @ (expected - held.observed / held.drawn)
+            row = int(np.argmax(np.abs(missing)))
+            if abs(missing[row]) > 1.2 * abs(off):
+                where, off = f"dr.dot({{}}, {_vector(middle[row])}) > {cosine}", float(missing[row])
     text = _head(subject, cells.wo) + GRID + SAMPLE
     inside = "mi.Bool(True)" if where == "True" else where
     return text + (
         f"claimed = dr.sum(dr.select({inside.format('wo')}, bsdf.pdf(ctx, si, wo) * area, 0))\n"
-        f"found = dr.mean(dr.select(dr.any(weight > 0) & ({inside.format('bs.wo')}), 1.0, 0.0))\n"
-        f"assert dr.abs(claimed - found) < {0.5 * abs(off):.2g}, "
-        'f"pdf claims {claimed} of all samples, {found} come"\n'
+        f"drawn = dr.mean(dr.select(dr.any(weight > 0) & ({inside.format('bs.wo')}), 1.0, 0.0))\n"
+        f"assert dr.abs(claimed - drawn) < {0.5 * abs(off):.2g}, "
+        'f"the pdf claims {claimed} of all samples, and {drawn} occur"\n'
     )
 
 
@@ -151,7 +151,7 @@ def _reciprocity(subject: Subject, finding: Finding) -> str:
     return _head(subject, wo).replace("1 << 24", "1") + (
         f"wo = {_vector(wi)}\n"
         "there = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)\n"
-        "ctx.mode = mi.TransportMode.Importance  # the same path, followed the other way\n"
+        "ctx.mode = mi.TransportMode.Importance  # the same path in the other direction\n"
         "si.wi, wo = wo, mi.Vector3f(si.wi)\n"
         "back = bsdf.eval(ctx, si, wo) / dr.abs(wo.z)\n"
         f"assert dr.all(dr.abs(there - back) <= {0.5 * min(finding.figure, 1.0):.2g} * dr.maximum(there, back)), "
@@ -164,9 +164,9 @@ def _positivity(subject: Subject, finding: Finding) -> str:
         return ""
     wo, wi = finding.at
     return _head(subject, wo) + (
-        f"wo = {_vector(wi)}\n" + SAMPLE + "found = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]\n"
-        "good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in found]\n"
-        'assert dr.all(good, axis=None), f"numbers >= 0, of eval, pdf, weight and its pdf: {good}"\n'
+        f"wo = {_vector(wi)}\n" + SAMPLE + "values = [bsdf.eval(ctx, si, wo), bsdf.pdf(ctx, si, wo), weight, bs.pdf]\n"
+        "good = [dr.all(dr.isfinite(v) & (v >= 0), axis=None) for v in values]\n"
+        'assert dr.all(good, axis=None), f"finite and not negative: eval, pdf, weight, pdf of the sample: {good}"\n'
     )
 
 
@@ -174,13 +174,13 @@ def _isotropy(subject: Subject, finding: Finding) -> str:
     if finding.at is None:
         return ""
     wo, wi = finding.at
-    # Dr.Jit has no turn about an axis for plain vectors: x and y are one complex number
+    # Dr.Jit has no rotation of plain vectors about an axis
     return _head(subject, wo).replace("1 << 24", "24") + (
         "turn = dr.arange(mi.Float, n) * (2 * dr.pi / n)\n"
-        "(s, c), turned = dr.sincos(turn), lambda w: mi.Vector3f(c * w.x - s * w.y, s * w.x + c * w.y, w.z)\n"
-        "si.wi = turned(si.wi)\n"
-        f"value = bsdf.eval(ctx, si, turned({_vector(wi)}))[0]\n"
-        'assert dr.max(value) < 1.05 * dr.min(value), f"{dr.min(value)} to {dr.max(value)} as both directions turn"\n'
+        "(s, c), rotated = dr.sincos(turn), lambda w: mi.Vector3f(c * w.x - s * w.y, s * w.x + c * w.y, w.z)\n"
+        "si.wi = rotated(si.wi)\n"
+        f"value = bsdf.eval(ctx, si, rotated({_vector(wi)}))[0]\n"
+        'assert dr.max(value) < 1.05 * dr.min(value), f"{dr.min(value)} to {dr.max(value)} as both directions rotate"\n'
     )
 
 
@@ -224,24 +224,24 @@ CALLS = {
     "count, kinds = bsdf.component_count(), [bsdf.flags(k) for k in range(bsdf.component_count())]\n"
     'assert dr.all(last < count), f"samples of component {last}, of {count}: {kinds}"\n',
     "components": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
-    "whole, parts, seen = bsdf.eval(ctx, si, wo), mi.Color3f(0), {}\n"
+    "total, parts, sampled = bsdf.eval(ctx, si, wo), mi.Color3f(0), {}\n"
     "for ctx.component in range(bsdf.component_count()):\n"
     "    parts += bsdf.eval(ctx, si, wo)\n"
     "    " + SAMPLE + "    got = dr.select(dr.any(weight > 0), bs.sampled_component, ctx.component)\n"
-    "    seen[ctx.component] = (dr.min(got)[0], dr.max(got)[0])\n"
-    "parts, whole = dr.mean(parts, axis=None), dr.mean(whole, axis=None)\n"
-    "assert all(pair == (k, k) for k, pair in seen.items()) and dr.allclose(parts, whole, 1e-3), "
-    'f"asked for one component, samples are of {seen}; values sum to {parts}, eval is {whole}"\n',
+    "    sampled[ctx.component] = (dr.min(got)[0], dr.max(got)[0])\n"
+    "parts, total = dr.mean(parts, axis=None), dr.mean(total, axis=None)\n"
+    "assert all(pair == (k, k) for k, pair in sampled.items()) and dr.allclose(parts, total, 1e-3), "
+    'f"with one component enabled, samples are of {sampled}; values sum to {parts}, eval is {total}"\n',
     "types": "wo = mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32()))\n"
-    "whole, parts = bsdf.eval(ctx, si, wo), mi.Color3f(0)\n"
+    "total, parts = bsdf.eval(ctx, si, wo), mi.Color3f(0)\n"
     "for kind in (mi.BSDFFlags.Reflection, mi.BSDFFlags.Transmission):\n"
     "    ctx.type_mask = int(kind)\n"
     "    parts += bsdf.eval(ctx, si, wo)\n"
-    "parts, whole = dr.mean(parts, axis=None), dr.mean(whole, axis=None)\n"
-    'assert dr.allclose(parts, whole, 1e-3), f"reflected and transmitted sum to {parts}, eval is {whole}"\n',
+    "parts, total = dr.mean(parts, axis=None), dr.mean(total, axis=None)\n"
+    'assert dr.allclose(parts, total, 1e-3), f"reflected and transmitted sum to {parts}, eval is {total}"\n',
     "eval_diffuse_reflectance": "value = bsdf.eval_diffuse_reflectance(si)\n"
     "least, most = dr.min(value, axis=None), dr.max(value, axis=None)\n"
-    'assert 0 <= least and most <= 1, f"a share of the light is from {least} to {most}"\n',
+    'assert 0 <= least and most <= 1, f"a reflectance is from {least} to {most}"\n',
 }
 
 MAKERS: dict[str, Callable[[Subject, Finding], str]] = {

@@ -1,4 +1,4 @@
-"""A time limit around the BSDF's own code: sampling that never ends must not hang the trial."""
+"""A time limit for the BSDF's own code: an endless loop must not hang the trial."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
-LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds a law; the slowest takes some ten
-GRACE = 20.0  # a loop inside a kernel does not hear the signal; after this the process ends
-watched = False  # whether a parent watches this process, and ends it where the signal is not heard
-# around each call of a BSDF, given the model and the method; the process that is watched says there where it is
+LIMIT = float(os.environ.get("GONIO_VERIFY_LIMIT", "300"))  # seconds per law; the slowest takes some ten
+GRACE = 20.0  # seconds; a signal does not interrupt a loop inside a kernel, and after these the process ends
+watched = False  # whether a parent watches this process, and ends it where the signal has no effect
+# a context around each call of a BSDF, by model and method; a watched process announces the call there
 calling: Callable[[Any, str], contextlib.AbstractContextManager[None]] | None = None
 
 
 def words(seconds: float) -> str:
-    """What is said of a law that did not end."""
-    return f"no end after {seconds:g} s: does `sample` loop until something that may never come?"
+    """The reason for the failure of a law that did not end."""
+    return f"no end after {seconds:g} s: does `sample` loop on a condition that may never hold?"
 
 
 @contextlib.contextmanager
 def limited(what: str, seconds: float | None = None) -> Iterator[None]:
     """Raise TimeoutError in the block after that many seconds.
 
-    A loop in Python is interrupted. A loop in a compiled kernel is not: then the process says so and exits with 2,
-    unless a parent watches it (`gonio.verify.isolation.child`).
-    Elsewhere than in the main thread, and where there is no SIGALRM, only the second happens.
+    A loop in Python is interrupted. A loop in a compiled kernel is not: then the process prints an error and exits
+    with 2, unless a parent watches it (`gonio.verify.isolation.child`). The same holds outside of the main thread, and
+    where there is no SIGALRM.
     """
     seconds = seconds or LIMIT
     text = words(seconds)

@@ -1,9 +1,8 @@
-"""The process in which a BSDF is judged, as `child` starts it: it may loop, crash, print, or eat memory.
+"""The process in which a BSDF is judged, as `child` starts it: it may loop, crash, print, or exhaust memory.
 
-Orders come pickled on standard input, answers leave pickled by a copy of standard output; what the BSDF itself prints
-goes to a file. An order is ("judge", card, skip, forbidden) or ("card", card, threshold); before each step an answer
-says what is next, and a file says which method is being called, so that the parent knows what it was that never came
-back.
+Orders arrive pickled on standard input; answers leave pickled by a copy of standard output, and what the BSDF prints
+goes to the file that is standard error. An order is (card, skip, forbidden, threshold). Before each step, and around
+each call of the BSDF, an answer says what comes next, so that the parent knows what was in progress when it ends.
 """
 
 from __future__ import annotations
@@ -11,160 +10,121 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
-import mmap
 import os
 import pickle
 import signal
 import sys
 import threading
-import time
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
 from ...catalog import notation, outside
-from ...errors import GonioError, GonioWarning, InputError
+from ...errors import GonioError, GonioWarning, InputError, MachineError
 from ...material import BSDF
 from .. import run, targets
 from ..laws import chosen
 from ..subject import Described, Fault, Subject, of
 from ..verdict import Card
 from . import watch
-from .child import CALLING, ISOLATED, LOADING, OTHERS, PRINTED, Item
+from .child import ISOLATED, LOADING, OTHERS, Item, Task
+
+Say = Callable[..., None]
 
 
-def main(folder: str) -> None:
-    """Judge what the parent orders until it closes the pipe. The folder is for what is printed, and what is called."""
-    orders, answers = _pipes()
+def main() -> None:
+    """Follow the parent's orders until it closes the pipe."""
+    orders, say = _pipes()
     _end_with(os.getppid())
-    printed = _Printed(Path(folder, PRINTED))
-    calls = _Calls(Path(folder, CALLING))
     task, limit = pickle.load(orders)
+    calls = _Calls(say)
     watch.watched, watch.LIMIT, watch.calling = True, limit, calls
-    say = _Answers(answers)
-    warnings.showwarning = say.warning
+    warnings.showwarning = lambda message, category, *more, **options: (
+        say("warning", str(message)) if issubclass(category, GonioWarning) else None
+    )
     warnings.simplefilter("always", GonioWarning)
     try:
-        say("begin", -1, LOADING)
-        subjects = [one for item in task.items for one in _subjects(item)]
-        laws = chosen(task.laws)
-        say("loaded", [one.title for one in subjects], [law.name for law in laws])
-        held: dict[int, run.Held] = {}
-        lines: dict[int, int] = {}
-        while True:
-            try:
-                order, card, *what = pickle.load(orders)
-            except EOFError:
-                break
-            before = printed.size()
-
-            def begin(step: str, card: int = card) -> None:
-                say("begin", card, step)
-
-            if order == "judge":
-                skip, forbidden = what
-                calls.judge(subjects[card].model, forbidden)
-                held[card] = run.judged(subjects[card], laws, task.effort, task.seed, begin, skip)
-                lines[card] = printed.since(before)
-                say("judged", card, held[card].tests, held[card].lowest)
-            else:
-                made = held[card].card(what[0], task.seed, task.effort, begin)
-                say("card", card, _plain(made), lines[card] + printed.since(before))
+        _work(task, orders, say, calls)
     except GonioError as error:
         say("error", error)
-    except (_Stuck, Fault) as error:  # a fault here is that of a test's repetition
+    except (_Stuck, Fault) as error:  # a fault here is that of a repeated test
         say("lost", str(error))
     except (KeyboardInterrupt, SystemExit, GeneratorExit, TimeoutError, MemoryError, RecursionError) as error:
-        # Ctrl-C does not come here: this is the BSDF's doing, outside of what `guarded` sees
+        # Ctrl-C does not reach this process: the BSDF raised it, outside of the calls that `guarded` watches
         say("lost", f"{type(error).__name__} ended the thread that judges it")
     except BaseException as error:
-        place = _outside(error)
+        place, what = _outside(error), f"{type(error).__name__}: {error}"
         if place:
-            say("lost", f"{type(error).__name__}: {error} ({place})")
+            say("lost", f"{what} ({place})")
         else:
-            say("fault", f"{type(error).__name__}: {error}", traceback.format_exc())
-    sys.stdout.flush()
+            internal = GonioError(f"the verifier raised {what}", "", "run `gonio --debug ...` and report its output")
+            internal.code = MachineError.code
+            say("error", internal, traceback.format_exc())
     os._exit(0)  # whatever threads and handlers the BSDF has left behind
 
 
+def _work(task: Task, orders: IO[bytes], say: Say, calls: _Calls) -> None:
+    say("step", -1, LOADING)
+    subjects = [one for item in task.items for one in _subjects(item)]
+    laws = chosen(task.laws)
+    say("loaded", [one.title for one in subjects], [law.name for law in laws])
+    while True:
+        try:
+            number, skip, forbidden, threshold = pickle.load(orders)
+        except EOFError:
+            return
+
+        def begin(step: str, number: int = number) -> None:
+            say("step", number, step)
+
+        calls.judge(subjects[number].model, forbidden)
+        judged = run.judged(subjects[number], laws, task.effort, task.seed, begin, skip)
+        say("card", number, _plain(judged.card(threshold, task.seed, task.effort, begin)))
+
+
 def _outside(error: BaseException) -> str:
-    """file:line where an exception came from a file of the user's, in no call that `guarded` sees; else ""."""
+    """file:line where an exception came from a file of the user's, outside of `guarded` calls; else ""."""
     files = {getattr(module, "__file__", "") for name, module in sys.modules.items() if name.startswith(outside.PREFIX)}
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename in files]
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
 
 
-class _Answers:
-    """What goes to the parent, each whole."""
-
-    def __init__(self, pipe: IO[bytes]) -> None:
-        self._pipe, self._lock = pipe, threading.Lock()
-
-    def __call__(self, *answer: object) -> None:
-        text = pickle.dumps(answer)
-        with self._lock, contextlib.suppress(BrokenPipeError):
-            self._pipe.write(text)
-            self._pipe.flush()
-
-    def warning(self, message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
-        if issubclass(category, GonioWarning):
-            self("warning", str(message))
-
-
-def _pipes() -> tuple[IO[bytes], IO[bytes]]:
-    """Both ends, out of the way of whoever reads standard input or prints."""
+def _pipes() -> tuple[IO[bytes], Say]:
+    """The orders, and the function that sends an answer; whoever reads standard input or prints does not touch them."""
     orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    return orders, answers
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # else a process that aborts loses its last lines
+    lock = threading.Lock()
 
-
-class _Printed:
-    """Standard output and error, which end in a file from here on."""
-
-    def __init__(self, log: Path) -> None:
-        self._log = log
-        file = os.open(log, os.O_WRONLY | os.O_APPEND)
-        for stream in (1, 2):
-            os.dup2(file, stream)
-        os.close(file)
-        if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(line_buffering=True)  # else the last words of a process that aborts die with it
-
-    def size(self) -> int:
-        """Bytes so far."""
+    def say(*answer: object) -> None:
+        text = pickle.dumps(answer)
         with contextlib.suppress(Exception):  # the BSDF may have closed them
             sys.stdout.flush()
             sys.stderr.flush()
-        return self._log.stat().st_size
+        with lock, contextlib.suppress(BrokenPipeError):
+            answers.write(text)
+            answers.flush()
 
-    def since(self, before: int) -> int:
-        """Lines since it held so many bytes."""
-        if self.size() <= before:
-            return 0
-        with self._log.open("rb") as file:
-            file.seek(before)
-            text = file.read()
-        return text.count(b"\n") + (not text.endswith(b"\n"))
+    return orders, say
 
 
 class _Stuck(BaseException):
-    """A call that did not end in time. Past every law: the parent starts anew, and that call is not made again."""
+    """A call that did not end in time. No law catches it: a new process starts, and that call is not repeated."""
 
 
 class _Calls:
-    """Which method of which material is being called, kept in a file that outlives this process.
+    """Announces each call of the BSDF to the parent, and refuses those that ended a process before.
 
     forbidden   by method and values, why it must not be called again
     given       the key of the values that the material was given
     """
 
-    def __init__(self, file: Path) -> None:
-        with file.open("r+b") as opened:
-            self._memory = mmap.mmap(opened.fileno(), 0)
+    def __init__(self, say: Say) -> None:
+        self.say = say
         self.forbidden: dict[tuple[str, str], str] = {}
         self.given = ""
         self._keys: dict[int, tuple[Any, str, str]] = {}
@@ -178,23 +138,22 @@ class _Calls:
         why = self.forbidden.get((method, key)) or (key != self.given and self.forbidden.get((method, OTHERS)))
         if why:
             raise Fault(why)
-        text = f"{method}\t{key}\t{words}\n".encode()
-        self._memory[: len(text)] = text
+        self.say("call", method, key, words)
         try:
             yield
         except TimeoutError as error:
-            raise _Stuck(str(error)) from error  # and the file still says what was called
+            raise _Stuck(str(error)) from error  # the parent still knows the call
         except BaseException as error:
-            self._memory[:1] = b"\n"
-            if isinstance(error, KeyboardInterrupt):  # the BSDF's doing: Ctrl-C does not come here
+            self.say("call")
+            if isinstance(error, KeyboardInterrupt):  # raised by the BSDF: Ctrl-C does not reach this process
                 raise Fault(f"KeyboardInterrupt in {method}") from error
             raise
-        self._memory[:1] = b"\n"
+        self.say("call")
 
     def _values(self, model: Any) -> tuple[str, str]:
         """The values of a material's parameters as a key, the same in every process, and in words."""
         known = self._keys.get(id(model))
-        if known is None or known[0] is not model:  # the model is kept, so that no other gets its id
+        if known is None or known[0] is not model:  # the model is stored, so that no other gets its id
             key = words = ""
             if isinstance(model, BSDF):
                 with contextlib.suppress(Exception):
@@ -206,29 +165,31 @@ class _Calls:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent is gone, be it killed."""
+    """End this process when its parent ends, even if it is killed."""
     if sys.platform == "linux":
         import ctypes
 
         with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, which a loop inside a kernel cannot delay
+            return
+    import psutil
 
-    def look() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
+    def wait() -> None:
+        with contextlib.suppress(psutil.Error):
+            psutil.Process(parent).wait()
         os._exit(2)
 
-    threading.Thread(target=look, daemon=True).start()
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def _subjects(item: Item) -> list[Subject]:
-    if isinstance(item.target, bytes):
-        try:
-            return [of(pickle.loads(item.target))]
-        except Exception as error:  # of a module that can be imported in the other process alone
-            what = f"the material cannot be sent to another process: {error}"
-            raise InputError(what, ISOLATED, "put the class into a file and name it FILE.py:CLASS") from error
-    return targets.resolve(item.target, item.settings, item.sweep)
+    if isinstance(item.target, str):
+        return targets.resolve(item.target, item.settings, item.sweep)
+    try:
+        return [of(pickle.loads(item.target))]
+    except Exception as error:  # of a module that only the other process can import
+        what = f"the material cannot be sent to another process: {error}"
+        raise InputError(what, ISOLATED, "put the class into a file and name it FILE.py:CLASS") from error
 
 
 def _plain(card: Card) -> Card:
@@ -237,6 +198,6 @@ def _plain(card: Card) -> Card:
     for verdict in card.verdicts:
         try:
             pickle.dumps(verdict.evidence)
-        except Exception:  # of a law in a package of somebody else's
+        except Exception:  # of a law in another package
             verdict.evidence = None
     return card

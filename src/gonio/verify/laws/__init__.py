@@ -1,5 +1,5 @@
-"""The laws, one file each. A new one is one new file in this folder, an entry point of a package, or a class that is
-registered: `gonio.members`.
+"""The laws, one file each. A new law is a new file in this folder, an entry point of a package, or a registered class:
+`gonio.members`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def laws() -> dict[str, Law]:
 
 
 def chosen(names: Sequence[str] | None) -> list[Law]:
-    """The laws of these names in the order of a report; where None all but those that are asked on request; InputError
-    where one is unknown."""
+    """The laws of these names in the order of a report, all but those on request where None. InputError where a name is
+    unknown."""
     asked = None if names is None else {Law.family.get(name).name for name in names}
     return [law for name, law in laws().items() if (not law.on_request if asked is None else name in asked)]

@@ -1,4 +1,4 @@
-"""What a law is, and what several of them share: pairs of directions, and how far rounding alone moves a value."""
+"""The protocol of a law, and tools that several laws share: pairs of directions, and the effect of rounding."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from ..verdict import Finding
 
 
 class Law:
-    """A law: asked of a subject, it returns a Finding, or raises DoesNotApply.
+    """A law: for a subject it returns a Finding, or raises DoesNotApply.
 
     number   its place in the report; Gonio's own are 1 to 10
-    name     how it is called on the command line and in `breaks`
+    name     its name on the command line and in `breaks`
     title    the law as a sentence
-    meaning  what its violation means for a picture
-    everywhere  whether it is also asked at other values of the parameters
+    meaning  the effect of a violation on pictures
+    everywhere  whether it is also judged at other values of the parameters
     at_ends     and at the ends of their ranges
-    on_request  whether it is asked only when it is named
+    on_request  whether it is judged only when it is named
     """
 
     family: ClassVar[Family[Law]]
@@ -41,11 +41,11 @@ class Law:
         raise NotImplementedError(f"{type(self).__name__} has no judge")
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Bias | None:
-        """What a failure does to a picture; None where the law cannot say. Asked only where it fails."""
+        """The effect of a failure on a picture; None where it is unknown. Called only after a failure."""
         return None
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterable[Ratio | Cause]:
-        """Ratios that may name a failure's cause, or causes that are known already, the best first."""
+        """Ratios that may determine a failure's cause, or causes that are known already, the best first."""
         return ()
 
 
@@ -53,17 +53,16 @@ Law.family = Family("law", "gonio.laws", ["gonio.verify.laws"], instances_of(Law
 
 
 def where_found(subject: Subject, finding: Finding) -> Subject:
-    """The subject with the settings at which a finding was made."""
+    """The subject with the settings of a finding."""
     return subject.replace(**finding.settings) if finding.settings else subject
 
 
 def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (wo, wi) on which the subject may have something to say, (count, 3) each.
+    """Pairs (wo, wi) at which the subject may be positive, (count, 3) each: a third uniform on the sphere, a third with
+    wi sampled by the model (narrow lobes), a third near grazing.
 
-    They are rounded to what float32 holds, so that both precisions see the same; with `exact` they are not, and unit
-    to 64 bits.
-
-    A third uniform on the sphere, a third with wi where the model samples (narrow lobes), a third near grazing.
+    They are rounded to float32, so that both precisions get the same input; with `exact` they are unit vectors to 64
+    bits.
     """
     rng = np.random.default_rng([seed, 1])
     sides = np.array(subject.sides or (1,))
@@ -82,7 +81,7 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
         wo, wi = directions.single(wo), directions.single(wi)
     try:
         drawn = subject.sample(wo[third : 2 * third], directions.numbers(rng, third))
-    except Fault:  # for the laws of sampling to report; the others do without
+    except Fault:  # the laws of sampling report it; the others do without samples
         return wo, wi
     good = (drawn.pdf > 0.0) & np.all(np.isfinite(drawn.wi), axis=1)
     wi[third : 2 * third][good] = drawn.wi[good]
@@ -90,14 +89,14 @@ def pairs(subject: Subject, count: int, seed: int, exact: bool = False) -> tuple
 
 
 ROUNDINGS = 4
-ALLOWED = 8.0  # roundings of the directions that float32 code may show
+ALLOWED = 8.0  # roundings of the directions that are tolerated of float32 code
 
 
 def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray, seed: int = 0) -> np.ndarray:
-    """How far a value may move by ALLOWED roundings of both directions in float32 (6e-8 each), (N, channels).
+    """The change of a value by ALLOWED roundings of both directions in float32 (6e-8 each), (N, channels).
 
-    Narrow lobes magnify the rounding of a half vector by 1 / alpha, and a step that is so near may be crossed; no
-    float32 code can do better than this.
+    Narrow lobes magnify the rounding of a half vector by 1 / alpha, and a step that close may be crossed; no float32
+    code can be more accurate.
     """
     rng = np.random.default_rng([seed, 2])
     value = function(wo, wi)
@@ -106,7 +105,7 @@ def rounding(function: Callable[..., np.ndarray], wo: np.ndarray, wi: np.ndarray
         turns = [rng.uniform(-1.0, 1.0, w.shape) for w in (wo, wi)]
         a, b = (w + 2.0**-24 * turn for w, turn in zip((wo, wi), turns, strict=True))
         slope = np.maximum(slope, np.abs(function(a, b) - value))
-        for side in (ALLOWED, -ALLOWED):  # one of the two crosses whatever step is that near
+        for side in (ALLOWED, -ALLOWED):  # one of the two crosses a step that close
             a, b = (w + 2.0**-24 * side * np.sign(turn) for w, turn in zip((wo, wi), turns, strict=True))
             step = np.maximum(step, np.abs(function(a, b) - value))
     return np.where(step > 4.0 * ALLOWED * slope, step, ALLOWED * slope)
@@ -119,14 +118,19 @@ def relative(a: np.ndarray, b: np.ndarray, noise: np.ndarray | float = 0.0, floo
 
 
 def worst_of(error: np.ndarray) -> tuple[int, float]:
-    """Row and size of the largest entry of (N,) or (N, channels); what is no number counts as infinite."""
+    """Row and size of the largest entry of (N,) or (N, channels); NaN counts as infinite."""
     flat = np.where(np.isfinite(error), error, np.inf)
     flat = flat if flat.ndim == 1 else flat.max(1)
     row = int(np.argmax(flat)) if len(flat) else 0
     return row, float(flat[row]) if len(flat) else 0.0
 
 
+def angles(w: np.ndarray) -> str:
+    """A direction's theta and phi in degrees."""
+    theta, phi = directions.angles(w)
+    return f"{theta:.4g}, {phi:.4g}"
+
+
 def pair_in_words(wo: np.ndarray, wi: np.ndarray) -> str:
     """Both directions in degrees."""
-    (to, po), (ti, pi) = directions.angles(wo), directions.angles(wi)
-    return f"wo at {to:.4g}, {po:.4g}; wi at {ti:.4g}, {pi:.4g} degrees"
+    return f"wo at {angles(wo)}; wi at {angles(wi)} degrees"

@@ -1,4 +1,4 @@
-"""Calls: the answers do not depend on how a renderer asks."""
+"""Calls: results do not depend on how a renderer makes them."""
 
 from __future__ import annotations
 
@@ -20,72 +20,72 @@ from .base import Law, pair_in_words, pairs
 
 SAME = {"float64": 1e-10, "float32": 1e-4}
 LARGE = 1 << 20
-SMALL = 1e-6  # of the largest value: less than that is as good as nothing
+SMALL = 1e-6  # of the largest value: smaller values are negligible
 
 
 class Calls(Law):
-    """One row says what a million say; rows that a renderer has switched off change no others; the same question has
-    the same answer; only transmission knows of `mode`. Of a plugin: eval_pdf, eval_pdf_sample, masks of lanes, of
-    components and of types, and its flags, say what eval, pdf and sample say."""
+    """The result of a row does not depend on the other rows, on their number or on earlier calls; only transmission
+    depends on `mode`. Of a plugin: eval_pdf, eval_pdf_sample, masks of lanes, of components and of types, and its
+    flags, agree with eval, pdf and sample."""
 
     number = 11
     name = "calls"
-    title = "the same answers however a renderer asks"
-    everywhere = False  # what it is about does not depend on the values
-    meaning = "Right in a test, wrong in a picture: integrators use calls, batches and masks that nothing else tries."
+    title = "the same results however a renderer calls"
+    everywhere = False  # it does not depend on the parameter values
+    meaning = "Right in a test, wrong in a picture: only integrators use these calls, batches and masks."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        finding = Finding(0.0, 0.0, "one wrong answer is one too many", shown="agree")
-        asked = []
+        finding = Finding(0.0, 0.0, "not one difference is allowed", shown="agree")
+        checked = []
         others: Iterable[Answer] = subject.model.renderer_calls(seed) if isinstance(subject.model, BSDF) else ()
         wrong: list[Answer] = []
         finding.details = wrong
         for answer in (*_checks(subject, effort, seed), *others):
-            asked.append(answer.what)
+            checked.append(answer.what)
             if answer.wrong:
                 wrong.append(answer)
                 finding.problems.append(f"{answer.what}: {answer.wrong}")
-        finding.notes.append(f"asked: {', '.join(dict.fromkeys(asked))}")
+        finding.notes.append(f"checked: {', '.join(dict.fromkeys(checked))}")
         finding.figure = float(len(finding.problems))
         if finding.problems:
             finding.shown = f"{len(finding.problems)} differ"
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        """What the call that path tracers make returns too much or too little; nothing for the others."""
+        """The error of the call that path tracers make; 0 for other calls."""
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
         worst = max(wrong, key=lambda answer: answer.share)
         if worst.share > 0.0:
             return severity.Bias(min(worst.worst, 1.0), min(worst.share, 1.0), 0.0, f"of {worst.what}", "bias")
         names = ", ".join(dict.fromkeys(answer.what for answer in wrong))
-        return severity.Bias(0.0, 0.0, 0.0, f"only who asks for {names}", "interface")
+        return severity.Bias(0.0, 0.0, 0.0, f"only callers of {names} are affected", "interface")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         wrong: list[Answer] = finding.details  # type: ignore[assignment]
         for answer in wrong:
             if answer.rows is not None:
-                name, other, wo, wi, got, whole = answer.rows
-                yield Ratio(name, other, wo, wi, got, whole, subject)
+                name, other, wo, wi, got, all_rows = answer.rows
+                yield Ratio(name, other, wo, wi, got, all_rows, subject)
         for answer in wrong:
-            words = SUSPECTS.get(answer.what, f"not the formula, but {answer.what}: {answer.wrong}")
+            words = SUSPECTS.get(answer.what, f"{answer.what}, not the formula: {answer.wrong}")
             yield Cause(words, f"calls {answer.what}")
 
 
-# what an answer that depends on how it was asked for comes from
-_ROWS = "the answer depends on how many rows there are: an index or a buffer of fixed size?"
-_NEIGHBOURS = "a row's answer depends on the other rows: a sum, a mean or a branch over all of them?"
+# the probable mistake behind a result that depends on the call
+_ROWS = "the result depends on the number of rows: an index or a buffer of fixed size?"
+_OTHER_ROWS = "the result of a row depends on the other rows: a sum, a mean or a branch over all of them?"
 SUSPECTS = {
     "a million rows": _ROWS,
     "one row at a time": _ROWS,
-    "rows in another order": _NEIGHBOURS,
-    "half the rows dead": _NEIGHBOURS,
-    "textured parameters": "a value of one ray serves others: derived once for all of them?",
-    "of one that nobody has used": "a call changes what later ones answer: state that is kept in the object?",
+    "rows in another order": _OTHER_ROWS,
+    "half the rows disabled": _OTHER_ROWS,
+    "textured parameters": "the value of one ray is used for others: derived once for all of them?",
+    "a new object": "a call changes the results of later ones: state stored in the object?",
 }
 
 
 def _checks(subject: Subject, effort: Effort, seed: int) -> Iterator[Answer]:
-    """What holds of any BSDF."""
+    """Checks of any BSDF."""
     wo, wi = pairs(subject, min(effort.pairs // 8, 4096), seed)
     u = directions.numbers(np.random.default_rng([seed, 101]), len(wo))
     for precision in subject.precisions:
@@ -106,10 +106,10 @@ def _answers(
     mode: Mode = "radiance",
     lanes: int = 0,
 ) -> list[dict[str, np.ndarray]]:
-    """eval, pdf and all of sample, rows (N, ...), asked as a renderer does: of Dr.Jit vectors, rows may be anything.
+    """Results of eval, pdf and sample, rows (N, ...), called as a renderer does, with Dr.Jit vectors of any rows.
 
-    times  that each is asked, one time straight after the other: an answer for each
-    lanes  a multiple of N: the rows again and again; the answer is that of the last N
+    times  number of consecutive calls of each method: a result per call
+    lanes  a multiple of N: the rows are repeated, and the results are those of the last N
     """
     dr = backend.drjit()
     types = backend.types(precision)
@@ -122,22 +122,22 @@ def _answers(
         dr.eval(given)
     a, b, c = given
     values: list[dict[str, Any]] = [{} for _ in range(times)]
-    for found in values:
-        found["eval"] = guarded(subject.model, "eval", lambda: model.eval(a, b, mode))
-    for found in values:
-        found["pdf"] = guarded(subject.model, "pdf", lambda: model.pdf(a, b))
-    for found in values:
+    for value in values:
+        value["eval"] = guarded(subject.model, "eval", lambda: model.eval(a, b, mode))
+    for value in values:
+        value["pdf"] = guarded(subject.model, "pdf", lambda: model.pdf(a, b))
+    for value in values:
         s = guarded(subject.model, "sample", lambda: model.sample(a, c, mode))
-        found |= {"sample's weight": s[1], "sample's pdf": s[2], "sample's wi": s[0], "sample's eta": s[4]}
-    dr.eval([list(found.values()) for found in values])
+        value |= {"sample's weight": s[1], "sample's pdf": s[2], "sample's wi": s[0], "sample's eta": s[4]}
+    dr.eval([list(value.values()) for value in values])
     if lanes:
         last = dr.arange(types.module.UInt32, count) + (lanes - count)
-        values = [{name: _lanes(value, last, lanes) for name, value in found.items()} for found in values]
-    return [{name: _rows(value, count) for name, value in found.items()} for found in values]
+        values = [{name: _lanes(part, last, lanes) for name, part in value.items()} for value in values]
+    return [{name: _rows(part, count) for name, part in value.items()} for value in values]
 
 
 def _lanes(value: Any, last: Any, lanes: int) -> Any:
-    """Some lanes of a value; as it is where it has one for all."""
+    """Some lanes of a value; a value that is the same for all lanes stays."""
     dr = backend.drjit()
     if not dr.is_array_v(value) or dr.width(value) != lanes:
         return value
@@ -152,15 +152,15 @@ def _rows(value: Any, count: int) -> np.ndarray:
 
 
 def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision) -> Iterator[Answer]:
-    whole, second = _answers(subject, wo, wi, u, precision, 2)
+    first, second = _answers(subject, wo, wi, u, precision, 2)
     if subject.stochastic:
         return
     same = SAME[precision]
 
-    def some(rows: Any, answers: dict[str, np.ndarray] = whole) -> dict[str, np.ndarray]:
+    def some(rows: Any, answers: dict[str, np.ndarray] = first) -> dict[str, np.ndarray]:
         return {name: value[rows] for name, value in answers.items()}
 
-    twice = _unlike("asked twice", whole, second, wo, wi, 0.0)
+    twice = _unlike("asked twice", first, second, wo, wi, 0.0)
     if twice.wrong:
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return
@@ -168,35 +168,35 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
     fresh = subject.anew()
     if fresh is not None:
         (new,) = _answers(fresh, wo, wi, u, precision)
-        yield _unlike("of one that nobody has used", whole, new, wo, wi, same)
+        yield _unlike("a new object", first, new, wo, wi, same)
     for row in range(5):
         one = slice(row, row + 1)
-        (alone,) = _answers(subject, wo[one], wi[one], u[one], precision)
-        answer = _unlike("one row at a time", some(one), alone, wo[one], wi[one], same)
+        (single,) = _answers(subject, wo[one], wi[one], u[one], precision)
+        answer = _unlike("one row at a time", some(one), single, wo[one], wi[one], same)
         if answer.wrong:
             break
     yield answer
     if precision == "float32":
         (many,) = _answers(subject, wo, wi, u, precision, lanes=LARGE // len(wo) * len(wo))
-        yield _unlike("a million rows", whole, many, wo, wi, same)
+        yield _unlike("a million rows", first, many, wo, wi, same)
     order = np.random.default_rng(5).permutation(len(wo))
     (mixed,) = _answers(subject, wo[order], wi[order], u[order], precision)
     yield _unlike("rows in another order", some(order), mixed, wo[order], wi[order], same)
     live = np.arange(len(wo)) % 2 == 0
     a, b, c = (np.where(live[:, None], w, np.nan) for w in (wo, wi, u))
-    (half,) = _answers(subject, a, b, c, precision)
-    yield _unlike("half the rows dead", some(live), some(live, half), wo[live], wi[live], same)
+    (enabled,) = _answers(subject, a, b, c, precision)
+    yield _unlike("half the rows disabled", some(live), some(live, enabled), wo[live], wi[live], same)
 
 
 def _unlike(
     what: str, first: dict[str, np.ndarray], second: dict[str, np.ndarray], wo: np.ndarray, wi: np.ndarray, same: float
 ) -> Answer:
-    """The worst difference in words, where there is any beyond `same`, relative to the larger."""
+    """The worst difference in words, where there is one beyond `same`, relative to the larger value."""
     lit = first["sample's pdf"][:, 0] > 0.0
     for name, a in first.items():
         b = second[name]
         if a.shape != b.shape:
-            return Answer(what, f"{name} has shape {b.shape}, and {a.shape} otherwise")
+            return Answer(what, f"{name} has shape {b.shape}, and otherwise {a.shape}")
         keep = np.isfinite(a).all(1)
         if name in ("sample's wi", "sample's eta"):
             keep &= lit
@@ -205,7 +205,7 @@ def _unlike(
         difference = np.where(keep[:, None], np.abs(a - b), 0.0)
         off = difference / np.where(size > 0.0, size, 1.0)
         off = np.where(np.isnan(off), np.inf, off).max(1)
-        # rounding differs where kernels are fused otherwise; a lobe of width 1e-4 magnifies it, in few rows
+        # rounding differs between kernels; a lobe of width 1e-4 magnifies it, in few rows
         wrong = off > same
         if wrong.sum() > (0 if same == 0.0 else 0.002 * len(off)) or np.any(off > 0.1):
             row = int(np.argmax(off))
@@ -221,7 +221,7 @@ def _short(values: np.ndarray) -> str:
 
 
 def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
-    """Reflection does not depend on the mode; transmission by one and the same factor each way."""
+    """Reflection does not depend on the mode, and transmission by one factor per side."""
     radiance, power = (subject.eval(wo, wi, mode) for mode in ("radiance", "importance"))
     through = wo[:, 2] * wi[:, 2] < 0.0
     same = SAME[subject.best]
@@ -238,32 +238,32 @@ def _mode(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> str:
         ratio = radiance[rows].sum(1) / power[rows].sum(1)
         if np.ptp(ratio) > max(10.0 * same, 1e-3) * np.median(ratio):
             ends = f"from {ratio.min():.4g} to {ratio.max():.4g}"
-            return f"radiance over power in transmission runs {ends}: one index, one factor"
+            return f"radiance over power in transmission varies {ends}: an index has one factor"
     return ""
 
 
 def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> Iterator[Answer]:
-    """Parameters that differ from ray to ray, as textures make them: each ray as if all had its values."""
+    """Parameters that vary from ray to ray, as with textures: each ray has the result of its own values."""
     if not isinstance(subject.model, BSDF) or subject.stochastic or subject.model.needs_uniform:
         return
     along = [axis for axis in box.axes(subject) if axis.path not in subject.model.fixed]
     if not along:
         return
     odd = np.arange(len(wo)) % 2 == 1
-    # some up and others down, so that what depends on their ratio changes too
+    # some up and others down, so that their ratios change too
     shares = [(0.3, 0.6), (0.7, 0.25)]
     ends = [{axis.path: float(axis.at(shares[k % 2][end])) for k, axis in enumerate(along)} for end in (0, 1)]
     together = box.per_ray(subject, {path: np.where(odd, ends[1][path], ends[0][path]) for path in ends[0]})
     if together is None:
         return
     try:
-        alone = [_answers(subject.replace(**values), wo, wi, u, subject.best)[0] for values in ends]
+        separate = [_answers(subject.replace(**values), wo, wi, u, subject.best)[0] for values in ends]
     except InputError:
-        return  # these values do not go together
+        return  # the material rejects this combination of values
     (mixed,) = _answers(together, wo, wi, u, subject.best)
-    each = {name: np.where(odd[:, None], alone[1][name], first) for name, first in alone[0].items()}
+    each = {name: np.where(odd[:, None], separate[1][name], first) for name, first in separate[0].items()}
     if any(one.guided for _, one in tree.walk(subject.model)):
-        # a guide follows all values together: its density is another than for one of them, and its samples are others
+        # a guide depends on all values together: its density and samples differ from those of one value
         mixed = {**each, "eval": mixed["eval"]}
     names = " and ".join(list(ends[0])[:3])
     answer = _unlike("textured parameters", each, mixed, wo, wi, SAME[subject.best])
@@ -271,7 +271,7 @@ def _textured(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """Reflection knows nothing of the mode."""
+    """Reflection does not depend on the mode."""
     radiance, power = (_answers(subject, wo, wi, u, subject.best, mode=mode)[0] for mode in ("radiance", "importance"))
     for name in ("eval", "sample's weight"):
         a, b = radiance[name], power[name]
@@ -283,41 +283,41 @@ def _one_mode(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -
 
 
 def _facts(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray) -> str:
-    """What it declares about itself is what it does: `transmits`, `two_sided`, `delta`, and a sample's eta."""
+    """Declared facts agree with the results: `transmits`, `two_sided`, `delta`, and eta of samples."""
     model = subject.model
-    # every pair of sides, whether it declares to answer there or not
+    # all pairs of sides, whether it declares values there or not
     sides = np.resize([[1, 1], [1, -1], [-1, 1], [-1, -1]], (len(wo), 2))
     o, i = (np.concatenate([w[:, :2], np.abs(w[:, 2:]) * sides[:, k, None]], 1) for k, w in enumerate((wo, wi)))
     value = subject.eval(o, i).max(1)
     drawn = subject.sample(o, u)
     lit = (drawn.pdf > 0.0) & np.any(drawn.weight > 0.0, axis=1) & np.all(np.isfinite(drawn.wi), axis=1)
-    seen = value > SMALL * max(float(np.max(value, initial=0.0)), 1e-3)
+    bright = value > SMALL * max(float(np.max(value, initial=0.0)), 1e-3)
     across, sampled_across = o[:, 2] * i[:, 2] < 0.0, o[:, 2] * drawn.wi[:, 2] < 0.0
     if not subject.transmits:
-        if np.any(seen & across) or np.any(lit & sampled_across):
-            return "light goes through, and `transmits` says that none does"
-        below = np.any(seen & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
+        if np.any(bright & across) or np.any(lit & sampled_across):
+            return "light is transmitted, and `transmits` says that none is"
+        below = np.any(bright & (o[:, 2] < 0.0)) or np.any(lit & (o[:, 2] < 0.0))
         declared = bool(getattr(model, "two_sided", True))
         if below and not declared and subject.best == "float64":
-            return "it answers from below, and neither `transmits` nor `two_sided` says so"
+            return "it reflects light from below, and neither `transmits` nor `two_sided` says so"
         if declared and subject.best == "float64" and 1 in subject.sides:
             flip = np.array([1.0, 1.0, -1.0])
             up = [np.concatenate([w[:, :2], np.abs(w[:, 2:])], 1) for w in (wo, wi)]
             over, under = subject.eval(up[0], up[1]), subject.eval(up[0] * flip, up[1] * flip)
             off = np.abs(over - under).max(1)
             if np.any(off > 1e-3 * np.maximum(over.max(1), SMALL * max(float(over.max(initial=0.0)), 1e-3))):
-                return "`two_sided` says that it looks from below as from above, and its values differ"
+                return "`two_sided` says that both sides are the same, and their values differ"
     fact = getattr(model, "delta", "maybe")
     if fact == "never" and np.any(lit & drawn.delta):
-        return 'delta samples, and `delta` says "never"'
-    if fact == "always" and (np.any(lit & ~drawn.delta) or seen.any()):
-        return 'light that is in no delta lobe, and `delta` says "always"'
+        return 'it has delta samples, and `delta` says "never"'
+    if fact == "always" and (np.any(lit & ~drawn.delta) or bright.any()):
+        return 'it has light outside of delta lobes, and `delta` says "always"'
     if np.any(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))):
         row = int(np.argmax(lit & ~(np.isfinite(drawn.eta) & (drawn.eta > 0.0))))
-        return f"a sample's eta is {drawn.eta[row]:.4g}: the index on wi's side over that on wo's expected"
+        return f"eta of a sample is {drawn.eta[row]:.4g}; expected: the index on wi's side over that on wo's"
     wrong = lit & ~sampled_across & (np.abs(drawn.eta - 1.0) > 1e-6)
     if wrong.any():
-        return f"a reflected sample's eta is {drawn.eta[int(np.argmax(wrong))]:.4g}, 1 expected"
+        return f"eta of a reflected sample is {drawn.eta[int(np.argmax(wrong))]:.4g}, 1 expected"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Energy: nothing gives back more than it receives."""
+"""Energy: no more light is reflected than arrives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...energy.albedo import cubature
 from ...errors import InputError
 from ...material import BSDF
 from ...ops import Mode, backend
-from .. import directions, histogram, lobes, severity, statistics
+from .. import directions, estimators, histogram, lobes, severity, statistics
 from ..effort import Effort
 from ..figures import AlbedoCurves
 from ..forensics.causes import place_of
@@ -34,7 +34,7 @@ class Energy(Law):
     name = "energy"
     title = "directional albedo <= 1; quadrature and sampling agree"
     meaning = (
-        "Above 1, every bounce adds light and interiors glow; what a white furnace loses is missing from each bounce."
+        "Above 1, every bounce adds light and interiors glow; every bounce lacks the light that a white furnace loses."
     )
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -55,16 +55,16 @@ class Energy(Law):
         for i in range(len(wo)):
             p = _agreement(value[i], error[i], mean[i], noise[i], heavy[i])
 
-            def again(i: int = i) -> float:
+            def repeat(i: int = i) -> float:
                 second = _sampling(subject, wo[i : i + 1], effort.furnace_samples, seed + 7919)
                 return _agreement(value[i], error[i], *(part[0] for part in second))
 
             text = f"quadrature {value[i].mean():.5f} against sampling {mean[i].mean():.5f} at {theta[i]:.4g} degrees"
-            finding.trials.append(Trial(p, text, again))
+            finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
-        white = white_twin(subject)
+        white = lossless_variant(subject)
         if white is None and getattr(subject.model, "lossless", None) is not None:
-            white = subject  # nothing in it can be whitened, and it claims to lose nothing
+            white = subject  # it has no albedo to set, and claims to lose nothing
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
         if finding.figure > GAIN:
@@ -73,22 +73,22 @@ class Energy(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        found = [severity.of_sampling(subject)]
+        biases = [estimators.sampling_bias(subject)]
         if finding.figure > finding.tolerance:
-            found.append(severity.gain(subject))
-            white = white_twin(subject)
-            if white is not None and found[-1].average == 0.0:
-                gained = severity.gain(white)
-                found.append(dataclasses.replace(gained, where=f"{gained.where}, where nothing is absorbed"))
-        if finding.problems and (white := white_twin(subject)) is not None:
-            found.append(severity.loss(white))
-        return max(found, key=lambda bias: bias.average)
+            biases.append(estimators.gain_bias(subject))
+            white = lossless_variant(subject)
+            if white is not None and biases[-1].average == 0.0:
+                gained = estimators.gain_bias(white)
+                biases.append(dataclasses.replace(gained, where=f"{gained.where}, of the lossless variant"))
+        if finding.problems and (white := lossless_variant(subject)) is not None:
+            biases.append(estimators.loss_bias(white))
+        return max(biases, key=lambda bias: bias.average)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         curves = finding.evidence
         if not isinstance(curves, AlbedoCurves) or finding.figure <= finding.tolerance:
             return
-        # only where nothing is absorbed is it known what the albedo should be
+        # the right albedo is known only where nothing is absorbed
         albedo = curves.quadrature if curves.furnace is None else curves.furnace
         if np.ptp(albedo, axis=1).max() > SPREAD:
             if curves.furnace is not None and albedo.shape[1] == 3:
@@ -100,41 +100,41 @@ class Energy(Law):
                 factor = written(float(a.mean()))
                 guess = "a constant factor"
                 if factor == "2":
-                    guess = "a constant factor, a lobe that counts twice, or light to both sides of the surface"
-                words = f"it reflects {factor} times what comes in, whatever wo: {guess}?"
+                    guess = "a constant factor, a lobe counted twice, or light to both sides of the surface"
+                words = f"it reflects {factor} times the incident light for every wo: {guess}?"
                 yield Cause(words, factor_key(float(a.mean())))
             return
         bad = np.abs(a - 1.0) > SPREAD
         place = place_of(curves.wo, curves.wo, bad)
-        # an edge, and no gradual rise
+        # with an edge, not a gradual rise
         if place and np.abs(a[bad] - 1.0).min() > 0.1 * np.abs(a[bad] - 1.0).max():
             words = f"{place.replace('from wi', 'from wo')}"
-            yield Cause(f"it reflects all that comes in, but {np.median(a[bad]):.4g} times that {words}", words)
+            yield Cause(f"it reflects all incident light, but {np.median(a[bad]):.4g} times that {words}", words)
 
     def _known(self, subject: Subject, wo: np.ndarray, value: np.ndarray, error: np.ndarray, finding: Finding) -> None:
-        """The closed form that a material gives of its albedo is what its values integrate to."""
+        """The closed form of a material's albedo equals the integral of its values."""
         if not isinstance(subject.model, BSDF) or subject.stochastic:
             return
 
         def inner(material: BSDF, mu: np.ndarray, phi: np.ndarray) -> np.ndarray | None:
             return material.known_albedo(mu, phi, inner, None)
 
-        told = subject.model.known_albedo(wo[:, 2], np.arctan2(wo[:, 1], wo[:, 0]), inner, None)
-        if told is None:
+        stated = subject.model.known_albedo(wo[:, 2], np.arctan2(wo[:, 1], wo[:, 0]), inner, None)
+        if stated is None:
             return
-        off = np.abs(told - value).max(1) - error.max(1)
+        off = np.abs(stated - value).max(1) - error.max(1)
         row = int(np.argmax(off))
         if off[row] > GAIN:
             theta = directions.angles(wo)[row, 0]
             finding.problems.append(
-                f"known_albedo says {told[row].max():.5f} at {theta:.4g} degrees, the values integrate to "
+                f"known_albedo is {stated[row].max():.5f} at {theta:.4g} degrees, and the integral of eval is "
                 f"{value[row].max():.5f}"
             )
 
     def _furnace(
         self, white: Subject, wo: np.ndarray, effort: Effort, seed: int, finding: Finding, curves: AlbedoCurves
     ) -> None:
-        """The same with every albedo 1 and F = 1: its loss is what the model forgets."""
+        """The same with every albedo 1 and F = 1: its loss is the light that the model neglects."""
         value, error = _quadrature(white, wo, effort, seed)
         curves.furnace = value
         gain = float((value - error).max() - 1.0)
@@ -155,31 +155,31 @@ class Energy(Law):
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
         claim = getattr(white.model, "lossless", None)
-        # a black one keeps nothing, whatever it claims of the rest
+        # a black one reflects nothing, whatever it claims
         if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
-                f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, at most {claim:g} is claimed"
+                f"white furnace loses {lost[where]:.4f} at {theta[where]:.4g} degrees, more than the claimed {claim:g}"
             )
 
 
 def _one_channel(furnace: np.ndarray) -> Iterator[Cause]:
-    """The channel of a white furnace that is a constant times the other two, which are one."""
+    """The channel of a white furnace that is a constant times the other two, which are equal."""
     for channel, name in enumerate(("red", "green", "blue")):
         a, b = np.delete(furnace, channel, axis=1).T
         factor = furnace[:, channel] / np.maximum(a, 1e-9)
         middle = float(np.median(factor))
         if np.abs(a - b).max() < SPREAD and np.ptp(factor) < SPREAD * middle:
-            words = f"where nothing is absorbed, {name} is {written(middle)} times the other channels, whatever wo"
+            words = f"without absorption, {name} is {written(middle)} times the other channels for every wo"
             yield Cause(f"{words}: a constant of that channel?", f"{factor_key(middle)} in {name}")
 
 
 def _views(subject: Subject, effort: Effort) -> np.ndarray:
-    """Equal steps in the cosine, and grazing ones, from each side that answers."""
+    """Directions wo on each side that answers: in equal steps of the cosine, the normal, and near grazing."""
     mu = (np.arange(effort.furnace) + 0.5) / effort.furnace
-    # the normal itself as well, where tangents and azimuths have no value
+    # the normal itself as well, where tangents and azimuths are undefined
     theta = np.concatenate([np.degrees(np.arccos(mu)), (0.0, *GRAZING) if effort.full else ()])
-    found = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
-    return directions.single(np.concatenate(found))
+    wo = [directions.at(theta if side > 0 else 180.0 - theta, 37.0) for side in (subject.sides or (1,))]
+    return directions.single(np.concatenate(wo))
 
 
 def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -194,14 +194,14 @@ def _quadrature(subject: Subject, wo: np.ndarray, effort: Effort, seed: int) -> 
 
 
 def _deltas(subject: Subject, wo: np.ndarray, seed: int, full: bool) -> np.ndarray:
-    """What all delta lobes carry, (N, channels)."""
-    seen = lobes.of(subject, wo, seed, "importance")
-    carried = seen.carried
+    """The light of all delta lobes, (N, channels)."""
+    power = lobes.of(subject, wo, seed, "importance")
+    carried = power.carried
     if not full and carried.size:
-        # where parameters make two lobes one, each says its own probability and both together are met twice as often
-        often = np.where(seen.share > 0.05, np.round(seen.share / np.maximum(seen.pdf, 0.01)), 1.0)
+        # lobes that coincide at some parameters are sampled together, twice as often as each states
+        often = np.where(power.share > 0.05, np.round(power.share / np.maximum(power.pdf, 0.01)), 1.0)
         carried = carried * np.maximum(often, 1.0)[..., None]
-    return np.sum(carried * seen.found[..., None], axis=1)
+    return np.sum(carried * power.valid[..., None], axis=1)
 
 
 def _randomly(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -250,19 +250,19 @@ def _sampling(subject: Subject, wo: np.ndarray, count: int, seed: int) -> tuple[
 
 
 def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np.ndarray, heavy: np.ndarray) -> float:
-    """p-value of the channels' mean; a single sample that rivals the noise says that the noise is not known."""
+    """p-value of the channels' mean; where a single sample rivals the noise, the noise is underestimated."""
     spread = float(np.hypot(noise.mean(), 1e-6))
     if float(heavy.mean()) > 0.2 * spread:
         spread += float(heavy.mean())
-    # twice: where a step runs through many cells, what is stated may be a few per cent too small
+    # twice: where a step crosses many cells, the stated error may be a few percent too small
     distance = max(abs(float(value.mean() - mean.mean())) - 2.0 * float(error.mean()), 0.0)
     return statistics.normal_two_sided(distance / spread)
 
 
-def white_twin(subject: Subject) -> Subject | None:
-    """The subject's white twin, every albedo 1 and F = 1; None where it has neither."""
+def lossless_variant(subject: Subject) -> Subject | None:
+    """The subject with every albedo 1 and F = 1; None where it has neither."""
     try:
-        twin = subject.model.white()
+        variant = subject.model.white()
     except InputError:
         return None
-    return None if twin is subject.model else Subject(twin, subject.target, subject.settings)
+    return None if variant is subject.model else Subject(variant, subject.target, subject.settings)

@@ -1,4 +1,4 @@
-"""Gradients: autodiff says what finite differences say."""
+"""Gradients: autodiff equals finite differences."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class Gradients(Law):
     name = "gradients"
     at_ends = False
     title = "autodiff equals finite differences for every parameter"
-    meaning = "Fitting and inverse rendering walk the wrong way, or stop where nothing is solved."
+    meaning = "Fitting and inverse rendering follow wrong gradients, or stop before they converge."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:
-            raise DoesNotApply("differences need 64 bits, which this renderer's variant does not have")
+            raise DoesNotApply("finite differences need 64 bits, which this variant of Mitsuba does not have")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: single values are random")
+            raise DoesNotApply("the model is stochastic: its single values are random")
         if not subject.has_density:
-            raise DoesNotApply("all lobes are deltas, which have no value to differentiate")
+            raise DoesNotApply("all lobes are delta lobes, which have no values to differentiate")
         wo, wi = pairs(subject, effort.pairs // 8, seed)
         worst, place, name, tried = -1.0, 0, "", []
         skipped = 0.0
@@ -48,28 +48,30 @@ class Gradients(Law):
             parameter = labels[label]
             if max(np.max(np.abs(differences)), np.max(np.abs(exact))) < least:
                 if _steps(subject, label, parameter, wo, wi):
-                    problems.append(f"the derivative by {label} is 0 everywhere, and the values follow it in steps")
+                    problems.append(
+                        f"the derivative by {label} is 0 everywhere, but the values change with it in steps"
+                    )
                 continue
             tried.append(label)
             skipped = max(skipped, 1.0 - float(smooth.mean()))
-            # kinks, such as a table's, are told from slopes down to 1e-7 of what many pairs have (`_derivatives`): a
-            # hundredth of that has its four digits
+            # kinks, such as those of a table, are detected down to 1e-7 of the usual slope (`_derivatives`): slopes of
+            # 1 % of it have four digits
             usual = float(np.percentile(np.abs(differences), 90.0))
             floor = max(1e-6 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-2 * usual, least)
             off = relative(exact, differences, 0.0, floor) * smooth[:, None]
             if np.max(off, initial=0.0) > TOLERANCE:
-                # a kink within the widest step may pass for smooth; what autodiff has wrong is wrong by small steps too
+                # a kink within the widest step may look smooth; a wrong derivative is wrong for small steps too
                 near = _derivatives(subject.model, [label], wo, wi, 0.1 * STEP)[label]
                 off = np.minimum(off, relative(exact, near.differences, 0.0, floor))
             row, size = worst_of(off)
             if size > worst:
                 worst, place, name = size, row, label
         if not tried and not problems:
-            raise DoesNotApply("no parameter changes a value")
+            raise DoesNotApply("no parameter changes its values")
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
-            reason="float64 differences are good to about 1e-6 here; edges, where two steps disagree, are left out",
+            reason="float64 differences are accurate to about 1e-6; edges, where two steps disagree, are left out",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             problems=problems,
@@ -93,13 +95,13 @@ class Gradients(Law):
             differences,
             subject,
             numbers={f"2 {name}": 2.0 * size, f"1 / (2 {name})": 0.5 / size},
-            zero="a value that is detached, rounded or branched on before autodiff sees it",
+            zero="a value that is detached, rounded or branched on before autodiff",
         )
 
     def _worst(
         self, subject: Subject, finding: Finding, seed: int
     ) -> tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The parameter that was worst, pairs away from edges, and its derivatives there, by both ways."""
+        """The worst parameter, pairs away from edges, and its derivatives there by both methods."""
         name = finding.worst.partition(":")[0]
         wo, wi = pairs(subject, 4096, seed)
         exact, differences, smooth, _ = _derivatives(subject.model, [name], wo, wi)[name]
@@ -107,8 +109,8 @@ class Gradients(Law):
 
 
 def _steps(subject: Subject, path: str, parameter: Parameter, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether a parameter without derivative changes nearly all values when it is moved by a third, and has no
-    derivative there either: with one, it is only held at an end of what it can do."""
+    """Whether a parameter without derivative changes nearly all values when it is moved by a third, and has none there
+    either; with a derivative there, it is only clamped at the given value."""
     value = tree.value_at(subject.model, path)
     if parameter.kind not in ("float", "alpha", "spectrum") or (parameter.kind != "spectrum" and np.ndim(value)):
         return False
@@ -141,12 +143,12 @@ def _size(value: Any) -> float:
 
 
 def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], Any]:
-    """How a bound value is moved."""
+    """The function that moves a bound value."""
 
     def moved(bound: Any) -> Any:
         if parameter.kind != "angle":
             return bound + shift
-        # the bound value is (cos, sin), or nothing at all where the angle is 0
+        # the bound value is (cos, sin), or None where the angle is 0
         kind = backend.types_like(type(shift))
         s, c = backend.drjit().sincos(backend.float_of(plain, kind) + shift)
         return kind.vec2(c, s)
@@ -155,8 +157,8 @@ def _shifted(parameter: Parameter, plain: Any, shift: Any) -> Callable[[Any], An
 
 
 class _Derivatives(NamedTuple):
-    """By autodiff and by differences, (N, channels) each, where two different steps agree and no kink explains what is
-    between autodiff and them (N,), and the derivative below which there is none."""
+    """By autodiff and by differences, (N, channels) each; whether two different steps agree and no kink explains the
+    difference, (N,); and the derivative below which there is none."""
 
     exact: np.ndarray
     differences: np.ndarray
@@ -167,16 +169,16 @@ class _Derivatives(NamedTuple):
 def _derivatives(
     model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, step: float = STEP
 ) -> dict[str, _Derivatives]:
-    """The derivatives by parameters at some paths, by steps of a share of their sizes. All are asked for at once, each
-    on its own rays, where the others are moved by 0: one kernel serves them all. Where another has no derivative, which
-    0 times does not mend, one is moved alone."""
-    found: dict[str, _Derivatives] = {}
+    """The derivatives by parameters at some paths, with steps of a share of their sizes. All are computed at once, each
+    on its own rays, where the others are moved by 0: one kernel serves them all. Where another parameter has no
+    derivative, and 0 times NaN is NaN, a parameter is moved alone."""
+    derivatives: dict[str, _Derivatives] = {}
     most = max(1, ROWS // len(wo))
     for first in range(0, len(paths), most):
         some = paths[first : first + most]
         for path, one in zip(some, _together(model, some, wo, wi, step), strict=True):
-            found[path] = one if np.isfinite(one.exact).all() else _together(model, [path], wo, wi, step)[0]
-    return found
+            derivatives[path] = one if np.isfinite(one.exact).all() else _together(model, [path], wo, wi, step)[0]
+    return derivatives
 
 
 def _together(model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, step: float) -> list[_Derivatives]:
@@ -196,8 +198,8 @@ def _together(model: BSDF, paths: list[str], wo: np.ndarray, wi: np.ndarray, ste
         return guarded(model, "eval", lambda: bound.eval(a, b, "radiance"))
 
     def rows(values: Any) -> np.ndarray:
-        found = np.array(backend.to_numpy(values, rays * count), float)
-        return found.reshape(count, rays, -1)
+        array = np.array(backend.to_numpy(values, rays * count), float)
+        return array.reshape(count, rays, -1)
 
     def number(times: float) -> np.ndarray:
         return rows(value(dr.opaque(kind.float, times) * steps))
@@ -224,12 +226,12 @@ def _judged(
     lit = np.array([np.any(v != 0.0, axis=1) for v in shifted.values()])
     wide = (8.0 * one - two) / (12.0 * step)
     narrow = (8.0 * half - one) / (6.0 * step)
-    # a percent more of the parameter that changes a value by less than its hundred-millionth changes nothing
+    # a parameter is without effect where 1 % more of it changes a value by less than 1e-8 of it
     least = 1e-6 * float(np.max(np.abs(plain), initial=0.0)) / size
     noise = 1e-5 * np.abs(narrow) + max(1e-7 * float(np.percentile(np.abs(narrow), 90.0)), 1e-2 * least)
     smooth = np.all(np.abs(wide - narrow) <= noise, axis=1) & (lit.all(0) == lit.any(0))
-    # A kink at the parameter's very value, such as a table's node: differences to both sides are the mean of its two
-    # slopes, and any between them is a derivative.
+    # A kink at the very value of the parameter, such as a node of a table: the central difference is the mean of its
+    # two slopes, and any value between them is a derivative.
     left, right = ((4.0 * shifted[0.5 * s] - shifted[s] - 3.0 * plain) / (s * step) for s in (-1.0, 1.0))
     steep = np.maximum(np.abs(left), np.abs(right))
     slack = 1e-6 * steep + 1e-8 * float(np.percentile(steep, 90.0))

@@ -1,4 +1,4 @@
-"""Isotropy, or anisotropy along the axes that are declared."""
+"""Isotropy, or anisotropy along the declared axes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 
 EXACT = 1e-6
 SINGLE = 2e-3
-VISIBLE = 1e-3  # an anisotropy below this is none
+VISIBLE = 1e-3  # least anisotropy
 
 
 class Isotropy(Law):
@@ -26,26 +26,26 @@ class Isotropy(Law):
     number = 6
     name = "isotropy"
     title = "isotropic, or anisotropic along the axes, as declared"
-    meaning = "Highlights turn with the mesh's tangents where they should not, or stretch the wrong way."
+    meaning = "Highlights follow the tangents of the mesh where they should not, or stretch along the wrong axis."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not subject.has_density:
-            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+            raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         if subject.stochastic:
             raise DoesNotApply("the model is stochastic; its samples are compared with its pdf by another law")
         exact = subject.best == "float64"
         wo, wi = pairs(subject, effort.pairs, seed, exact)
         turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
-        turned = directions.turned(wo, turn), directions.turned(wi, turn)
+        rotated = directions.rotated(wo, turn), directions.rotated(wi, turn)
         mirrored = wo * np.array([1.0, -1.0, 1.0]), wi * np.array([1.0, -1.0, 1.0])
         error = np.zeros(len(wo))
-        for a, b in (turned, mirrored):
+        for a, b in (rotated, mirrored):
             error = np.maximum(error, self._difference(subject, (wo, wi), (a, b), exact))
         row, size = worst_of(error)
         finding = Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="a turn rounds a direction at 1e-16; formulas that cancel lose up to ten digits"
+            reason="a rotation rounds a direction at 1e-16; formulas with cancellation lose up to ten digits"
             if exact
             else "float32: beyond 8 roundings of the directions, the rest is the model's own sums",
             worst=pair_in_words(wo[row], wi[row]),
@@ -53,11 +53,13 @@ class Isotropy(Law):
         )
         if subject.isotropic:
             return finding
-        finding.shown = f"changes by {size:.2g} when turned"
+        finding.shown = f"changes by {size:.2g} under rotation"
         finding.tolerance, finding.figure = 0.0, 0.0
-        finding.reason = "declared anisotropic: a turn must show, and the wider axis must be the declared one"
-        if size < VISIBLE and effort.full:  # elsewhere in its ranges it may well be isotropic
-            finding.problems.append(f"declared anisotropic, but a turn changes it by no more than {size:.1e}")
+        finding.reason = (
+            "declared anisotropic: a rotation must change values, and the wider axis must be the declared one"
+        )
+        if size < VISIBLE and effort.full:  # at other parameter values it may be isotropic
+            finding.problems.append(f"declared anisotropic, but a rotation changes it by {size:.1e} at most")
         self._axes(subject, finding)
         return finding
 
@@ -66,28 +68,31 @@ class Isotropy(Law):
         if not subject.isotropic and swapped is None:
             return None
 
-        def turned(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def rotated(wo: np.ndarray, wi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             if swapped is not None:
                 return subject.eval(wo, wi), swapped.eval(wo, wi)
-            # by another angle for each wo, the same for all its wi
+            # an angle per wo, the same for all its wi
             turn = 1.0 + 40.0 * wo[:, 2] + 13.0 * wo[:, 0]
-            return subject.eval(wo, wi), subject.eval(directions.turned(wo, turn), directions.turned(wi, turn))
+            return subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
 
-        where = ", against the other axes" if swapped is not None else ", when turned"
-        return severity.between(subject, turned, where=where)
+        where = ", against the other axes" if swapped is not None else ", under rotation"
+        return severity.between(subject, rotated, where)
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         if any("axes swapped" in problem for problem in finding.problems):
-            yield Cause("the wider axis is that of the smaller width: alpha_x and alpha_y exchanged?", "axes exchanged")
+            yield Cause(
+                "the wider axis has the smaller width: alpha_x and alpha_y exchanged?",
+                "axes exchanged",
+            )
         elif subject.isotropic:
             wo, wi = pairs(subject, 4096, seed)
             turn = np.random.default_rng([seed, 61]).uniform(0.0, 2.0 * np.pi, len(wo))
-            there, back = subject.eval(wo, wi), subject.eval(directions.turned(wo, turn), directions.turned(wi, turn))
+            there, back = subject.eval(wo, wi), subject.eval(directions.rotated(wo, turn), directions.rotated(wi, turn))
             off = np.mean(np.abs(there - back) > 1e-3 * np.maximum(there, back), axis=0)
             names = [name for name, share in zip(("red", "green", "blue"), off, strict=False) if share > 0.01]
             where = f" in {' and '.join(names)}" if len(off) == 3 and 0 < len(names) < 3 else ""
-            words = f"values change{where} when both directions turn about the normal: `isotropic` should be False"
-            yield Cause(f"{words}, or a tangent has got into the formula?", "turns")
+            words = f"values change{where} when both directions rotate about the normal: `isotropic` should be False"
+            yield Cause(f"{words}, or does the formula depend on a tangent?", "turns")
 
     def _difference(
         self, subject: Subject, first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], exact: bool
@@ -101,7 +106,7 @@ class Isotropy(Law):
         return relative(there, back, noise, floor).max(1)
 
     def _axes(self, subject: Subject, finding: Finding) -> None:
-        """Second moments of eval over wi, seen from the normal, along the two axes: ordered as the two widths are."""
+        """Second moments of eval over wi, for wo at the normal, along the two axes: in the order of the two widths."""
         pair = next((getattr(subject.model, n) for n, p in subject.parameters.items() if p.kind == "alpha"), None)
         if not isinstance(pair, tuple | list):
             return

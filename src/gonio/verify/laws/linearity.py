@@ -1,4 +1,4 @@
-"""Linearity: light adds up."""
+"""Linearity: values are affine in albedos."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ class Linearity(Law):
     number = 7
     name = "linearity"
     title = "linear in albedos; a mix is the mix of the values"
-    meaning = "Textures that are filtered or blended before shading look different from the average of what they show."
+    meaning = "Textures that are filtered or blended before shading do not look like the average of their colors."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not subject.has_density:
-            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+            raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: single values are random")
+            raise DoesNotApply("the model is stochastic: its single values are random")
         wo, wi = pairs(subject, effort.pairs // 4, seed)
         cases = [(name, *pair(wo, wi)) for name, pair in _pairs(subject).items()]
         if not cases:
-            raise DoesNotApply("it has no albedo that could be changed, and is no Gonio material that could be mixed")
+            raise DoesNotApply("it has no albedo to change, and is not a Gonio material that could be mixed")
         exact = subject.best == "float64"
         dead = [label for label, _, _ in cases if label != "mix" and effort.full and _is_dead(subject, label, wo, wi)]
         worst, place, name, notes = -1.0, 0, "", [f"tried: {', '.join(label for label, _, _ in cases)}"]
@@ -44,14 +44,14 @@ class Linearity(Law):
         for label, a, b in cases:
             row, size = worst_of(relative(a, b, 0.0, 1e-9 * float(np.max(np.abs(b), initial=0.0))))
             if size > tolerance and label != "mix" and _bounces(subject, label, wo, wi):
-                notes.append(f"{label} counts more than once, as where light bounces several times: off by {size:.2g}")
+                notes.append(f"{label} counts more than once, as with several bounces of light: off by {size:.2g}")
                 continue
             if size > worst:
                 worst, place, name = size, row, label
         return Finding(
             figure=max(worst, 0.0),
             tolerance=tolerance,
-            reason="a few roundings" if exact else "a few roundings of float32, some of them cancelling",
+            reason="a few roundings" if exact else "a few roundings of float32, some with cancellation",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
             problems=[f"{name} changes nothing" for name in dead],
@@ -66,7 +66,7 @@ class Linearity(Law):
             value, expected = pair(wo, wi)
             return expected, value
 
-        return severity.between(subject, expected_first, where=f", where {name} is between two others")
+        return severity.between(subject, expected_first, f", where {name} is between two others")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         name = finding.worst.partition(":")[0]
@@ -80,32 +80,32 @@ class Linearity(Law):
         powers = (np.log(high[lit] / low[lit]) / np.log(7.0), np.log(middle[lit] / low[lit]) / np.log(2.5))
         power = float(np.median(powers[0]))
         if abs(power - 1.0) > 0.01 and all(np.percentile(np.abs(p / power - 1.0), 97.0) < SPREAD for p in powers):
-            text = f"values follow {name}^{power:.3g}, within 1e-3: a colour decoded or multiplied twice?"
+            text = f"values follow {name}^{power:.3g}, within 1e-3: a color decoded or multiplied twice?"
             yield Cause(text, f"{name}^{power:.3g}")
 
 
 def _pairs(subject: Subject) -> dict[str, severity.Pair]:
-    """What should be equal: for each albedo its value between two others, and a mix, against what both give."""
+    """Values that should be equal: at an albedo between two others, and of a mix, against the interpolation."""
 
     def between(name: str) -> severity.Pair:
         low, high, middle = (subject.replace(**{name: v}) for v in (0.125, 0.875, 0.3125))
         return lambda wo, wi: (middle.eval(wo, wi), 0.75 * low.eval(wo, wi) + 0.25 * high.eval(wo, wi))
 
-    found = {n: between(n) for n, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0}
+    cases = {n: between(n) for n, p in subject.parameters.items() if p.kind == "spectrum" and p.high == 1.0}
     if isinstance(subject.model, BSDF):
         other = models()["lambert"]((0.2, 0.5, 0.8))  # type: ignore[call-arg]
         mixed = Subject(models()["mix"](subject.model, other, 0.25), "mix")  # type: ignore[call-arg]
         plain = Subject(other, "lambert")
-        found["mix"] = lambda wo, wi: (mixed.eval(wo, wi), 0.75 * subject.eval(wo, wi) + 0.25 * plain.eval(wo, wi))
-    return found
+        cases["mix"] = lambda wo, wi: (mixed.eval(wo, wi), 0.75 * subject.eval(wo, wi) + 0.25 * plain.eval(wo, wi))
+    return cases
 
 
 STEPS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 
 def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether values are a sum of powers of an albedo with no negative factor and a first power among them: light that
-    meets the pigment once, twice, and so on. A colour that is decoded, or multiplied twice, has no first power."""
+    """Whether values are a sum of powers of an albedo with no negative factor and with the first power: light that is
+    reflected once, twice, and so on. A color that is decoded, or multiplied twice, has no first power."""
     rows = np.stack([subject.replace(**{name: v}).eval(wo[:2048], wi[:2048]).mean(1) for v in STEPS])
     moved = rows[-1] > rows[0] * (1.0 + 1e-6) + 1e-9 * rows.max(initial=0.0)
     if not moved.any():
@@ -118,22 +118,22 @@ def _bounces(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> boo
         differences = np.diff(differences, axis=0)
         if np.mean((differences < -noise * 2.0**order).any(0)) > 1e-3:
             return False
-    # of a power 1.1 and beyond, nothing is left of the first step
+    # with powers of 1.1 and more, the first step is negligible
     return (
         bool(np.median(first[first > 0.0] / (rows[2] - rows[1])[first > 0.0]) > 0.5) if np.any(first > 0.0) else False
     )
 
 
 def _is_dead(subject: Subject, name: str, wo: np.ndarray, wi: np.ndarray) -> bool:
-    """Whether an albedo changes no value: a cache that forgets it, a parameter that nothing reads."""
+    """Whether an albedo changes no value: a cache that ignores it, a parameter that is never read."""
     low, high = (subject.replace(**{name: v}) for v in (0.125, 0.875))
     first, second = low.eval(wo, wi), high.eval(wo, wi)
     if not np.array_equal(first, second) or not np.any(first > 0.0):
         return False
-    u = directions.numbers(np.random.default_rng(17), len(wo))  # it may belong to a delta lobe, which has no value
+    u = directions.numbers(np.random.default_rng(17), len(wo))  # it may belong to a delta lobe, which has no values
     if not np.array_equal(low.sample(wo, u).weight, high.sample(wo, u).weight):
         return False
-    # it may belong to a part of which there is none: then where there is half of everything
+    # it may belong to a part whose share is 0: then with all shares at one half
     known = subject.parameters.items()
     shares = {path: getattr(subject.model, path) for path, one in known if one.high == 1.0 and not one.inside}
     some = {path: 0.5 for path, value in shares.items() if isinstance(value, int | float) and value == 0.0}

@@ -1,4 +1,4 @@
-"""The pdf: what `sample` does is what `pdf` says."""
+"""The pdf: the density of the samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import directions, histogram, severity
+from .. import directions, estimators, histogram, severity
+from ..cells import place
 from ..effort import Effort
 from ..figures import SampleCells
 from ..forensics import crowding
@@ -16,7 +17,7 @@ from ..forensics.causes import nothing_below
 from ..forensics.ratio import Cause
 from ..subject import Subject
 from ..verdict import Finding, Trial
-from .base import Law, pair_in_words, pairs, where_found
+from .base import Law, angles, pair_in_words, pairs, where_found
 
 ABOVE = (
     (0.0, 0.0),
@@ -29,21 +30,21 @@ ABOVE = (
     (89.5, 250.0),
 )
 BELOW = ((180.0, 0.0), (155.0, 70.0), (140.0, 190.0), (125.0, 280.0), (100.0, 15.0))  # 138.2 is glass's critical angle
-OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the latter for what only Fresnel's term tells
-FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # samples enough for a per cent
-PAIRS = 1 << 13  # that are looked at for a cause
-EXCESS = 1e-3
-SUPPORT = 1e-4
-LEAST = 1e-3
+OBLIQUE = ((50.0, 200.0), (75.0, 200.0))  # the latter for Fresnel's term
+FEW = Effort("cause", 0, 17, 0, 0, 1e-3)  # enough samples for a percent
+PAIRS = 1 << 13  # of directions, to find a cause
+EXCESS = 1e-3  # of int pdf over 1
+SUPPORT = 1e-4  # share of light where the pdf is 0
+MIN_LIGHT = 1e-3  # mean value against which that share is measured
 
 
 class Pdf(Law):
-    """int pdf dwi = 1 - failed samples, pdf > 0 where eval > 0, and samples are spread as the pdf says (chi-square)."""
+    """int pdf dwi = 1 - failed samples, pdf > 0 where eval > 0, and samples are distributed by the pdf (chi-square)."""
 
     number = 4
     name = "pdf"
     title = "pdf integrates to 1, covers eval, and is what sample does"
-    meaning = "Multiple importance sampling weighs samples wrongly: energy is lost or gained, or noise never ends."
+    meaning = "Multiple importance sampling gives samples wrong weights: energy is lost or gained, or noise persists."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         parts: list[tuple[dict[str, object], Subject]] = [({}, subject)]
@@ -51,7 +52,8 @@ class Pdf(Law):
         finding = Finding(
             figure=0.0,
             tolerance=EXCESS,
-            reason="int pdf is known to 1e-4; failed samples make it less than 1, never more",
+            reason="int pdf is accurate to 1e-4; failed samples make it less than 1, never more",
+            allowed=f"{1.0 + EXCESS:g}",
         )
         lowest, misplaced, largest = 2.0, 0.0, ""
         for settings, part in parts:
@@ -60,25 +62,26 @@ class Pdf(Law):
                 continue
             for tested in _chi_square(part, effort, seed):
                 wo, cells = tested.wo, tested.cells
-                place = f"{name + ': ' if name else ''}wo at {_angles(wo)} degrees"
+                where = f"{name + ': ' if name else ''}wo at {angles(wo)} degrees"
                 for kind, p in tested.outcome._asdict().items():
-                    finding.trials.append(Trial(p, f"{_KINDS[kind]}, {place}", _Again(part, wo, kind, effort, seed)))
-                    # of many that are 0, the one in which most is misplaced
+                    finding.trials.append(Trial(p, f"{_KINDS[kind]}, {where}", _Repeat(part, wo, kind, effort, seed)))
+                    # of several p-values of 0, that with the most misplaced samples
                     off = float(np.abs((cells.expected - cells.observed).sum((1, 2))).max()) / cells.drawn
                     if p < lowest or (p == lowest == 0.0 and off > misplaced):
                         lowest, misplaced, finding.evidence = p, off, cells
-                        finding.settings, finding.worst = settings, place
+                        finding.settings, finding.worst = settings, where
                 for side, e, o in zip(tested.sides, cells.expected, cells.observed, strict=True):
                     claimed = float(e.sum()) / cells.drawn
                     if claimed > EXCESS and not o.any():
                         word = "above" if side > 0 else "below"
-                        text = f"pdf puts {claimed:.2g} of all samples {word} the surface, where none falls, {place}"
+                        share = f"{claimed:.2g} of all samples {word} the surface"
+                        text = f"the pdf claims {share}, where none falls, {where}"
                         finding.notes[:] = finding.notes or [text]
                 excess = max(tested.total - 1.0, 0.0)
                 if excess > finding.figure:
                     finding.figure = excess
-                    largest = f"int pdf = {tested.total:.4g}, {place}"
-        finding.shown = "deltas only" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
+                    largest = f"int pdf = {tested.total:.4g}, {where}"
+        finding.shown = "delta lobes only" if lowest > 1.0 else f"lowest p {lowest:.2g} of {len(finding.trials)}"
         if finding.figure > EXCESS:
             finding.shown = largest
         _support(subject, finding, effort, seed)
@@ -86,11 +89,11 @@ class Pdf(Law):
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
         there = where_found(subject, finding)
-        bias = severity.of_sampling(there, "pdf")
+        bias = estimators.sampling_bias(there, "pdf")
         held = crowding.blocks(finding.evidence) if isinstance(finding.evidence, SampleCells) else None
         crowd = crowding.crowd(there, held) if held is not None else ""
         if bias.grade is severity.Grade.INVISIBLE:
-            where = crowding.around(there) or crowd or "less than a thousandth of all samples is misplaced"
+            where = crowding.unsampled(there) or crowd or "less than 0.1 % of all samples are misplaced"
             return dataclasses.replace(bias, kind="noise", where=where)
         return dataclasses.replace(bias, where=f"{bias.where}; {crowd}" if crowd else bias.where)
 
@@ -99,35 +102,33 @@ class Pdf(Law):
         if not there.has_density:
             return
         wo, wi = pairs(there, PAIRS, seed)
-        unfound = nothing_below("eval", "pdf", wo, wi, there.eval(wo, wi), there.pdf(wo, wi)[:, None])
-        if unfound is not None:
-            yield unfound
+        unsampled = nothing_below("eval", "pdf", wo, wi, there.eval(wo, wi), there.pdf(wo, wi)[:, None])
+        if unsampled is not None:
+            yield unsampled
         if there.stochastic or not isinstance(finding.evidence, SampleCells):
             return
-        # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are one
-        angles = [angles for side, angles in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
-        oblique = directions.single(np.array([directions.at(*pair) for pair in angles]).reshape(-1, 3))
+        # at an oblique wo all cosines differ; at the normal (o.m) and cos_m are equal
+        views = [view for side, view in (*((1, a) for a in OBLIQUE), (-1, BELOW[1])) if side in there.sides]
+        oblique = directions.single(np.array([directions.at(*pair) for pair in views]).reshape(-1, 3))
         for tested in _chi_square(there, FEW, seed, oblique):
             held = crowding.blocks(tested.cells)
             cause = crowding.named(there, held) if held is not None else None
             if cause is not None:
                 yield cause
         if _reused(there, oblique[:1], seed):
-            yield Cause(
-                "u.x chooses a lobe and, not stretched to [0, 1) again, places its directions too?", "u.x twice"
-            )
+            yield Cause("u.x chooses a lobe and then, not remapped to [0, 1), its direction too?", "u.x twice")
         for note in finding.notes:
-            if note.startswith("pdf puts"):
+            if note.startswith("the pdf claims"):
                 yield Cause(note, "pdf where no sample falls")
 
 
 SWEEP = 512  # values of u.x
 TRIALS = 32  # values of the other two numbers
-LEAP = 0.2  # of a direction from one value of u.x to the next: another lobe
+JUMP = 0.2  # of a direction from one value of u.x to the next: another lobe
 
 
 def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
-    """Whether the azimuth turns with u.x by 2 pi u.x, and not by 2 pi, over a part of [0, 1) that chooses a lobe."""
+    """Whether the azimuth covers 2 pi u.x, and not 2 pi, over the part of [0, 1) that chooses a lobe."""
     others = directions.numbers(np.random.default_rng([seed, 45]), TRIALS)
     u = np.repeat(others, SWEEP, axis=0)
     u[:, 0] = np.tile((np.arange(SWEEP) + 0.5) / SWEEP, TRIALS)
@@ -136,20 +137,24 @@ def _reused(subject: Subject, wo: np.ndarray, seed: int) -> bool:
     phi = np.arctan2(wi[..., 1], wi[..., 0])
     short = 0
     for row in range(TRIALS):
-        leaps = np.flatnonzero((np.abs(np.diff(wi[row], axis=0)).max(1) > LEAP) | ~fine[row, 1:] | ~fine[row, :-1]) + 1
-        for part in np.split(np.arange(SWEEP), leaps):
+        jumps = np.flatnonzero((np.abs(np.diff(wi[row], axis=0)).max(1) > JUMP) | ~fine[row, 1:] | ~fine[row, :-1]) + 1
+        for part in np.split(np.arange(SWEEP), jumps):
             length = len(part) / SWEEP
-            turned = abs(np.sum((np.diff(phi[row, part]) + np.pi) % (2.0 * np.pi) - np.pi)) / (2.0 * np.pi)
-            if 0.1 < length < 0.9 and abs(turned - length) < 0.02 and len(part) < SWEEP:
+            covered = abs(np.sum((np.diff(phi[row, part]) + np.pi) % (2.0 * np.pi) - np.pi)) / (2.0 * np.pi)
+            if 0.1 < length < 0.9 and abs(covered - length) < 0.02 and len(part) < SWEEP:
                 short += 1
                 break
     return short > 0.8 * TRIALS
 
 
-_KINDS = {"fine": "cells", "coarse": "coarse cells", "others": "share of samples in no cell against 1 - int pdf"}
+_KINDS = {
+    "fine": "cells",
+    "coarse": "coarse cells",
+    "others": "share of samples outside of all cells against 1 - int pdf",
+}
 
 
-class _Again:
+class _Repeat:
     """The same test with another seed: other cells, other samples."""
 
     def __init__(self, subject: Subject, wo: np.ndarray, kind: str, effort: Effort, seed: int) -> None:
@@ -160,13 +165,8 @@ class _Again:
         return min((getattr(one.outcome, self.kind) for one in tested), default=1.0)
 
 
-def _angles(w: np.ndarray) -> str:
-    theta, phi = directions.angles(w)
-    return f"{theta:.4g}, {phi:.4g}"
-
-
 def _widths(subject: Subject, effort: Effort) -> list[float]:
-    """Other widths to try, where there is a width to change."""
+    """Other widths, where there is a width to change."""
     parameter = subject.parameters.get("alpha")
     if parameter is None or parameter.kind not in ("alpha", "float"):
         return []
@@ -186,11 +186,11 @@ class _Tested(NamedTuple):
 def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | None = None) -> list[_Tested]:
     if wo is None:
         above, below = (ABOVE, BELOW) if effort.full else (ABOVE[:6:2], BELOW[1:4])
-        grid_of = [*(above if 1 in subject.sides else ()), *(below if -1 in subject.sides else ())]
-        wo = directions.single(np.array([directions.at(*angles) for angles in grid_of]).reshape(-1, 3))
+        views = [*(above if 1 in subject.sides else ()), *(below if -1 in subject.sides else ())]
+        wo = directions.single(np.array([directions.at(*view) for view in views]).reshape(-1, 3))
     if not len(wo):
         return []
-    grid = histogram.place(subject, wo, seed, effort.cells)
+    grid = place(subject, wo, seed, effort.cells)
     if grid is None or not len(grid.wo):
         return []
     expected = histogram.expect(subject, grid, 0.1 * 2.0 ** (-0.5 * effort.log_samples))
@@ -198,27 +198,28 @@ def _chi_square(subject: Subject, effort: Effort, seed: int, wo: np.ndarray | No
     tested = []
     for i in range(len(grid.wo)):
         expectation = expected.cells[i] * counts.drawn
-        seen = counts.cells[i]
-        cells = SampleCells(expectation, seen, grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides)
+        cells = SampleCells(
+            expectation, counts.cells[i], grid.rows[i], grid.columns[i], counts.drawn, grid.wo[i], grid.sides
+        )
         outcome = histogram.compare(expected, counts, i, grid)
         tested.append(_Tested(grid.wo[i], outcome, float(expected.total[i]), cells, grid.sides))
     return tested
 
 
 def _support(subject: Subject, finding: Finding, effort: Effort, seed: int) -> None:
-    """eval > 0 where pdf = 0 is light that sampling never finds."""
+    """eval > 0 where pdf = 0 is light that sampling never reaches."""
     if not subject.has_density:
         return
     wo, wi = pairs(subject, effort.pairs, seed)
     value, pdf = (subject.eval(wo, wi, precision=subject.best).max(1), subject.pdf(wo, wi, precision=subject.best))
     wanting = (value > 0.0) & ~(pdf > 0.0)
     total = float(np.sum(value[np.isfinite(value)]))
-    # beside a delta lobe, which carries the light, a density of a millionth is nothing
-    total = max(total, LEAST * len(value))
+    # a density of a millionth is negligible against a delta lobe, which carries the light
+    total = max(total, MIN_LIGHT * len(value))
     share = float(np.sum(value[wanting & np.isfinite(value)])) / total
     if np.any(pdf < 0.0):
         row = int(np.argmin(pdf))
-        finding.problems.append(f"pdf is negative: {pdf[row]:.3g} with {pair_in_words(wo[row], wi[row])}")
+        finding.problems.append(f"pdf is negative, {pdf[row]:.3g}, for {pair_in_words(wo[row], wi[row])}")
     if share > SUPPORT:
         row = int(np.argmax(np.where(wanting, value, 0.0)))
         finding.problems.append(f"eval > 0 where pdf = 0: {share:.2%} of all light, {pair_in_words(wo[row], wi[row])}")

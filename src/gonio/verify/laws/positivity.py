@@ -1,4 +1,4 @@
-"""Non-negative and finite, everywhere and at the ends of every range."""
+"""Positivity: values are non-negative and finite, everywhere and at the ends of every range."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .base import Law, pair_in_words, pairs, where_found
 
 THETA = (0.0, 1e-3, 1.0, 30.0, 60.0, 89.0, 89.9, 89.99, 89.9999, 90.0)
 PHI = (0.0, 90.0, 137.0, 180.0)
-CORNERS = (0.0, 1e-7, 0.5, 0.99999994)  # 0, the least that counts, the middle, and the largest float32 below 1
-NEGATIVE = 1e-6  # of the largest value: float32 sums that cancel end this far below 0
+CORNERS = (0.0, 1e-7, 0.5, 0.99999994)  # of random numbers; the last is the largest float32 below 1
+NEGATIVE = 1e-6  # of the largest value: float32 sums with cancellation end this far below 0
 
 
 class Positivity(Law):
@@ -32,7 +32,7 @@ class Positivity(Law):
     name = "positivity"
     title = "non-negative and finite, at extremes and in gradients"
     meaning = (
-        "One NaN blackens a pixel for good and spreads with every filter; negative light darkens its surroundings."
+        "One NaN blackens a pixel for good and spreads with every filter; negative light darkens its neighborhood."
     )
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
@@ -41,12 +41,18 @@ class Positivity(Law):
         finding = Finding(
             figure=0.0,
             tolerance=0.0,
-            reason="a single one is one too many",
+            reason="not one is allowed",
             notes=[f"{len(variants)} settings: the given one and the ends of each range"],
         )
-        declared = "positivity" in subject.breaches  # measured noise about 0: its size is a share of the largest value
+        declared = "positivity" in subject.breaches  # measured noise around 0: its size is a share of the largest value
         checked = 0
-        declared = "positivity" in subject.breaches
+
+        def fails(text: str, suffix: str, a: np.ndarray, b: np.ndarray, changed: dict[str, Any]) -> None:
+            place = pair_in_words(a, b)
+            finding.problems.append(f"{text}{_words(changed)}: {suffix}{place}")
+            if finding.at is None:
+                finding.at, finding.settings, finding.worst = (a, b), changed, place
+
         for changes, together in _batches(subject, variants, len(wo)):
             many_o, many_i, many_u = (np.tile(part, (len(changes), 1)) for part in (wo, wi, u))
             for precision in together.precisions:
@@ -54,36 +60,23 @@ class Positivity(Law):
                     largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
                     wrong = ~np.isfinite(values) | (values < (-NEGATIVE * largest if what != "wi" else -np.inf))
                     checked += values.size
-                    if declared and what in ("eval", "weight") and np.isfinite(values).all():
-                        finding.figure += int(wrong.sum())
-                        finding.breach = max(finding.breach or 0.0, float(-values.min(initial=0.0) / (largest or 1.0)))
-                        continue
-                    if not wrong.any():
+                    noise = declared and what in ("eval", "weight") and np.isfinite(values).all()
+                    if not (noise or wrong.any()):
                         continue
                     finding.figure += int(wrong.sum())
-                    deep = float(np.min(values, initial=0.0, where=np.isfinite(values)) / -largest) if largest else 0.0
-                    finding.breach = max(finding.breach or 0.0, deep)
-                    row = int(np.flatnonzero(wrong.any(1))[0])
-                    changed = changes[rows[row] // len(wo)]
-                    text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}{_words(changed)}"
-                    place = pair_in_words(a[row], b[row])
-                    kept = declared and what in ("eval", "weight") and bool(np.isfinite(values).all())
-                    texts = finding.notes if kept else finding.problems
-                    texts.append(f"{text}: {int(wrong.sum())} values, first at {place}")
-                    if finding.at is None:
-                        finding.at, finding.settings, finding.worst = (
-                            (a[row], b[row]),
-                            changed,
-                            pair_in_words(a[row], b[row]),
+                    deepest = -float(np.min(values, initial=0.0, where=np.isfinite(values))) / float(largest or 1.0)
+                    finding.breach = max(finding.breach or 0.0, deepest)
+                    if not noise:
+                        row = int(np.flatnonzero(wrong.any(1))[0])
+                        text = f"{what} is {values[row][wrong[row]][0]:.3g} in {precision}"
+                        fails(
+                            text, f"{int(wrong.sum())} values, first at ", a[row], b[row], changes[rows[row] // len(wo)]
                         )
             if isinstance(together.model, BSDF) and not together.stochastic:
                 for name, row in _bad_gradients(together, many_o, many_i):
                     finding.figure += 1
-                    place = pair_in_words(many_o[row], many_i[row])
-                    changed = changes[row // len(wo)]
-                    finding.problems.append(f"the gradient of eval by {name} is not finite{_words(changed)}: {place}")
-                    if finding.at is None:
-                        finding.at, finding.settings, finding.worst = ((many_o[row], many_i[row]), changed, place)
+                    text = f"the gradient of eval by {name} is not finite"
+                    fails(text, "", many_o[row], many_i[row], changes[row // len(wo)])
         finding.shown = f"{finding.figure:g} of {checked:.3g}"
         del finding.problems[6:], finding.notes[7:]
         return finding
@@ -117,16 +110,16 @@ class Positivity(Law):
             value = there.eval(o, i)
             return value, np.maximum(value, 0.0)
 
-        return severity.between(there, cut, where=", where light is negative")
+        return severity.between(there, cut, ", where light is negative")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Cause]:
         there = where_found(subject, finding)
         wo, wi, _ = _grid(there, effort, seed)
         value = np.min([there.eval(wo, wi, precision=p).min(1) for p in there.precisions], axis=0)
-        for what, bad in (("no number", ~np.isfinite(value)), ("negative", value < 0.0)):
+        for what, bad in (("not finite", ~np.isfinite(value)), ("negative", value < 0.0)):
             for words, rows in _exact_places(wo, wi):
                 if bad.any() and not np.any(bad & ~rows) and (rows & bad).sum() > 0.2 * rows.sum():
-                    yield Cause(f"eval is {what} only where {words}: a division by 0 there?", f"{what} where {words}")
+                    yield Cause(f"eval is {what} only where {words}: a division by 0?", f"{what} where {words}")
                     return
             place = place_of(wo, wi, bad)
             if place:
@@ -155,7 +148,7 @@ def _words(changed: dict[str, Any]) -> str:
 def _batches(
     subject: Subject, variants: list[tuple[dict[str, Any], Subject]], count: int
 ) -> list[tuple[list[dict[str, Any]], Subject]]:
-    """Settings that go together in one call, one value a ray; one by one where the subject takes no arrays."""
+    """Settings combined in one call, one value per ray; one by one where the subject takes no arrays."""
     changes = [changed for changed, _ in variants]
     names = dict.fromkeys(name for changed in changes for name in changed)
     columns: dict[str, Any] = {}
@@ -181,7 +174,7 @@ def _batches(
 
 
 def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs: extreme angles with each other, both sides whether it answers there or not, and random ones."""
+    """Pairs: extreme angles on both sides, whether it answers there or not, and random ones."""
     theta = np.array([*THETA, *(180.0 - t for t in THETA[:-1])])
     pair = np.array(list(itertools.product(theta, theta, PHI)))
     random_o, random_i = pairs(subject, max(effort.pairs // 16, 2048), seed)
@@ -198,7 +191,7 @@ def _grid(subject: Subject, effort: Effort, seed: int) -> tuple[np.ndarray, np.n
 def _values(
     subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, precision: Precision
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """What is looked at: its name, the values (n, channels), the directions they belong to, and their rows."""
+    """Each checked quantity: its name, values (n, channels), directions, and rows."""
     rows = np.arange(len(wo))
     yield "eval", subject.eval(wo, wi, precision=precision), wo, wi, rows
     yield "pdf", subject.pdf(wo, wi, precision)[:, None], wo, wi, rows
@@ -212,7 +205,7 @@ def _values(
 
 def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
     """The subject with one parameter at an end of its declared range, for each of its own parameters and ends."""
-    found = []
+    variants = []
     for axis in box.axes(subject):
         parameter = subject.parameters.get(axis.path)
         if parameter is None or parameter.kind == "angle":
@@ -222,14 +215,14 @@ def _extremes(subject: Subject) -> list[tuple[dict[str, Any], Subject]]:
             ends.insert(1, max(axis.low, 1e-4))
         for end in ends:
             try:
-                found.append(({axis.path: end}, subject.replace(**{axis.path: end})))
+                variants.append(({axis.path: end}, subject.replace(**{axis.path: end})))
             except InputError:
-                continue  # the model refuses the value: it need not answer for it
-    return found
+                continue  # the model rejects the value
+    return variants
 
 
 def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tuple[str, int]]:
-    """Parameters whose gradient of the summed values is not finite, each with a row where."""
+    """Parameters for which the gradient of the summed values is not finite, each with a row."""
     dr = backend.drjit()
     kind = backend.types("float32")
     leaves: dict[str, list[Any]] = {}
@@ -237,14 +230,14 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
     def watched(parameter: Any, value: Any) -> Any:
         bound = parameter.bind(value, kind)
         if bound is not None and backend.is_drjit(bound):
-            # one entry a ray, so that the gradient says which
+            # one entry per ray, so that the gradient tells which
             bound = bound + dr.zeros(kind.float, len(wo))
             dr.enable_grad(bound)
             leaves.setdefault(parameter.name, []).append(bound)
         return bound
 
     model = binding.bind(subject.model, watched)
-    # values hold to the horizon itself, their slopes, which are powers of the cosine steeper, to 89.9999 degrees
+    # values are checked to the horizon itself; their slopes, higher powers of 1 / cos, to 89.9999 degrees
     shallow = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) < 1.5e-6
     wo, wi = (np.where(shallow[:, None], [0.6, 0.0, 0.8], wo), np.where(shallow[:, None], [0.0, 0.6, 0.8], wi))
     a, b = (backend.vector_of(w, 3, kind) for w in (wo, wi))
@@ -252,13 +245,13 @@ def _bad_gradients(subject: Subject, wo: np.ndarray, wi: np.ndarray) -> list[tup
     if not dr.grad_enabled(value):
         return []
     dr.backward(dr.sum(dr.sum(value, axis=0)))
-    found = []
+    bad = []
     gradients = {name: [dr.grad(bound) for bound in bounds] for name, bounds in leaves.items()}
-    dr.eval(gradients)  # together: one by one each would be a kernel, most of it the same
+    dr.eval(gradients)  # together: each alone would be a kernel, most of it the same
     for name, each in gradients.items():
         for one in each:
             gradient = np.asarray(one.numpy())
             wrong = ~np.isfinite(gradient.reshape(-1, gradient.shape[-1])).all(0)
             if wrong.any():
-                found.append((name, int(np.argmax(wrong)) if len(wrong) == len(wo) else 0))
-    return found
+                bad.append((name, int(np.argmax(wrong)) if len(wrong) == len(wo) else 0))
+    return bad

@@ -1,4 +1,4 @@
-"""Precision: 32 bits say what 64 bits say."""
+"""Precision: 32 bits agree with 64 bits."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ TOLERANCE = 1e-3
 
 
 class Precision(Law):
-    """eval and pdf in float32 are those in float64, but for what a rounding of the directions does to the value."""
+    """eval and pdf in float32 equal those in float64, but for the effect of a rounding of the directions."""
 
     number = 9
     name = "precision"
-    title = "float32 says what float64 says"
-    meaning = "Speckles and rings that come and go with distance, angle and roughness."
+    title = "float32 agrees with float64"
+    meaning = "Speckles and rings appear and vanish with distance, angle and roughness."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if "float64" not in subject.precisions:
-            raise DoesNotApply("there is no 64-bit variant of it to compare with")
+            raise DoesNotApply("it has no 64-bit variant to compare with")
         if subject.stochastic:
-            raise DoesNotApply("the model is stochastic: single values are random")
+            raise DoesNotApply("the model is stochastic: its single values are random")
         if not subject.has_density:
-            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+            raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         wo, wi = pairs(subject, effort.pairs, seed)
         worst, place, name, plain = -1.0, 0, "", 0.0
         curve = np.zeros(len(wo))
@@ -55,7 +55,7 @@ class Precision(Law):
         return Finding(
             figure=worst,
             tolerance=TOLERANCE,
-            reason=f"beyond {ALLOWED:g} roundings (6e-8) of the directions, what is left is sums that cancel",
+            reason=f"beyond {ALLOWED:g} roundings (6e-8) of the directions, only sums with cancellation are left",
             shown=f"{worst:.1e}; 99.9 % within {plain:.1e}",
             worst=f"{name}: {pair_in_words(wo[place], wi[place])}",
             at=(wo[place], wi[place]),
@@ -73,5 +73,5 @@ class Precision(Law):
         noise = rounding(lambda a, b: subject.eval(a, b), wo, wi)
         bad = relative(single, exact, noise, 1e-6 * float(np.percentile(np.abs(exact), 99.0))).max(1) > TOLERANCE
         place = place_of(wo, wi, bad)
-        words = "float32 loses digits that float64 has" + (f", {place}" if place else "")
-        yield Cause(f"{words}: a difference of two numbers that are nearly one?", "cancellation")
+        words = "float32 loses digits of float64" + (f", {place}" if place else "")
+        yield Cause(f"{words}: a difference of two nearly equal numbers?", "cancellation")

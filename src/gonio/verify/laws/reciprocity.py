@@ -1,4 +1,4 @@
-"""Reciprocity: light may be followed either way."""
+"""Reciprocity: f is symmetric in its two directions."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from .base import Law, pair_in_words, pairs, relative, rounding, worst_of
 
 EXACT = 1e-6
 SINGLE = 2e-3
-STEPS = 24  # of the map, in each angle
-REPEATS = 4096  # of a stochastic model's values
-HAIR = 1e-5  # radians
-PAIRS = 1 << 13  # whose ratios are looked at for a cause
+STEPS = 24  # of the map, per angle
+REPEATS = 4096  # values of a stochastic model per pair
+PERTURBATION = 1e-5  # radians
+PAIRS = 1 << 13  # of directions, to find a cause
 
 
 class Reciprocity(Law):
@@ -35,24 +35,22 @@ class Reciprocity(Law):
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
         if not subject.has_density:
-            raise DoesNotApply("all lobes are deltas, which have no value to compare")
+            raise DoesNotApply("all lobes are delta lobes, which have no values to compare")
         eta = _eta(subject, seed)
         if subject.stochastic:
             return self._expected(subject, effort, seed, eta)
         exact = subject.best == "float64"
         wo, wi = pairs(subject, effort.pairs, seed, exact)
-        # f divides by the cosine: within .006 degrees of grazing that is all rounding
+        # f divides by the cosine: within 0.006 degrees of grazing only rounding is left
         keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 1e-4
         wo, wi = wo[keep], wi[keep]
         error = _difference(subject, wo, wi, eta, exact)
         row, size = worst_of(error)
-        single = (
-            "float32 values: an error beyond 8 roundings of the directions is the model's; the rest is its own sums"
-        )
+        single = "float32: beyond 8 roundings of the directions, the rest is the model's own sums"
         return Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="float64 rounds at 1e-16; formulas that cancel lose up to ten digits" if exact else single,
+            reason="float64 rounds at 1e-16; formulas with cancellation lose up to ten digits" if exact else single,
             worst=pair_in_words(wo[row], wi[row]),
             at=(wo[row], wi[row]),
             evidence=ReciprocityMap(_map(subject, eta, exact), subject.transmits),
@@ -65,7 +63,7 @@ class Reciprocity(Law):
             cosine = np.abs(wi[:, 2:])
             return subject.f(wo, wi) * _scale(wo, wi, eta)[:, None] * cosine, subject.f(wi, wo) * cosine
 
-        return severity.between(subject, both_ways, where="; followed the other way, from light to eye")
+        return severity.between(subject, both_ways, "; in light tracing")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         if subject.stochastic:
@@ -77,9 +75,9 @@ class Reciprocity(Law):
             wrong = _reciprocal_with(subject, other, seed)
             if wrong:
                 is_inverse = abs(other * eta - 1.0) < 1e-3
-                text = "the inverse of" if is_inverse else f"{eta:.4g}, not"
+                text = "the inverse of it" if is_inverse else f"{eta:.4g}"
                 yield Cause(
-                    f"with its parameter's index, {other:.4g}, it is reciprocal: `eta` of its samples is {text} that",
+                    f"with the index of its parameter, {other:.4g}, it is reciprocal: `eta` of its samples is {text}",
                     "eta of samples",
                 )
         if abs(eta - 1.0) > 1e-3 and _reciprocal_with(subject, 1.0, seed):
@@ -90,7 +88,7 @@ class Reciprocity(Law):
         yield Ratio("f(wo, wi)", "f(wi, wo)", wo, wi, there, back, subject, antisymmetric=True)
 
     def _expected(self, subject: Subject, effort: Effort, seed: int, eta: float) -> Finding:
-        """A stochastic model: means over many values of each pair, both ways."""
+        """A stochastic model: means over many values per pair, both ways."""
         wo, wi = pairs(subject, 96, seed)
         keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 0.02  # f divides by the cosine
         wo, wi = wo[keep][:24], wi[keep][:24]
@@ -100,16 +98,16 @@ class Reciprocity(Law):
             if z is None:
                 continue
 
-            def again(a: np.ndarray = a, b: np.ndarray = b) -> float:
+            def repeat(a: np.ndarray = a, b: np.ndarray = b) -> float:
                 return statistics.normal_two_sided(_distance(subject, a, b, eta, seed + 7919) or 0.0)
 
-            trials.append(Trial(statistics.normal_two_sided(z), pair_in_words(a, b), again))
+            trials.append(Trial(statistics.normal_two_sided(z), pair_in_words(a, b), repeat))
             if abs(z) > worst:
                 worst, place = abs(z), i
         return Finding(
             figure=worst,
             tolerance=np.inf,
-            reason="the model is stochastic: expectations are compared, by their p-values",
+            reason="the model is stochastic: expectations are compared by p-values",
             shown=f"{worst:.2f} standard errors",
             worst=pair_in_words(wo[place], wi[place]),
             at=(wo[place], wi[place]),
@@ -118,30 +116,30 @@ class Reciprocity(Law):
 
 
 def _distance(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, seed: int) -> float | None:
-    """Mean of f(wo, wi) less f(wi, wo), in standard errors; None where both are 0.
+    """Mean of f(wo, wi) - f(wi, wo), in standard errors; None where both are 0.
 
-    The random numbers of a model may be a hash of its directions: another `seed` is given to each row, where it has
-    one, else the directions are shaken by a hair, for both ways alike.
+    The random numbers of a model may be a hash of its directions: each row gets another `seed`, where the model has
+    one; else the directions are perturbed slightly, the same for both ways.
     """
     a, b = (np.tile(w, (REPEATS, 1)) for w in (wo, wi))
     if "seed" in subject.parameters:
         subject = subject.replace(seed=np.arange(REPEATS) + float(REPEATS * (seed % 1000)))
     else:
         rng = np.random.default_rng([seed, 6])
-        a, b = (w + HAIR * rng.normal(size=w.shape) for w in (a, b))
+        a, b = (w + PERTURBATION * rng.normal(size=w.shape) for w in (a, b))
         a, b = (directions.single(w / np.linalg.norm(w, axis=1, keepdims=True)) for w in (a, b))
     there, back = subject.f(a, b).mean(1) * _scale(a, b, eta), subject.f(b, a).mean(1)
     if not there.any() and not back.any():
         return None
     off = there - back
     spread = np.hypot(off.std() / np.sqrt(REPEATS), 1e-6 * max(np.abs(there).mean(), np.abs(back).mean()))
-    # where few values carry the mean, their own spread says too little of it
+    # where few values dominate the mean, their spread underestimates its error
     heavy = float(np.abs(off - off.mean()).max()) / np.sqrt(REPEATS)
     return float(off.mean() / max(spread, 0.25 * heavy))
 
 
 def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
-    """Whether the law holds where eta is another than samples say."""
+    """Whether the law holds with another eta than that of the samples."""
     exact = subject.best == "float64"
     wo, wi = pairs(subject, PAIRS, seed, exact)
     keep = np.minimum(np.abs(wo[:, 2]), np.abs(wi[:, 2])) > 1e-4
@@ -149,20 +147,20 @@ def _reciprocal_with(subject: Subject, eta: float, seed: int) -> bool:
 
 
 def _eta(subject: Subject, seed: int) -> float:
-    """Index below over index above, as the model's own samples say; 1 where nothing is transmitted."""
+    """Index below over index above, by the model's own samples; 1 where nothing is transmitted."""
     if not subject.transmits:
         return 1.0
     rng = np.random.default_rng([seed, 4])
     wo = directions.on_side(directions.uniform(rng, 4096), 1)
     drawn = subject.sample(wo, directions.numbers(rng, 4096))
     through = (drawn.pdf > 0.0) & (drawn.wi[:, 2] < 0.0)
-    if np.any(through & ~drawn.delta):  # what goes straight on through a hole says nothing of the rest
+    if np.any(through & ~drawn.delta):  # light through a hole carries no information about the index
         through &= ~drawn.delta
     return float(np.median(drawn.eta[through])) if through.any() else 1.0
 
 
 def _scale(wo: np.ndarray, wi: np.ndarray, eta: float) -> np.ndarray:
-    """(eta_i / eta_o)^2, what f(wo, wi) must be multiplied with to be f(wi, wo)."""
+    """(eta_i / eta_o)^2, the factor between f(wo, wi) and f(wi, wo)."""
     through = wo[:, 2] * wi[:, 2] < 0.0
     return np.where(through, np.where(wo[:, 2] > 0.0, eta**2, eta**-2), 1.0)
 
@@ -171,7 +169,7 @@ def _difference(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, ex
     scale = _scale(wo, wi, eta)[:, None]
     there, back = subject.f(wo, wi) * scale, subject.f(wi, wo)
     if exact:
-        # a value that is a billionth of the largest is as good as zero
+        # a billionth of the largest value is as good as 0
         floor = 1e-9 * float(np.max(np.abs(there), initial=0.0, where=np.isfinite(there)))
         return relative(there, back, 0.0, floor)
     noise = rounding(lambda a, b: subject.f(a, b) * scale, wo, wi) + rounding(subject.f, wi, wo)
@@ -180,7 +178,7 @@ def _difference(subject: Subject, wo: np.ndarray, wi: np.ndarray, eta: float, ex
 
 
 def _map(subject: Subject, eta: float, exact: bool) -> np.ndarray:
-    """The largest relative difference over azimuths, by (theta_o, theta_i), for pictures."""
+    """The largest relative difference over azimuths, by (theta_o, theta_i), for the figure."""
     below = subject.transmits
     theta = (np.arange(STEPS) + 0.5) / STEPS * (180.0 if below else 90.0)
     phi = np.arange(8) * 45.0 + 11.0

@@ -1,4 +1,4 @@
-"""Shader parity: asked where there is a browser to run a shader in, by tests/emit of the project itself."""
+"""Shader parity: judged where a browser can run a shader, by the project's own tests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .base import Law
 
 
 class Shader(Law):
-    """The shader code that is written from a model gives the model's values."""
+    """The shader code of a model gives the model's values."""
 
     number = 12
     on_request = True
@@ -18,4 +18,4 @@ class Shader(Law):
     meaning = "The engine's picture differs from the offline reference."
 
     def judge(self, subject: Subject, effort: Effort, seed: int) -> Finding:
-        raise DoesNotApply("it takes a browser to run a shader; the project's tests do it for every model")
+        raise DoesNotApply("it needs a browser to run a shader; the project's tests do it for every model")

@@ -1,4 +1,4 @@
-"""The weight: what `sample` hands out is what `eval` and `pdf` say."""
+"""The weight of a sample equals eval / pdf."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...ops import Precision
-from .. import directions, severity, statistics
+from .. import directions, estimators, severity, statistics
 from ..effort import Effort
 from ..forensics.ratio import Cause, Ratio
 from ..subject import Subject
@@ -16,13 +16,13 @@ from .base import Law, pair_in_words, relative, rounding, worst_of
 
 EXACT = 1e-10
 SINGLE = 2e-3
-LOBE = 1e4  # 1/sr; a value or a density that is larger is a lobe's, one of a degree at most
+LOBE = 1e4  # 1/sr; larger values and densities are those of a lobe of a degree at most
 ASIDE = 3e-5  # radians: a tenth of the narrowest lobe, and hundreds of roundings
-PAIRS = 1 << 13  # samples whose ratios are looked at for a cause
+PAIRS = 1 << 13  # samples, to find a cause
 
 
 class Weight(Law):
-    """weight = eval / pdf at the very wi that was sampled; declared deltas have neither value nor pdf."""
+    """weight = eval / pdf at the sampled wi; declared delta samples have neither value nor pdf."""
 
     number = 5
     name = "weight"
@@ -37,15 +37,14 @@ class Weight(Law):
             figures.append(self._at(subject, wo, u, precision, problems))
         size, row, wi = figures[-1]
         exact = subject.best == "float64"
-        # the worst over all precisions, each in units of what its own rounding allows
         if exact and figures[0][0] > SINGLE:
             problems.append(f"float32: {figures[0][0]:.2e} where {SINGLE:.0e} is allowed")
         finding = Finding(
             figure=size,
             tolerance=EXACT if exact else SINGLE,
-            reason="float64: both sides are the same formula, a few roundings apart"
+            reason="float64: both sides are the same formula, but for a few roundings"
             if exact
-            else "float32: beyond 8 roundings of wi, which the narrow lobe magnifies, the rest is the model's own sums",
+            else "float32: beyond 8 roundings of wi, which narrow lobes magnify, the rest is the model's own sums",
             worst=pair_in_words(wo[row], wi),
             at=(wo[row], wi),
             problems=problems,
@@ -57,7 +56,7 @@ class Weight(Law):
         return finding
 
     def bias(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> severity.Bias:
-        return severity.of_sampling(subject, "weights")
+        return estimators.sampling_bias(subject, "weights")
 
     def ratios(self, subject: Subject, finding: Finding, effort: Effort, seed: int) -> Iterator[Ratio | Cause]:
         if subject.stochastic:
@@ -82,11 +81,11 @@ class Weight(Law):
                 )
             value = subject.eval(o, i, mode)
             if _grey(s.weight[rows]) and not _grey(value):
-                yield Cause("the weight is grey where eval has a colour: a mean, or one channel of it?", "grey weight")
+                yield Cause("the weight is grey where eval has a color: a mean, or one channel of it?", "grey weight")
             yield Ratio(f"weight x pdf{suffix}", "eval", o, i, s.weight[rows] * claimed, value, subject, Subject.eval)
         for problem in finding.problems:
             _, _, convention = problem.partition(": ")
-            if "is allowed" not in convention:  # a figure says no more than the verdict does
+            if "is allowed" not in convention:  # the verdict already tells the figure
                 yield Cause(convention, convention)
 
     def _at(
@@ -97,7 +96,7 @@ class Weight(Law):
         for mode in modes:
             s = subject.sample(wo, u, mode, precision)
             _conventions(s, problems, precision)
-            unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-2  # no other direction can be asked for a value
+            unit = np.abs(np.linalg.norm(s.wi, axis=1) - 1.0) < 1e-2  # other directions are rejected
             s = s._replace(wi=np.where(unit[:, None], s.wi, [0.0, 0.0, 1.0]))
             density = (s.pdf > 0.0) & ~s.delta & unit
             value = subject.eval(wo, s.wi, mode, precision)
@@ -107,15 +106,15 @@ class Weight(Law):
                 aside = s.wi[delta] + ASIDE * np.roll(s.wi[delta], 1, axis=1)
                 aside /= np.linalg.norm(aside, axis=1, keepdims=True)
                 peak = np.maximum(value[delta].max(1), pdf[delta])
-                beside = np.maximum(
+                next_to = np.maximum(
                     subject.eval(wo[delta], aside, mode, precision).max(1), subject.pdf(wo[delta], aside, precision)
                 )
-                # a narrow lobe about it is as bright so close beside it, or, narrower yet, far brighter than any
-                # probability; the delta itself must not show
-                alone = getattr(subject.model, "delta", "maybe") == "always"
-                shows = peak > (0.0 if alone else 1e-3 + 3.0 * beside)
-                if np.any(shows & (alone | (peak < LOBE))):
-                    problems.append(f"{precision}: a delta sample's direction has a finite value or pdf")
+                # a narrow lobe around it is as bright that close to it, or, if even narrower, far brighter than any
+                # probability; the delta lobe itself must not show
+                only_delta = getattr(subject.model, "delta", "maybe") == "always"
+                shows = peak > (0.0 if only_delta else 1e-3 + 3.0 * next_to)
+                if np.any(shows & (only_delta | (peak < LOBE))):
+                    problems.append(f"{precision}: eval or pdf is positive at the direction of a delta sample")
             rows = np.flatnonzero(density)
             if subject.stochastic or not len(rows):
                 continue
@@ -134,7 +133,7 @@ class Weight(Law):
                 relative(c, d, noise_pdf, 1e-6 * scale.max(1, keepdims=True))[:, 0],
             )
             if precision == "float32":
-                # a direction that rounding carries over an edge (the horizon, total reflection) is no error
+                # a direction that rounding moves over an edge (the horizon, total reflection) is not an error
                 error = np.where(_on_edge(subject, wo[rows], s.wi[rows], precision), 0.0, error)
             row, size = worst_of(error)
             if size > worst or not np.isfinite(size):
@@ -143,18 +142,18 @@ class Weight(Law):
 
 
 def _on_edge(subject: Subject, wo: np.ndarray, wi: np.ndarray, precision: Precision) -> np.ndarray:
-    """Whether a turn of a few roundings makes the value or the pdf vanish, or appear."""
+    """Whether a change of wi by a few roundings makes the value or the pdf vanish, or appear."""
     rng = np.random.default_rng(8)
     lit = [subject.pdf(wo, wi, precision) > 0.0]
     for _ in range(6):
-        turned = wi + 2.0**-21 * rng.uniform(-1.0, 1.0, wi.shape)
-        lit.append(subject.pdf(wo, turned, precision) > 0.0)
-        lit.append(np.any(subject.eval(wo, turned, precision=precision) > 0.0, axis=1))
+        moved = wi + 2.0**-21 * rng.uniform(-1.0, 1.0, wi.shape)
+        lit.append(subject.pdf(wo, moved, precision) > 0.0)
+        lit.append(np.any(subject.eval(wo, moved, precision=precision) > 0.0, axis=1))
     return np.any(lit, axis=0) & ~np.all(lit, axis=0)
 
 
 def _grey(values: np.ndarray) -> bool:
-    """Whether all channels are one, within a per cent of most rows."""
+    """Whether all channels are equal, within a percent for most rows."""
     return not len(values) or bool(np.mean(np.ptp(values, axis=1) > 0.01 * values.max(1)) < 0.05)
 
 
@@ -166,17 +165,17 @@ def _drawn(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, np.ndar
 
 
 def _conventions(s: object, problems: list[str], precision: Precision) -> None:
-    """Failed samples weigh nothing; the others have unit directions and finite weights; probabilities are at most 1."""
+    """Failed samples have weight 0; the others have unit directions; probabilities are at most 1."""
     pdf, weight, wi, delta = s.pdf, s.weight, s.wi, s.delta  # type: ignore[attr-defined]
     good = pdf > 0.0
-    found = []
+    wrong = []
     if np.any(weight[~good] != 0.0):
-        found.append("a failed sample (pdf 0) has a weight")
+        wrong.append("a failed sample (pdf 0) has a weight")
     if np.any(np.abs(np.linalg.norm(wi[good], axis=1) - 1.0) > 1e-5):  # wo itself is rounded to float32
-        found.append("a sampled direction is no unit vector")
+        wrong.append("a sampled direction is not a unit vector")
     if np.any(pdf[good & delta] > 1.0 + 1e-6):
-        found.append("a delta sample's pdf, which is a probability, exceeds 1")
-    for what in found:
+        wrong.append("the pdf of a delta sample, a probability, exceeds 1")
+    for what in wrong:
         if f"{precision}: {what}" not in problems:
             problems.append(f"{precision}: {what}")
 
@@ -192,12 +191,12 @@ def _expected(subject: Subject, finding: Finding, seed: int, effort: Effort) -> 
         difference = s.weight[good].mean(1) - value / s.pdf[good]
         if not len(difference):
             return 1.0
-        # where both draw the same number, all that is left is rounding
+        # where both use the same random number, only rounding is left
         noise = float(np.hypot(difference.std() / np.sqrt(len(difference)), 1e-6 * s.weight[good].mean()))
         return statistics.normal_two_sided(difference.mean() / noise) if noise > 0.0 else 1.0
 
     finding.tolerance = np.inf
-    finding.reason = "the model is stochastic: expectations are compared, by their p-values"
+    finding.reason = "the model is stochastic: expectations are compared by p-values"
     finding.shown = "expectations"
     finding.trials.append(Trial(p_value(seed), "mean weight against mean eval / pdf", lambda: p_value(seed + 7919)))
     return finding

@@ -1,0 +1,160 @@
+"""Cells of the sphere that follow a BSDF's samples, for the chi-square test.
+
+A lobe of width 0.005 fills a hundred-thousandth of the sphere: fixed cells would hold it in one, or number millions. So
+a first, small draw (the pilot) places the edges: 100 rows per side of the surface and 200 columns per row, at quantiles
+of the pilot, at equal steps, and at growing distances from its middle for the tails. The coordinates are
+(1 - |z|, a pseudo-angle of (x, y)): equal areas, no transcendental function, and no cancellation near the pole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from . import directions
+from .subject import Subject
+
+CELLS = (100, 200)  # rows and columns per side of the surface
+PILOT = 1 << 15  # samples for CELLS; fewer cells need fewer
+FINEST = 3e-5  # spread of the azimuth: 120 steps of float32 directions
+
+Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of rows (wo, wi), (N, 3) each: (N,)
+
+
+class Grid(NamedTuple):
+    """Cells of several wo.
+
+    wo     (N, 3)
+    sides  which sides of the surface have cells
+    rows   edges of 1 - |z|, (N, sides, rows + 1), float32
+    columns  edges of the pseudo-angle, (N, sides, rows, columns + 1), float32
+    """
+
+    wo: np.ndarray
+    sides: tuple[int, ...]
+    rows: np.ndarray
+    columns: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(N, sides, rows, columns)."""
+        n, sides, rows, edges = self.columns.shape
+        return n, sides, rows, edges - 1
+
+
+def place(subject: Subject, wo: np.ndarray, seed: int, cells: tuple[int, int] = CELLS) -> Grid | None:
+    """Cells around the pilot's samples; None where no sample has a density."""
+    rng = np.random.default_rng([seed, 11])
+    pilot = max(1 << 12, PILOT * cells[0] * cells[1] // (CELLS[0] * CELLS[1]))
+    many = np.repeat(wo, pilot, axis=0)
+    drawn = subject.sample(many, directions.numbers(rng, len(many)), precision="float32")
+    good = (drawn.pdf > 0.0) & ~drawn.delta & np.all(np.isfinite(drawn.wi), axis=1)
+    if not good.any():
+        return None
+    rows = zip(drawn.wi.reshape(len(wo), pilot, 3), good.reshape(len(wo), pilot), strict=True)
+    return place_around([wi[valid] for wi, valid in rows], wo, lambda o, i: subject.pdf(o, i, "float32"), cells)
+
+
+def place_around(pilot: Sequence[np.ndarray], wo: np.ndarray, pdf: Density, cells: tuple[int, int] = CELLS) -> Grid:
+    """Cells around some samples (n, 3) of each wo, on the sides where there are any, or where the pdf is positive.
+
+    A wo whose samples are so close together that the steps of float32 directions matter is left out.
+    """
+    sides = tuple(s for s in (1, -1) if any(np.any(s * wi[:, 2] > 0.0) for wi in pilot) or _claims(pdf, wo, s))
+    resolved = [i for i, wi in enumerate(pilot) if _spread(wi) > FINEST]
+    pilot, wo = [pilot[i] for i in resolved], wo[resolved]
+    many_rows, many_columns = cells
+    rows = np.empty((len(wo), len(sides), many_rows + 1), np.float32)
+    columns = np.empty((len(wo), len(sides), many_rows, many_columns + 1), np.float32)
+    for i, wi in enumerate(pilot):
+        for j, side in enumerate(sides):
+            mine = wi[side * wi[:, 2] > 0.0]
+            heights, turns = height(mine), pseudo_angle(mine)
+            order = np.argsort(heights)
+            heights, turns = heights[order], turns[order]
+            rows[i, j] = _edges(heights, 0.0, 1.0, many_rows)
+            for r, (a, b) in enumerate(zip(rows[i, j][:-1], rows[i, j][1:], strict=True)):
+                first, last = np.searchsorted(heights, [a, b])
+                more = max(300 - (last - first), 0) // 2  # a row with few samples takes those of its neighbors
+                columns[i, j, r] = _edges(turns[max(first - more, 0) : last + more], 0.0, 4.0, many_columns)
+    return Grid(wo, sides, rows, columns)
+
+
+def _spread(wi: np.ndarray) -> float:
+    """Spread in azimuth of the middle half of directions; infinite where there are too few."""
+    if len(wi) < 20:
+        return float("inf")
+    first, last = np.percentile(pseudo_angle(wi), [25.0, 75.0])
+    return float(last - first)
+
+
+def _claims(pdf: Density, wo: np.ndarray, side: int) -> bool:
+    """Whether the pdf is positive anywhere on that side."""
+    rng = np.random.default_rng(3)
+    wi = directions.on_side(directions.uniform(rng, 256 * len(wo)), side)
+    return bool(np.any(pdf(np.repeat(wo, 256, axis=0), wi) > 0.0))
+
+
+def height(w: np.ndarray) -> np.ndarray:
+    """1 - |z| of directions (N, 3), from x and y: no cancellation near the pole."""
+    return (w[:, 0] ** 2 + w[:, 1] ** 2) / (1.0 + np.abs(w[:, 2]))
+
+
+def pseudo_angle(w: np.ndarray) -> np.ndarray:
+    """Pseudo-angle in [0, 4]: monotone in the azimuth, y / (|x| + |y|) in the first quarter."""
+    reach = np.abs(w[:, 0]) + np.abs(w[:, 1])
+    t = w[:, 1] / np.where(reach > 0, reach, 1.0)
+    return np.where(w[:, 0] < 0, 2.0 - t, np.where(w[:, 1] < 0, 4.0 + t, t))
+
+
+def azimuth(turn: np.ndarray) -> np.ndarray:
+    """The azimuth in [0, 2 pi] of a pseudo-angle in [0, 4]."""
+    quarter = np.minimum(np.floor(turn), 3.0)
+    t = turn - quarter
+    return 0.5 * np.pi * quarter + np.arctan2(t, 1.0 - t)
+
+
+def _edges(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
+    """count + 1 edges over [low, high]: half at quantiles, a quarter evenly, a quarter at growing distances."""
+    inside = values[(values > low) & (values < high)]
+    if not len(inside):
+        return np.linspace(low, high, count + 1).astype(np.float32)
+    even, far = count // 4 - 2, count // 4
+    own = np.sort(inside)[np.linspace(0, len(inside) - 1, count - 1 - even - far).astype(int)]
+    first, middle, last = own[len(own) // 4], own[len(own) // 2], own[3 * len(own) // 4]
+    tails = [
+        middle + sign * _growing(reach, high - low, far // 2)
+        for sign, reach in ((1, last - middle), (-1, middle - first))
+    ]
+    # a density with a step at its end has it just beyond the outermost samples
+    beyond = [own[-1] + (own[-1] - own[-2]), own[0] - (own[1] - own[0])]
+    spread = np.concatenate([own, beyond, np.linspace(low, high, even + 2)[1:-1], *tails])
+    edges = np.sort(np.clip(spread, low, high))
+    # clipped tails leave several edges at an end: cells of zero width, which count and expect nothing
+    edges = np.concatenate([[low], edges, np.full(max(count - len(edges), 0), high)])[: count + 1]
+    edges[-1] = high
+    return edges.astype(np.float32)
+
+
+def _growing(first: float, last: float, count: int) -> np.ndarray:
+    """Distances in equal ratios, up to 1e4 at least: a lobe of width 1e-4 has its tail at a million of its heights."""
+    first = max(first, 1e-10)
+    return first * max(last / first, 1e4) ** (np.arange(count) / max(count - 1, 1))
+
+
+def boxes(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(a, b, c, d) of each cell [a, b] x [c, d] of (1 - |z|, azimuth), (..., rows, columns) each, by the edges of rows
+    (..., rows + 1) and columns (..., rows, columns + 1)."""
+    turn = azimuth(columns.astype(float))
+    c, d = turn[..., :-1], turn[..., 1:]
+    heights = rows.astype(float)[..., None]
+    a, b = (np.broadcast_to(edge, c.shape) for edge in (heights[..., :-1, :], heights[..., 1:, :]))
+    return a, b, c, d
+
+
+def direction(height: np.ndarray, azimuth: np.ndarray, side: np.ndarray | float) -> np.ndarray:
+    """Unit vectors (..., 3) of 1 - |z| and azimuth, on a side of the surface."""
+    r = np.sqrt(height * (2.0 - height))
+    return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), (1.0 - height) * side], -1)

@@ -1,0 +1,273 @@
+"""The albedos that integrators measure of one BSDF, each in its own way, and the bias of a picture that follows.
+
+A path tracer uses a BSDF in two ways. It follows samples, whose mean weight is an albedo; and it samples lights with
+`eval` and `pdf` and weights both by the balance heuristic (Veach1997, eq. 9.10). In a furnace of radiance 1, every
+estimator must return int eval dwi. The difference, as a share of the reflected light, is the bias of a picture.
+
+    bias = estimators.sampling_bias(subject)     bias.worst, bias.average, bias.share, bias.words
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..energy.albedo import cubature
+from ..material.sample import SampleArrays
+from ..ops import Direction, Mode, Scalar, backend
+from . import directions
+from .severity import ACCURACY, Bias, Grade, percent, seeds, summed, views
+from .subject import Subject
+
+SAMPLES = 1 << 13  # per wo; stratified, so that the mean is accurate to about 1e-3 of a weight
+NEGLIGIBLE = 2e-4  # difference of two albedos that counts as none
+SPHERE = 0.25 / np.pi  # density of light samples: those of a constant environment
+BINS = 16  # four quarters of the azimuth, within 45 degrees of the normal and beyond, on each side of the surface
+TAIL = 64  # largest weights per wo, from which the exponent of the tail is estimated
+
+Part: TypeAlias = Literal["all", "weights", "pdf"]
+
+
+class Estimates(NamedTuple):
+    """Directional albedos by each estimator, for N directions wo.
+
+    wo, mass  as `severity.views` returns them
+    value     int eval dwi plus the delta lobes' shares, (N, channels): the limit of light sampling
+    sampled   mean weight (N, channels): the limit of BSDF sampling
+    both      the two combined by the balance heuristic, light samples uniform on the sphere
+    consistent, consistent_both  the last two with each sample weighted by eval / pdf: the rest of the difference to
+              `sampled` and `both` is due to the weights, the rest of that to `value` due to the pdf
+    noise     two standard errors of `sampled` and `both`
+    parts     `value`, `sampled` and `consistent`, means over the channels, per bin of wi: (3, N, BINS)
+    doubt     three standard errors of the latter two, (N, BINS)
+    unseen    share of light that rare samples of huge weight may still add, (N,)
+    claimed   int pdf dwi, (N,)
+    drawn     share of samples that did not fail and are not delta samples, (N,)
+    """
+
+    wo: np.ndarray
+    mass: np.ndarray
+    value: np.ndarray
+    sampled: np.ndarray
+    both: np.ndarray
+    consistent: np.ndarray
+    consistent_both: np.ndarray
+    noise: np.ndarray
+    parts: np.ndarray
+    doubt: np.ndarray
+    unseen: np.ndarray
+    claimed: np.ndarray
+    drawn: np.ndarray
+
+
+def of_subject(subject: Subject) -> Estimates:
+    """The estimates of radiance: computed when a law first fails, once for all laws."""
+    if "estimates" not in subject.memo:
+        subject.memo["estimates"] = estimate(subject)
+    estimates: Estimates = subject.memo["estimates"]
+    return estimates
+
+
+def estimate(subject: Subject, mode: Mode = "radiance") -> Estimates:
+    """The results of the three integrators for each of `views`."""
+    wo, mass = views(subject.sides)
+    n = len(wo)
+    many = np.repeat(wo, SAMPLES, axis=0)
+    s = subject.sample(many, np.tile(_stratified(SAMPLES), (n, 1)), mode, "float32")
+    weight = _followed_weight(subject, many, s)
+    good = (s.pdf > 0.0) & ~s.delta
+    own, own_pdf = _eval_over_pdf(subject, many, s.wi, weight, good, mode)
+    heuristic = np.nan_to_num(np.where(s.delta, 1.0, s.pdf / np.maximum(s.pdf + SPHERE, 1e-30)))
+    own_heuristic = np.where(good, own_pdf / (own_pdf + SPHERE), 1.0)
+    (sampled, error), (sampled_part, part_error) = _batched(weight, n), _batched(weight * heuristic[:, None], n)
+    consistent, consistent_part = _batched(own, n)[0], _batched(own * own_heuristic[:, None], n)[0]
+    bins = _bins(s.wi) * good[:, None]
+    (drawn_bins, bin_error), (own_bins, own_bin_error) = (
+        _batched(w.mean(1, keepdims=True) * bins, n) for w in (weight, own)
+    )
+    integral = _integral(subject, many, wo, weight.shape[1], mode)
+    channels = weight.shape[1]
+    by_eval, by_lights, claimed, value_bins = np.split(integral, [channels, 2 * channels, 2 * channels + 1], axis=1)
+    value = by_eval + _deltas(s.wi, weight, s.pdf, s.delta, n)
+    unseen = _unseen(weight, n)
+    random = 0.02 if subject.stochastic else 0.0
+    return Estimates(
+        wo,
+        mass,
+        value,
+        sampled,
+        sampled_part + by_lights,
+        consistent,
+        consistent_part + by_lights,
+        unseen + 2.0 * np.maximum(error, part_error) + random * value,
+        np.stack([value_bins, drawn_bins, own_bins]),
+        unseen + 3.0 * np.maximum(bin_error, own_bin_error) + random * value_bins,
+        unseen[:, 0] / np.maximum(value.mean(1), 1e-12),
+        claimed[:, 0],
+        good.reshape(n, SAMPLES).mean(1),
+    )
+
+
+def _followed_weight(subject: Subject, wo: np.ndarray, s: SampleArrays) -> np.ndarray:
+    """Weights of the samples that a path tracer follows, 0 for the others, (N, channels)."""
+    valid = s.pdf > 0.0
+    if not subject.transmits:
+        # a sample through the surface of an opaque solid reaches its inside, which is dark
+        valid = valid & (s.wi[:, 2] * wo[:, 2] > 0.0)
+    return np.where(valid[:, None], np.nan_to_num(s.weight, posinf=0.0, neginf=0.0), 0.0)
+
+
+def _integral(subject: Subject, many: np.ndarray, wo: np.ndarray, channels: int, mode: Mode) -> np.ndarray:
+    """Integrals over wi of eval, of eval times the light samples' heuristic, of pdf, and of mean eval per bin:
+    (N, 2 channels + 1 + BINS)."""
+
+    def answers(o: np.ndarray, i: np.ndarray) -> np.ndarray:
+        value = np.nan_to_num(subject.eval(o, i, mode), posinf=0.0, neginf=0.0)
+        pdf = np.maximum(np.nan_to_num(subject.pdf(o, i), posinf=0.0, neginf=0.0), 0.0)
+        return np.concatenate([value, pdf[:, None]], axis=1)
+
+    asked = cubature.of_rows(answers)
+
+    def integrand(o: Direction, i: Direction) -> list[Scalar]:
+        *value, pdf = asked(o, i)
+        split = _split(sum(value[1:], start=value[0]) / len(value), i)
+        return [*value, *(channel * (SPHERE / (pdf + SPHERE)) for channel in value), pdf, *split]
+
+    if not subject.has_density:
+        return np.zeros((len(wo), 2 * channels + 1 + BINS))
+    if subject.stochastic or not subject.steady:  # random values: no cell would ever be accurate enough
+        wi = directions.uniform(np.random.default_rng(43), len(many))
+        vectors = (backend.vector_of(w, 3, backend.types("float64")) for w in (many, wi))
+        columns = np.stack([backend.to_numpy(column, len(wi)) for column in integrand(*vectors)], axis=-1)
+        return np.asarray(columns.reshape(len(wo), SAMPLES, -1).mean(1) / SPHERE)
+    return cubature.integrate(seeds(subject), integrand, wo, ACCURACY).value
+
+
+def _unseen(weight: np.ndarray, n: int) -> np.ndarray:
+    """Contribution to the mean of samples beyond the largest observed weight, (N, 1); 0 where weights are bounded.
+
+    The tail's exponent is Hill's: P(w > t) ~ t^-a gives a mean of a / (a - 1) t P(w > t) beyond t.
+    """
+    largest = np.partition(weight.mean(1).reshape(n, SAMPLES), -TAIL, axis=1)[:, -TAIL:]
+    least, most = np.maximum(largest.min(1), 1e-30), largest.max(1)
+    exponent = 1.0 / np.maximum(np.log(np.maximum(largest, least[:, None]) / least[:, None]).mean(1), 1e-6)
+    beyond = exponent / np.maximum(exponent - 1.0, 0.05) * most / SAMPLES
+    return np.where(exponent < 2.5, beyond, 0.0)[:, None]
+
+
+def _bins(w: np.ndarray) -> np.ndarray:
+    """1 in the column of a direction's bin, (N, BINS); the edges are those of the first cells of the cubature."""
+    number = (w[:, 0] > 0.0) + 2 * (w[:, 1] > 0.0) + 4 * (np.abs(w[:, 2]) > np.sqrt(0.5)) + 8 * (w[:, 2] > 0.0)
+    return (number[:, None] == np.arange(BINS)).astype(float)
+
+
+def _split(value: Scalar, w: Direction) -> list[Scalar]:
+    """A Dr.Jit value in its bin, 0 in the others. It runs in the kernel that sums them: sixteen columns of NumPy take
+    longer than most models."""
+    dr = backend.drjit()
+    sides = [(~side, side) for side in (w.x > 0.0, w.y > 0.0, dr.abs(w.z) > np.sqrt(0.5), w.z > 0.0)]
+
+    def inside(number: int) -> Any:
+        a, b, c, d = (choice[number >> bit & 1] for bit, choice in enumerate(sides))
+        return a & b & c & d
+
+    return [dr.select(inside(number), value, 0.0) for number in range(BINS)]
+
+
+def _eval_over_pdf(
+    subject: Subject, wo: np.ndarray, wi: np.ndarray, weight: np.ndarray, good: np.ndarray, mode: Mode
+) -> tuple[np.ndarray, np.ndarray]:
+    """eval / pdf of the samples with a density, and their pdf; other samples keep their weight."""
+    weight, pdf = weight.copy(), np.zeros(len(wo))
+    if good.any():
+        unit = wi[good] / np.maximum(np.linalg.norm(wi[good], axis=1, keepdims=True), 1e-12)
+        value = subject.eval(wo[good], unit, mode, "float32")
+        pdf[good] = np.maximum(np.nan_to_num(subject.pdf(wo[good], unit, "float32"), posinf=0.0), 0.0)
+        over = np.divide(value, pdf[good, None], out=np.zeros_like(value), where=pdf[good, None] > 0.0)
+        weight[good] = np.nan_to_num(over, posinf=0.0, neginf=0.0)
+    return weight, pdf
+
+
+def _stratified(count: int) -> np.ndarray:
+    """A sequence of low discrepancy in [0, 1)^3: multiples of powers of the root of x^4 = x + 1."""
+    steps = 1.2207440846057596 ** -np.arange(1.0, 4.0)
+    u = (0.5 + np.arange(count)[:, None] * steps) % 1.0
+    return directions.single(np.minimum(u, 1.0 - 2.0**-24))
+
+
+def _batched(values: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean over each wo's samples, and its standard error from eight interleaved parts, (N, channels) each."""
+    parts = values.reshape(n, SAMPLES // 8, 8, -1).mean(1)
+    return parts.mean(1), parts.std(1) / np.sqrt(7.0)
+
+
+def _deltas(wi: np.ndarray, weight: np.ndarray, pdf: np.ndarray, delta: np.ndarray, n: int) -> np.ndarray:
+    """Sum of weight times probability over the sampled delta directions, (N, channels)."""
+    result = np.zeros((n, weight.shape[1]))
+    chosen = (delta & (pdf > 0.0)).reshape(n, SAMPLES)
+    for i in range(n):
+        rows = i * SAMPLES + np.flatnonzero(chosen[i])
+        if len(rows):
+            _, first = np.unique(np.round(wi[rows], 4), axis=0, return_index=True)
+            result[i] = np.sum(weight[rows[first]] * pdf[rows[first], None], axis=0)
+    return result
+
+
+# --------------------------------------------------------------------------- the bias of a picture
+
+
+def sampling_bias(subject: Subject, part: Part = "all", light: Estimates | None = None) -> Bias:
+    """The error of BSDF sampling, with and without light samples, against the limit of light sampling.
+
+    part  the share of it that is due to weights other than eval / pdf, or to a pdf other than that of the samples
+    The larger of the two errors counts; `both` of the result is the one with light samples.
+    """
+    light = light or of_subject(subject)
+    biases = []
+    for sampled, consistent in ((light.sampled, light.consistent), (light.both, light.consistent_both)):
+        off = (consistent if part == "pdf" else sampled) - (consistent if part == "weights" else light.value)
+        off = np.where(np.abs(off) > light.noise + NEGLIGIBLE, off, 0.0)
+        biases.append(summed(off, np.maximum(light.value, 0.0), light.wo, light.mass))
+    by_samples, both = biases
+    # the same light from a lamp, per bin: an excess on one side does not make up for a lack on another
+    value, drawn, own = light.parts
+    apart = np.abs((own if part == "pdf" else drawn) - (own if part == "weights" else value))
+    # a lobe that the edge of a bin cuts in two lies on either side by chance: half a percent of all light is nothing
+    doubt = light.doubt + 5e-3 * np.abs(value).sum(1, keepdims=True)
+    apart = np.where(apart > doubt, apart, 0.0).sum(1, keepdims=True)
+    lamp = summed(apart, light.value.mean(1, keepdims=True).clip(min=0.0), light.wo, light.mass, by_samples.kind)
+    worse = max((by_samples, both, lamp), key=lambda bias: bias.average)
+    if lamp.average > 1.1 * max(by_samples.average, both.average) and by_samples.kind != "bias":
+        worse = dataclasses.replace(worse, kind="bias")
+    worse = dataclasses.replace(worse, furnace=by_samples.average, both=both.average)
+    if worse.grade is Grade.INVISIBLE and part != "pdf" and light.unseen.max() > 0.01:
+        row = int(np.argmax(light.unseen))
+        share, theta = percent(float(light.unseen[row])), float(directions.angles(light.wo[row])[0])
+        where = f"single samples hold more than {share} of the light, wo at {theta:.3g} degrees"
+        return dataclasses.replace(worse, kind="noise", where=where)
+    if subject.transmits and light is subject.memo.get("estimates") and worse.grade is Grade.INVISIBLE:
+        other = sampling_bias(subject, part, estimate(subject, "importance"))
+        if other.average > worse.average:
+            return dataclasses.replace(other, where=f"{other.where}, light tracing")
+    return worse
+
+
+def _of_power(subject: Subject) -> Estimates:
+    """Estimates of power, without the factor eta^2 of radiance."""
+    return estimate(subject, "importance") if subject.transmits else of_subject(subject)
+
+
+def gain_bias(subject: Subject) -> Bias:
+    """The power that is reflected beyond the incident power, as a share of the latter."""
+    light = _of_power(subject)
+    over = np.where(light.value > 1.0 + 5.0 * NEGLIGIBLE, light.value - 1.0, 0.0)
+    return summed(over, np.ones_like(over), light.wo, light.mass, "gained")
+
+
+def loss_bias(subject: Subject) -> Bias:
+    """The power that a subject which claims to reflect all of it, a lossless variant, loses."""
+    light = _of_power(subject)
+    lost = np.maximum(1.0 - light.value, 0.0)
+    return summed(-lost, np.ones_like(lost), light.wo, light.mass, "lost")

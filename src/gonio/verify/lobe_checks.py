@@ -1,0 +1,389 @@
+"""Checks of delta lobes: direction, index, radiance against power, the way back, Fresnel's equations, rotation, tint,
+float32 and derivatives. Each yields a `Miss` per kind of error; `laws/delta.py` makes a verdict of them.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..material import BSDF, binding, tree
+from ..ops import backend
+from . import directions, lobes
+from .forensics.factors import dielectric
+from .lobes import Lobes
+from .subject import Subject, guarded
+
+SINGLE = 2e-3  # error of float32
+SLOPES = 1e-4  # error of derivatives
+FORWARD = 1e-4  # share of light below which a lobe need not come back
+FLAT = 1e-3  # difference of an index from 1 that refracts nothing
+
+
+class Probe(NamedTuple):
+    """A subject, directions wo (N, 3), and its delta lobes for them, of radiance and of power."""
+
+    subject: Subject
+    wo: np.ndarray
+    radiance: Lobes
+    power: Lobes
+    seed: int
+
+    def lobes(self, part: Lobes) -> Iterator[tuple[np.ndarray, int, np.ndarray, np.ndarray]]:
+        """For each number n of a lobe: the rows of the directions that have one, n, and wo and wi of those."""
+        for n in range(part.valid.shape[1]):
+            rows = np.flatnonzero(part.valid[:, n])
+            if len(rows):
+                yield rows, n, self.wo[rows], part.wi[rows, n]
+
+
+class Miss(NamedTuple):
+    """One error.
+
+    size     relative, of the worst direction
+    text     the error in words
+    wo, wi   the worst direction and its lobe
+    average  over the directions that have the lobe; `share` of them off by more than a hundredth
+    cause    the probable mistake
+    """
+
+    size: float
+    text: str
+    wo: np.ndarray
+    wi: np.ndarray
+    average: float = 1.0
+    share: float = 1.0
+    cause: str = ""
+
+
+Misses: TypeAlias = Iterator[Miss]
+
+
+def _miss(off: np.ndarray, text: str, wo: np.ndarray, wi: np.ndarray, cause: str = "") -> Miss:
+    off = np.where(np.isnan(off), np.inf, off)
+    if not len(off):
+        return Miss(0.0, text, wo, wi)
+    row = int(np.argmax(off))
+    average, share = float(np.minimum(off, 1.0).mean()), float(np.mean(off > 0.01))
+    return Miss(float(off[row]), text, wo[row], wi[row], average, share, cause=cause)
+
+
+def _relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Largest difference over channels, relative to the larger brightest channel, (N,)."""
+    size = np.maximum(np.maximum(np.abs(a).max(1), np.abs(b).max(1)), 1e-6)
+    return np.asarray(np.abs(a - b).max(1) / size)
+
+
+def distinct(a: float, b: float) -> tuple[str, str]:
+    """Two numbers with as many digits as it takes to tell them apart, four at least."""
+    for digits in range(4, 18):
+        texts = f"{a:.{digits}g}", f"{b:.{digits}g}"
+        if texts[0] != texts[1]:
+            break
+    return texts
+
+
+# --------------------------------------------------------------------------- where a lobe goes
+
+
+def direction(probe: Probe) -> Misses:
+    """Directions are unit vectors, and refraction follows Snell's law with the lobe's own eta. Reflection off the
+    mirror direction, and transmission without refraction, are judged by the way back alone: gratings and corner cubes
+    have them."""
+    for rows, n, o, i in probe.lobes(probe.radiance):
+        eta = probe.radiance.eta[rows, n]
+        off = np.abs(np.linalg.norm(i, axis=1) - 1.0)
+        yield _miss(off, "the direction of a delta lobe is not a unit vector", o, i)
+        through = o[:, 2] * i[:, 2] < 0.0
+        refracted = through & (np.abs(eta - 1.0) > FLAT)
+        if refracted.any():
+            yield _snell(o, i, eta, refracted)
+        straight = through & ~refracted
+        if straight.any():
+            yield from _unstated_index(o, i, straight)
+        mirror = o * [-1.0, -1.0, 1.0]
+        # a grating's orders lie next to the mirror direction, and one of them in it
+        _, exact = lobes.along(lobes.rows_of(probe.radiance, rows), mirror)
+        # not about the normal, where all these and the way back to wo coincide
+        close = ~through & ~exact & (np.abs(i - mirror).max(1) < 0.1) & (np.hypot(o[:, 0], o[:, 1]) > 0.2)
+        yield _miss(np.abs(i - mirror).max(1) * close, "a lobe next to the mirror direction", o, i)
+
+
+def _snell(o: np.ndarray, i: np.ndarray, eta: np.ndarray, refracted: np.ndarray) -> Miss:
+    off = np.abs(i[:, :2] + o[:, :2] / eta[:, None]).max(1) * refracted
+    inverse = np.abs(i[:, :2] + o[:, :2] * eta[:, None]).max(1) * refracted
+    text, cause = "not refracted by Snell's law with the eta of the sample", ""
+    wrong = off > SINGLE
+    if wrong.any() and inverse[wrong].max() < SINGLE:
+        text += ", but with 1 / eta"
+        cause = "Snell's law holds with 1 / eta: refracted the wrong way, or `eta` is that of the other side?"
+    return _miss(off, text, o, i, cause)
+
+
+def _unstated_index(o: np.ndarray, i: np.ndarray, straight: np.ndarray) -> Misses:
+    """Samples with eta = 1 do not refract."""
+    sin_o, sin_i = np.hypot(o[:, 0], o[:, 1]), np.hypot(i[:, 0], i[:, 1])
+    usable = straight & (sin_o > 0.1) & (sin_i > 0.1)
+    index = sin_o[usable] / sin_i[usable]
+    if len(index) > 3 and np.ptp(index) < 1e-3 * index.mean() and abs(index.mean() - 1.0) > FLAT:
+        size = np.where(usable, abs(index.mean() - 1.0), 0.0)
+        text = f"refracted by an index of {index.mean():.4g}, with eta = 1 in the samples"
+        yield _miss(size, text, o, i, "`eta` of transmitted samples is left at 1?")
+
+
+def indices(probe: Probe) -> Misses:
+    """Reflection has eta = 1; eta from below is the inverse of that from above; a parameter that names the index agrees
+    with it."""
+    named = _named_index(probe.subject)
+    for rows, n, o, i in probe.lobes(probe.radiance):
+        eta = probe.radiance.eta[rows, n]
+        through = o[:, 2] * i[:, 2] < 0.0
+        yield _miss(np.abs(eta - 1.0) * ~through, "eta of a reflected sample is not 1", o, i)
+        above = np.where(o[:, 2] > 0.0, eta, 1.0 / np.where(eta > 0.0, eta, np.nan))[through]
+        if not len(above) or np.all(np.abs(above - 1.0) < FLAT):
+            continue  # nothing is transmitted, or without an index
+        off = np.zeros(len(o))
+        if named is not None:
+            off[through] = np.abs(above / named - 1.0)
+            stated, expected = distinct(float(above[np.argmax(np.abs(above / named - 1.0))]), named)
+            yield _miss(off, f"eta, from above, is {stated}, and {expected} by the parameters", o, i)
+        elif np.ptp(above) > FLAT * np.median(above):
+            off[through] = np.abs(above / np.median(above) - 1.0)
+            yield _miss(off, "eta from below is not the inverse of that from above", o, i)
+
+
+def _named_index(subject: Subject) -> float | None:
+    """The index below over that above, where a parameter of the material itself names it."""
+    names = subject.parameters
+    try:
+        if "eta" in names and names["eta"].kind == "float":
+            return float(subject.model.eta)
+        if "int_ior" in names:
+            return float(subject.model.int_ior) / float(getattr(subject.model, "ext_ior", 1.000277))
+    except TypeError:
+        pass
+    return None
+
+
+# --------------------------------------------------------------------------- the light that a lobe carries
+
+
+def modes(probe: Probe) -> Misses:
+    """Radiance is 1 / eta^2 times power in transmission, and equals it in reflection (Veach1997, 5.2)."""
+    if not probe.subject.transmits:
+        return
+    for rows, n, o, i in probe.lobes(probe.radiance):
+        eta = probe.radiance.eta[rows, n]
+        radiance, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
+        power, exists = lobes.along(lobes.rows_of(probe.power, rows), i)
+        through = o[:, 2] * i[:, 2] < 0.0
+        factor = np.where(through, eta**-2.0, 1.0)
+        off = _relative(radiance, power * factor[:, None]) * exists
+        row = int(np.argmax(off))
+        ratio, expected = distinct(float(radiance[row].mean() / max(power[row].mean(), 1e-12)), float(factor[row]))
+        verb = "transmits" if through[row] else "reflects"
+        text = f"{verb} {ratio} times as much radiance as power, {expected} expected (1 / eta^2)"
+        yield _miss(off, text, o, i, _power_of_index(radiance, power, eta, through & exists))
+
+
+def _power_of_index(radiance: np.ndarray, power: np.ndarray, eta: np.ndarray, usable: np.ndarray) -> str:
+    """The cause where radiance over power is one power of the index for all of transmission."""
+    if usable.sum() < 8 or np.all(np.abs(eta[usable] - 1.0) < FLAT):
+        return ""
+    ratio = radiance[usable].sum(1) / np.maximum(power[usable].sum(1), 1e-12)
+    for exponent, words in ((0.0, "is missing"), (2.0, "is inverted"), (-4.0, "is applied twice")):
+        if np.all(np.abs(ratio / eta[usable] ** exponent - 1.0) < 1e-3):
+            return f"radiance over power is {f'eta^{exponent:g}' if exponent else '1'}: the factor 1 / eta^2 {words}?"
+    return ""
+
+
+def way_back(probe: Probe) -> Misses:
+    """The lobe along wi, viewed from wi, leads back to wo and carries the same power."""
+    for rows, _, o, i in probe.lobes(probe.power):
+        there, _ = lobes.along(lobes.rows_of(probe.power, rows), i)
+        fine = np.isfinite(i).all(1) & (np.abs(np.linalg.norm(i, axis=1) - 1.0) < SINGLE) & (np.abs(i[:, 2]) > 1e-3)
+        fine &= there.max(1) > FORWARD
+        if not fine.any():
+            continue
+        o, i, there = o[fine], i[fine], there[fine]
+        back, exists = lobes.along(lobes.of(probe.subject, i, probe.seed, "importance"), o)
+        yield _miss(np.where(exists, 0.0, np.inf), "a lobe leads along wi, and none leads back from there", o, i)
+        off = _relative(there, back) * exists
+        row = int(np.argmax(off))
+        one_way, other_way = distinct(there[row].mean(), back[row].mean())
+        yield _miss(off, f"carries {one_way} of the power one way and {other_way} the other", o, i)
+
+
+def fresnel(probe: Probe) -> Misses:
+    """A material that names its index reflects by Fresnel's equations, or by Schlick's curve, times a constant."""
+    subject, wo, power = probe.subject, probe.wo, probe.power
+    index = _named_index(subject)
+    through = power.through(wo)
+    refracted = through & (np.abs(power.eta - 1.0) > FLAT)
+    if index is None or abs(index - 1.0) < FLAT or (through.any() and not refracted.any()):
+        return  # a thin slab transmits without refraction, and has another curve
+    if "delta" in subject.breaches:
+        return  # declared, as of a film: its reflectance does not depend on this index alone
+    cosine, ratio = np.abs(wo[:, 2]), np.where(wo[:, 2] > 0.0, index, 1.0 / index)
+    carried = {
+        "reflects": np.sum(power.carried * (power.valid & ~through)[..., None], axis=1),
+        "transmits": np.sum(power.carried * through[..., None], axis=1),
+    }
+
+    def against(curve: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        return {verb: _of_curve(carried[verb], c) for verb, c in (("reflects", curve), ("transmits", 1.0 - curve))}
+
+    exact, schlick = against(dielectric(cosine, ratio)), against(_schlick(cosine, ratio))
+    least = 1e-4 if subject.best == "float64" else 5e-3
+    if any(max(off.max() for off, _ in curve.values()) < least for curve in (exact, schlick)):
+        return
+    verb = max(exact, key=lambda verb: float(exact[verb][0].max()))
+    off, expected = exact[verb]
+    row = int(np.argmax(off))
+    channel = int(np.argmax(np.abs(carried[verb][row] - expected[row])))
+    cause = ""
+    for other, words in ((ratio**-1.0, "of the other side's index"), (ratio**2.0, "of the index squared")):
+        if max(off.max() for off, _ in against(dielectric(cosine, other)).values()) < 1e-4:
+            cause = f"it reflects by Fresnel's equations {words}?"
+    value, right = distinct(float(carried[verb][row, channel]), float(expected[row, channel]))
+    text = f"{verb} {value} of the light, where Fresnel's equations for eta = {index:.4g} give {right}"
+    worst = np.maximum(exact["reflects"][0], exact["transmits"][0])
+    yield _miss(worst, text, wo, wo * [-1.0, -1.0, 1.0], cause)
+
+
+def _of_curve(value: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The error of values (N, channels) against the nearest multiple of a curve (N,), relative to the largest, (N,);
+    and that multiple."""
+    size = float(np.sum(curve**2))
+    scale = value.T @ curve / size if size > 0.0 else np.zeros(value.shape[1])
+    most = np.maximum(np.abs(value).max(0), 1e-6)
+    expected = curve[:, None] * scale
+    return (np.abs(value - expected) / most).max(1), expected
+
+
+def _schlick(cosine: np.ndarray, eta: np.ndarray) -> np.ndarray:
+    """Schlick's curve, in the cosine on the side of the smaller index."""
+    r0 = ((eta - 1.0) / (eta + 1.0)) ** 2
+    sin2 = (1.0 - cosine**2) / eta**2
+    outer = np.where(eta < 1.0, np.sqrt(np.maximum(1.0 - sin2, 0.0)), cosine)
+    return np.where(sin2 >= 1.0, 1.0, r0 + (1.0 - r0) * (1.0 - outer) ** 5)
+
+
+def rotation(probe: Probe) -> Misses:
+    """Isotropic lobes turn with wo."""
+    if not probe.subject.isotropic:
+        return
+    angle = np.random.default_rng([probe.seed, 92]).uniform(0.0, 2.0 * np.pi, len(probe.wo))
+    rotated = lobes.of(probe.subject, directions.rotated(probe.wo, angle), probe.seed)
+    for rows, _, o, i in probe.lobes(probe.radiance):
+        carried, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
+        other, exists = lobes.along(lobes.rows_of(rotated, rows), directions.rotated(i, angle[rows]))
+        lost = np.where(exists | (carried.max(1) < FORWARD), 0.0, np.inf)
+        yield _miss(lost, "declared isotropic, but a turn of the view moves the lobe", o, i)
+        off = _relative(carried, other) * exists
+        yield _miss(off, "declared isotropic, but a turn of the view changes what the lobe carries", o, i)
+
+
+def tint(probe: Probe) -> Misses:
+    """The light of a lobe is affine in each albedo, unless values are declared not to be."""
+    if "linearity" in probe.subject.breaches:
+        return
+    for name, parameter in probe.subject.parameters.items():
+        if parameter.kind != "spectrum" or parameter.high != 1.0:
+            continue
+        low, high, middle = (
+            lobes.of(probe.subject.replace(**{name: v}), probe.wo, probe.seed) for v in (0.125, 0.875, 0.3125)
+        )
+        for rows, _, o, i in probe.lobes(middle):
+            a, b, c = (lobes.along(lobes.rows_of(part, rows), i)[0] for part in (low, high, middle))
+            yield _miss(_relative(c, 0.75 * a + 0.25 * b), f"the light of the lobe is not linear in {name}", o, i)
+
+
+def float32(probe: Probe) -> Misses:
+    """float32 has the same lobes with the same light; not within 3 degrees of grazing, where an edge may be near."""
+    rounded = lobes.of(probe.subject, probe.wo, probe.seed, precision="float32")
+    for rows, _, o, i in probe.lobes(probe.radiance):
+        exact, _ = lobes.along(lobes.rows_of(probe.radiance, rows), i)
+        single, exists = lobes.along(lobes.rows_of(rounded, rows), i)
+        matters = (np.abs(i[:, 2]) > 0.05) & (exact.max(1) > FORWARD)
+        yield _miss(np.where(exists | ~matters, 0.0, np.inf), "float32 has no such lobe", o, i)
+        off = _relative(single, exact) * (exists & matters)
+        yield _miss(np.where(off > SINGLE, off, 0.0), "float32 carries another share of the light than float64", o, i)
+
+
+# --------------------------------------------------------------------------- derivatives
+
+
+def derivatives(probe: Probe) -> Misses:
+    """d (weight x pdf) / d parameter by autodiff equals differences, at fixed random numbers."""
+    model = probe.subject.model
+    if not isinstance(model, BSDF) or probe.subject.stochastic:
+        return
+    dr, kind = backend.drjit(), backend.types("float64")
+    views = probe.wo[::3]
+    views = views[np.abs(views[:, 2]) > 0.1]
+    u = lobes.chosen(16, probe.seed)
+    many, numbers = np.repeat(views, len(u), axis=0), np.tile(u, (len(views), 1))
+    a, b = (backend.vector_of(w, 3, kind) for w in (many, numbers))
+    numeric = [
+        leaf
+        for leaf in tree.leaves(model)
+        if leaf.parameter.numeric and leaf.parameter.kind not in ("angle", "alpha") and np.ndim(leaf.value) <= 1
+    ]
+
+    def carried(own: dict[str, Any], shift: Any) -> tuple[Any, Any]:
+        """weight x pdf with parameters moved, each by its own share of a shift, and whether it is a delta sample."""
+        bound = model.bind(kind)
+        for path, much in own.items():
+            bound = binding.shift(bound, path, functools.partial(operator.add, much * shift))
+        s = guarded(model, "sample", lambda: bound.sample(a, b, "radiance"))
+        return kind.vec3(s[1]) * s[2], kind.bool(s[3]) & (s[2] > 0.0)
+
+    for leaf in numeric:
+        # all parameters are moved, the others by 0, so that one kernel serves for each of them
+        own = {one.path: dr.opaque(kind.float, float(one is leaf)) for one in numeric}
+        exact, lit = _autodiff(functools.partial(carried, own), len(many))
+        if not np.isfinite(exact).all():  # another parameter has no derivative, and 0 times NaN is NaN
+            exact, lit = _autodiff(functools.partial(carried, {leaf.path: own[leaf.path]}), len(many))
+        size = float(np.max(np.abs(np.asarray(leaf.value, float)))) or 1.0
+        off = _slope_error(exact, lit, functools.partial(carried, own), size)
+        text = f"the derivative by {leaf.path} of the light of the lobe differs from finite differences"
+        yield _miss(np.where(off > SLOPES, off, 0.0), text, many, many * [-1.0, -1.0, 1.0])
+
+
+Carried: TypeAlias = Callable[[Any], tuple[Any, Any]]  # of a shift: values, and whether they exist
+
+
+def _autodiff(carried: Carried, count: int) -> tuple[np.ndarray, Any]:
+    """Derivatives by the shift at 0, (N, 3), and whether the values exist."""
+    dr = backend.drjit()
+    delta = dr.opaque(backend.types("float64").float, 0.0)
+    dr.enable_grad(delta)
+    value, lit = carried(delta)
+    if not dr.grad_enabled(value):
+        return np.zeros((count, 3)), lit
+    dr.forward(delta)
+    return np.asarray(backend.to_numpy(dr.grad(value), count)), lit
+
+
+def _slope_error(exact: np.ndarray, lit: Any, carried: Carried, size: float) -> np.ndarray:
+    """Relative error of derivatives (N, 3) against differences, (N,); 0 where the values have an edge."""
+    dr, kind, count = backend.drjit(), backend.types("float64"), len(exact)
+    step = 1e-4 * size
+    ends = [carried(dr.opaque(kind.float, s * step)) for s in (-1.0, -0.5, 0.5, 1.0, 0.0)]
+    values = [np.broadcast_to(backend.to_numpy(v, count), (count, 3)) for v, _ in ends]
+    exists = [np.broadcast_to(backend.to_numpy(m, count), (count,)) for m in [lit, *(m for _, m in ends)]]
+    wide, narrow = ((values[3] - values[0]) / (2.0 * step), (values[2] - values[1]) / step)
+    before, after = (values[4] - values[1]) / (0.5 * step), (values[2] - values[4]) / (0.5 * step)
+    smooth = np.all(exists, axis=0) & np.all(np.abs(wide - narrow) <= 1e-3 * np.abs(narrow) + 1e-7 / size, axis=1)
+    differences = narrow + (narrow - wide) / 3.0
+    # a kink at the very value, as where black is clamped above 0: any slope between those of its sides is right
+    kink = np.abs(after - before) > 0.01 * (np.abs(after) + np.abs(before))
+    between = np.clip(exact, np.minimum(before, after), np.maximum(before, after))
+    differences = np.where(kink, between, differences)
+    floor = max(1e-3 * float(np.max(np.abs(differences[smooth]), initial=0.0)), 1e-6 / size)
+    return np.asarray((np.abs(exact - differences) / np.maximum(np.abs(differences), floor)).max(1) * smooth)
