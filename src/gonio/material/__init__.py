@@ -6,7 +6,7 @@ The materials themselves are in `gonio.materials`, one file each.
 from __future__ import annotations
 
 from ..errors import InputError, did_you_mean
-from .bsdf import BSDF, Breach, Microsurface, Preset, never
+from .bsdf import BSDF, Breach, Microsurface, Preset
 from .calling import method
 from .parameters import (
     Angle,
@@ -25,7 +25,7 @@ from .parameters import (
     spectrum,
     width,
 )
-from .sample import Sample
+from .sample import Sample, never
 
 __all__ = [
     "BSDF", "Angle", "Breach", "Colour", "Index", "Microsurface", "Number", "Parameter", "Preset", "Sample", "Width",

@@ -1,6 +1,6 @@
 """The bound copy of a material: every number a Dr.Jit value (or a symbol), ready for `eval`, `pdf` and `sample`.
 
-Binding makes each value an evaluated array of one entry, never a literal, so that a changed value compiles nothing.
+Binding makes each value an evaluated array of one entry a literal, so that a changed value compiles nothing.
 What follows from the parameters alone (`BSDF.derive`) is computed once on the bound copy and kept there.
 
 Copies are made in this file and nowhere else.

@@ -199,7 +199,7 @@ class BSDF(Material):
         pdf = self.pdf(wo, wi)
         valid = pdf > 0.0
         weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> tuple[Value, ...]:
@@ -433,11 +433,6 @@ def _folders() -> list[str]:
 
 
 BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), where="model")
-
-
-def never(like: Scalar) -> Mask:
-    """False for every ray."""
-    return like != like
 
 
 def _alike(x: object, y: object) -> bool:

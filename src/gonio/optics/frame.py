@@ -29,7 +29,7 @@ def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction
 
 def upright(like: Direction) -> Direction:
     """The surface normal, one for every ray of `like`."""
-    zero = 0.0 * like.z
+    zero = ops.zeros_like(like.z)
     return vec3(zero, zero, 1.0 + zero)
 
 

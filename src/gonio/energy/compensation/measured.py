@@ -28,6 +28,7 @@ from ...ops import (
     clamp,
     max_component,
     maximum,
+    ones_like,
     safe_div,
     sincos,
     sqrt,
@@ -78,7 +79,7 @@ class Measured(NamedTuple):
         return self.scale
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
-        return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
+        return where(lobe.above(wo, wi), ones_like(wi.z), 0.0)
 
     def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> float:
         return 1.0
@@ -95,7 +96,7 @@ class Measured(NamedTuple):
         return lobe.from_square(_read(self.inverse, u.y), u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        return 1.0 + 0.0 * wo.z
+        return ones_like(wo.z)
 
 
 def measured(base: BSDF) -> Measured:

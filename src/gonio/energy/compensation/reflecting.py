@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ...material import BSDF, Microsurface
 from ...material.parameters import pair_of
-from ...ops import backend, function, inset, lookup, maximum, minimum, sqr, sqrt, where
+from ...ops import backend, function, inset, lookup, maximum, minimum, ones_like, sqr, sqrt, where
 from ...ops.backend import Array
 from ...ops.types import Direction, Mode, Pair, Scalar, Spectrum
 from ...optics import frame
@@ -56,7 +56,7 @@ class Reflecting(NamedTuple):
         return self.whole
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
-        return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
+        return where(lobe.above(wo, wi), ones_like(wi.z), 0.0)
 
     def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> float:
         return 1.0
@@ -74,7 +74,7 @@ class Reflecting(NamedTuple):
         return lobe.from_square(mu2, u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        return 1.0 + 0.0 * wo.z
+        return ones_like(wo.z)
 
 
 class TwoWidths(NamedTuple):

@@ -9,7 +9,7 @@ and nothing is sampled, so a small sun leaves neither noise nor blotches. Where 
 averaged in blocks first, where it is narrower than a few texels the map is read between them.
 
 **Two errors.** That of the blur (each level against a sum over every texel of the map, finely divided) is far below
-what a screen shows. That of the split sum itself is not: it takes the lobe for round, never cut by the horizon, and
+what a screen shows. That of the split sum itself is not: it takes the lobe for round cut by the horizon, and
 masked alike all over. The manifest states both, for this environment.
 """
 

@@ -123,7 +123,7 @@ class NormalMap(BSDF):
     def _bent(self, wo: Direction) -> tuple[_Frame, ops.Mask]:
         """The leaning frame, bent until wo lies on its own side; whether it does."""
         n = self._normal()
-        side = where(wo.z < 0.0, -1.0, 1.0 + 0.0 * wo.z)
+        side = where(wo.z < 0.0, -1.0, ops.ones_like(wo.z))
         lacking = maximum(minimum(wo.z * side, LEAST) - dot(wo, n) * side, 0.0)
         n = n + wo * (side * lacking)
         n = n * ops.rsqrt(dot(n, n))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ops
-from ...material.bsdf import BSDF, InnerAlbedo, never
+from ...material.bsdf import BSDF, InnerAlbedo
 from ...material.calling import method
 from ...material.parameters import Colour, Number, choice, number, spectrum
 from ...material.sample import Sample
@@ -105,7 +105,7 @@ class Eon(BSDF):
         wi = where(u.x < _uniform_share(wo.z, r), vec3(across * cos, across * sin, u.y), lobe)
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """rho E_avg + rho_ms (1 - E_avg), the mean albedo."""

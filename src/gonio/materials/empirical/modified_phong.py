@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, never
+from ...material.bsdf import BSDF, Breach
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -71,7 +71,7 @@ class ModifiedPhong(BSDF):
         wi = where(u.x < self._share(wo), lobe, square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def white(self) -> Self:
         """Itself: no two albedos whose sum is 1 return all light."""

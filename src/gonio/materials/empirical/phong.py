@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import ops
 from ...errors import InputError
-from ...material.bsdf import BSDF, Breach, never
+from ...material.bsdf import BSDF, Breach
 from ...material.calling import method
 from ...material.parameters import Colour, Number, flag, number, spectrum
 from ...material.sample import Sample
@@ -104,7 +104,7 @@ class _Empirical(BSDF):
         wi = where(u.x < self._specular_share(wo), specular, diffuse)
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The diffuse part's colour."""

@@ -42,14 +42,14 @@ class AshikhminShirley(_Glossy):
 
     def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
         """F by name at a facet seen under cos_theta."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
         """diffuse / pi, or 28 diffuse / (23 pi) (1 - Rs) (1 - (1 - (n.o) / 2)^5) (1 - (1 - (n.i) / 2)^5)."""
         if not self.coupled:
             return self._lambert * (wi.z * inv_pi)
-        kept = 1.0 - self.specular * self.reflectance(1.0 + 0.0 * wo.z)
+        kept = 1.0 - self.specular * self.reflectance(ops.ones_like(wo.z))
         return self._lambert * kept * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
 
     @function

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...material.bsdf import Breach
 from ...material.parameters import Angle, Colour, Width, spectrum, width
-from ...ops import Direction, Scalar, Spectrum, function
+from ...ops import Direction, Scalar, Spectrum, function, zeros_like
 from ...optics import frame, fresnel
 from ...optics.masking.v_groove import v_groove
 from ...optics.ndf import distribution
@@ -43,7 +43,7 @@ class CookTorrance(_Glossy):
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F by name at a facet seen under cos_theta."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, zeros_like(self.eta))
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import ops
 from ...catalog import library
-from ...material.bsdf import BSDF, Breach, Preset, never
+from ...material.bsdf import BSDF, Breach, Preset
 from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.sample import Sample
@@ -101,7 +101,7 @@ class _Glossy(BSDF):
         wi = where(pick, self._lobe_sample(o, again), square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def white(self) -> Self:
         """Itself: the two parts are simply added, so no values of theirs return all light without any loss."""

@@ -41,7 +41,7 @@ class LowMicrofacet(_Glossy):
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F by name at a facet seen under cos_theta."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _fall(self, h: Direction) -> Scalar:

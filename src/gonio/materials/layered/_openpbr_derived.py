@@ -8,7 +8,7 @@ from ...energy.compensation.glass import Glass
 from ...energy.compensation.lobe import NOTHING, MissingEnergy
 from ...energy.compensation.missing import missing_energy
 from ...material import binding
-from ...ops import Pair, Scalar, Spectrum, maximum, mean, sqr, sqrt
+from ...ops import Pair, Scalar, Spectrum, maximum, mean, ones_like, sqr, sqrt, zeros_like
 from ...optics import fresnel
 from ...optics.fresnel import exact
 from ...optics.special import gauss
@@ -90,7 +90,7 @@ def derive(model: OpenPBR) -> Between:
     alpha = model._widths(rough, model.specular_roughness_anisotropy)
     coat_alpha = model._widths(model.coat_roughness, model.coat_roughness_anisotropy)
     ratio, eta, medium = model._indices()
-    zero, white = 0.0 * model.base_color, 1.0 + 0.0 * model.base_color
+    zero, white = zeros_like(model.base_color), ones_like(model.base_color)
     two = model._two_widths
     kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=model._masking)
     values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
@@ -101,7 +101,7 @@ def derive(model: OpenPBR) -> Between:
     over = [1.0 - E for E in tables.reflected_at_nodes(model.coat_roughness, model.coat_ior, model._masking)]
     over_hats, over = over[:HATS], over[HATS:]
     facets: tuple[Scalar, ...] = ()
-    returned = 0.0 * rough
+    returned = zeros_like(rough)
     if model._has("coat_weight"):
         facets = balanced(model, rough, over_hats)
         returned = returned_less(model, rough, ratio, over_hats, facets)
@@ -116,19 +116,19 @@ def derive(model: OpenPBR) -> Between:
     f_metal = white
     if model._has("base_metalness"):
         places = FEW_PLACES if filmed else PLACES
-        f_metal = averaged([model._metal(x + 0.0 * rough, eta, medium) for x in places])
+        f_metal = averaged([model._metal(x + zeros_like(rough), eta, medium) for x in places])
     sheet = None
     if model.geometry_thin_walled:
         f = [white * one for one in bare]
         if filmed:
             f = [one + more for one, more in zip(f, filmed, strict=True)]
-        both_ways = [model._sheet(x + 0.0 * rough, one, eta) for x, one in zip(PLACES, f, strict=True)]
+        both_ways = [model._sheet(x + zeros_like(rough), one, eta) for x, one in zip(PLACES, f, strict=True)]
         sheet = averaged([back for back, _ in both_ways]), averaged([on for _, on in both_ways])
     glass, other = None, None
     if model._refracts:
         kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=model._masking)
         clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
-        found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
+        found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": zeros_like(eta)}))
         assert isinstance(found, Glass), "a dielectric's"
         glass = found
         if filmed or model._has("coat_weight"):
@@ -159,10 +159,10 @@ def at_places(
     model: OpenPBR, ratio: Scalar, eta: Scalar, medium: Scalar
 ) -> tuple[list[Scalar], tuple[Spectrum, ...], Scalar]:
     """F of the bare dielectric at `PLACES`, what a film adds there, and the mean of that."""
-    cosines = [x + 0.0 * ratio for x in PLACES]
+    cosines = [x + zeros_like(ratio) for x in PLACES]
     bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
     if not model._has("thin_film_weight"):
-        return bare, (), 0.0 * ratio
+        return bare, (), zeros_like(ratio)
     filmed = tuple(
         (model._clear_film(cos, eta, medium) - one) * model.thin_film_weight
         for cos, one in zip(cosines, bare, strict=True)
@@ -174,10 +174,10 @@ def misses_otherwise(
     model: OpenPBR, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
 ) -> Other:
     """What that glass misses more or less than bare glass of index eta."""
-    white = 1.0 + 0.0 * model.base_color
+    white = ones_like(model.base_color)
     less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
     for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
-        cos = x + 0.0 * eta
+        cos = x + zeros_like(eta)
         known = exact.dielectric(cos, fresnel.cos_transmitted(cos, eta), eta)
         less.append(white * (one - known) + filmed[n] if filmed else white * (one - known))
         reflected = reflected + less[-1] * weight
@@ -198,7 +198,7 @@ def kept_at_nodes(model: OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[Sp
     E_of = tables.reflected_at_nodes(rough, ratio, model._masking)[HATS:]
     faced = tables.faced_at_nodes(rough, model._masking) if filmed else [()] * len(E_of)
     for E, shares in zip(E_of, faced, strict=True):
-        found.append(1.0 - covered(E + 0.0 * model.base_color, filmed, shares))
+        found.append(1.0 - covered(E + zeros_like(model.base_color), filmed, shares))
     return found
 
 
@@ -230,6 +230,6 @@ def returned_less(
     rows = tables.scattered_at_nodes(rough, model._masking)
     less = []
     for n, (E, one, w, row) in enumerate(zip(E_of, kept, facets, rows, strict=True)):
-        cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
+        cos = (n / (HATS - 1.0)) ** 2 + zeros_like(rough)
         less.append(E * (one - w * seen_by(cos, ratio, row, facets)) * tables.MEANS[n])
     return total_of(less)

@@ -56,7 +56,7 @@ def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[S
     """<w>: the mean factor of facets over what those of a dielectric send to a direction of a cosine. They reflect most
     where light grazes: shares of the light are white facets' times F of the facet half way between."""
     sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
-    met, total = 0.0 * cos, 0.0 * cos
+    met, total = ops.zeros_like(cos), ops.zeros_like(cos)
     for n, (share, w) in enumerate(zip(row, facets, strict=True)):
         other = (n / (HATS - 1.0)) ** 2
         half = safe_sqrt(0.5 + 0.5 * (other * cos - math.sqrt(1.0 - other * other) * sin))

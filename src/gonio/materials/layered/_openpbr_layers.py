@@ -16,10 +16,12 @@ from ...ops import (
     inv_pi,
     maximum,
     minimum,
+    ones_like,
     safe_sqrt,
     sqr,
     sqrt,
     where,
+    zeros_like,
 )
 from ...optics import fresnel
 from ...optics.fresnel import exact
@@ -55,12 +57,12 @@ def even(model: OpenPBR, w: Direction, coated: bool) -> Scalar:
     over azimuth is known: the factor makes a white base whole to second order.
     """
     rough = model.base_diffuse_roughness
-    lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": 1.0 + 0.0 * model.base_color, "roughness": rough})
-    sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), 0.0 * w.z
+    lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": ones_like(model.base_color), "roughness": rough})
+    sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), zeros_like(w.z)
     nodes = [x * x for x in NODES]
     for node, off in zip(nodes, model.derived.bent[coated], strict=True):
         slant = sin * (math.sqrt(1.0 - node * node) * inv_pi) * (1.0 / maximum(w.z, node) - 1.0)
-        twice = lost * (lobe._lost(direction_at(node + 0.0 * w.z)) / (GRAZING_LOSS - MEAN_LOSS))
+        twice = lost * (lobe._lost(direction_at(node + zeros_like(w.z))) / (GRAZING_LOSS - MEAN_LOSS))
         total = total + off * (slant + twice)
     return 1.0 / (1.0 + lobe._single() * rough * total)
 
@@ -89,7 +91,7 @@ def darkened(model: OpenPBR, cos: Scalar) -> Spectrum:
     rough = mix(1.0, model.specular_roughness, f0)
     K = mix(outer, broad, mix(rough, model.specular_roughness, model.base_metalness))
     body = mix(model.base_color * model.base_weight, model.subsurface_color, model.subsurface_weight)
-    body = mix(body, 1.0 + 0.0 * body, model.transmission_weight)
+    body = mix(body, ones_like(body), model.transmission_weight)
     metal = model.base_color * (model.base_weight * minimum(model.specular_weight, 1.0))
     E_b = mix(f0 + (1.0 - f0) * body, metal, model.base_metalness)
     return mix(1.0, (1.0 - K) / (1.0 - E_b * K), model.coat_darkening)
@@ -139,7 +141,7 @@ def through_coat(model: OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum])
 
 def past_layers(model: OpenPBR, w: Direction) -> Spectrum:
     """What coat and fuzz leave of light that passes them once, on its way in or out."""
-    left = 1.0 + 0.0 * model.base_color
+    left = ones_like(model.base_color)
     if model._has("coat_weight"):
         kept, tint, _, less = under(model, w)
         left = mix(1.0, tint * covered_less(kept, less, model._let_in(w)), model.coat_weight) * left

@@ -37,7 +37,7 @@ def shares_at(model: OpenPBR, wo: Direction) -> Shares:
     b = model.derived
     o = upper(wo)
     cos = maximum(o.z, 1e-4)
-    zero, M, T = 0.0 * cos, model.base_metalness, model.transmission_weight
+    zero, M, T = ops.zeros_like(cos), model.base_metalness, model.transmission_weight
     above = wo.z != 0.0 if model.geometry_thin_walled else wo.z > 0.0
     fuzz, coat, left = zero, zero, 1.0 + zero
     if model._has("fuzz_weight"):
@@ -62,7 +62,7 @@ def shares_at(model: OpenPBR, wo: Direction) -> Shares:
     refracted, back = zero, glossy
     near, far = lost * metal * M, zero
     if model.geometry_thin_walled and model._has("transmission_weight"):
-        on = model._sheet(cos, glossy + 0.0 * model.base_color, b.eta)
+        on = model._sheet(cos, glossy + ops.zeros_like(model.base_color), b.eta)
         back = mix(glossy, mean(on[0]), T)
         refracted = mean(on[1]) * (1.0 - M) * T
         near, far = near + lost * T * mean(on[0]), lost * T * mean(on[1])
@@ -131,7 +131,7 @@ def drawn(model: OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
     m = distribution("ggx").sample_visible(o, u.y, u.z, alpha)
     smooth = model._smooth(b.alpha, "specular_roughness")
     smooth_coat = model._smooth(b.coat_alpha, "coat_roughness") if model._has("coat_weight") else None
-    ideal, found = None, 0.0 * pick  # rays on smooth facets, and the probability of their direction
+    ideal, found = None, ops.zeros_like(pick)  # rays on smooth facets, and the probability of their direction
     for mirror, here, joins, share in (
         (smooth_coat, on_coat, on_coat | on_facets, shares.coat),
         (smooth, on_facets, on_coat | on_facets, shares.mirrored),
@@ -169,7 +169,7 @@ def drawn(model: OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
         density = where(ideal, found, density)
     density = where(valid, density, 0.0)
     weight = model._surface(wo, wi, mode, ideal) * safe_div(1.0, density)
-    one = 1.0 + 0.0 * density
+    one = ops.ones_like(density)
     eta = one
     if model._refracts:
         eta = where(wo.z * wi.z > 0.0, one, where(wo.z >= 0.0, b.eta, 1.0 / b.eta))

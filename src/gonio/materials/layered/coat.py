@@ -113,7 +113,7 @@ class Coat(BSDF):
     def _top(self) -> Dielectric:
         """The outside, as glass that only reflects."""
         kind = Dielectric(transmission=False, ndf=self.ndf, masking=self.masking)
-        one = 1.0 + 0.0 * self.absorption
+        one = ops.ones_like(self.absorption)
         return binding.bound_copy(kind, {"eta": self.index, "alpha": self.alpha, "rotation": None, "albedo": one})
 
     # ------------------------------------------------------------------ formulas
@@ -156,14 +156,14 @@ class Coat(BSDF):
 
     def _colour(self, w: Direction) -> Spectrum:
         """a: what colours the base's light, with each bounce."""
-        white = 1.0 + 0.0 * self.absorption
-        up = ops.vec3(0.0 * w.z, 0.0 * w.z, 1.0 + 0.0 * w.z)
+        white = ops.ones_like(self.absorption)
+        up = ops.vec3(ops.zeros_like(w.z), ops.zeros_like(w.z), ops.ones_like(w.z))
         return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
 
     def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
         """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
-        met = 1.0 + 0.0 * a if self.bounces == "white" else a
-        u = self._crossed() + 0.0 * a
+        met = ops.ones_like(a) if self.bounces == "white" else a
+        u = self._crossed() + ops.zeros_like(a)
         account, ends = self._account, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
         factors, rests = [], []
         for colour, left in zip(ops.channels(colour_place(met)), ops.channels(left_place(u)), strict=True):
@@ -175,7 +175,7 @@ class Coat(BSDF):
                     ops.lookup(account.rest, ops.inset(end, account.rest.shape[0]), *place)[0] for end in ends
                 )
                 rests.append(at_o * at_i * ops.safe_div(1.0, norm))
-        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else 0.0 * a
+        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else ops.zeros_like(a)
         return ops.of_channels(a, factors), rest
 
     @method
@@ -202,10 +202,10 @@ class Coat(BSDF):
         through = where(smooth, self._sharp(wo), 1.0 - reflected)
         reflected = where(smooth, sharp, reflected)
         inner = self._inside(wo)
-        tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
+        tint = clamp(self.base.tint(inner) * ops.ones_like(self.absorption), 0.0, 1.0)
         below = through * mean(self._left(inner) * tint) + 2.0 * beyond
         under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
-        cosine = 0.0 * even if self._mirror else even
+        cosine = ops.zeros_like(even) if self._mirror else even
         return ops.vec2(under, cosine)
 
     @method
@@ -215,7 +215,7 @@ class Coat(BSDF):
         above = (wo.z > 0.0) & (wi.z > 0.0)
         top = self._top.pdf(wo, wi)
         if self._mirror:
-            return 0.0 * top
+            return ops.zeros_like(top)
         o, i = self._inside(wo), self._inside(wi)
         base = self.base.pdf(o, i) * wi.z / (sqr(self.index) * maximum(i.z, frame.TINY))
         below = shares.y * wi.z * inv_pi + (1.0 - shares.y) * base
@@ -253,7 +253,7 @@ class Coat(BSDF):
             weight = where(from_base, s_base.weight * self._bounced(wo, o), weight)
             weight = where(from_base, weight * ops.safe_div(1.0, shares.x), weight)
         pdf = where((wo.z > 0.0) & (wi.z > 0.0), where(delta, ideal, density), 0.0)
-        return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), 1.0 + 0.0 * pdf)
+        return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), ops.ones_like(pdf))
 
     @function
     def _bounced(self, wo: Direction, inner: Direction) -> Spectrum:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple, Self
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, never
+from ...material.bsdf import BSDF, Breach
 from ...material.calling import method
 from ...material.parameters import Angle, Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -113,7 +113,7 @@ class Disney(BSDF):
         """The base colour over its mean, 1 of black."""
         level = mean(self.base_color)
         some = level > 0.0
-        return where(some, self.base_color / where(some, level, 1.0), 1.0 + 0.0 * self.base_color)
+        return where(some, self.base_color / where(some, level, 1.0), ops.ones_like(self.base_color))
 
     @function
     def _normal_reflectance(self) -> Spectrum:
@@ -144,7 +144,7 @@ class Disney(BSDF):
         f0 = self._normal_reflectance()
         four = 4.0 * wo.z
         specular = (f0 + (1.0 - f0) * at_h) * (ndf.D(m, alpha) * g / four)
-        satin = vec2(COAT_WIDTH + 0.0 * cos, COAT_WIDTH + 0.0 * cos)
+        satin = vec2(COAT_WIDTH + ops.zeros_like(cos), COAT_WIDTH + ops.zeros_like(cos))
         coat_g = masking.masking_shadowing("smith-separable", ndf, wo, wi, h, satin)
         strength = (0.01 + 0.24 * at_h) * self.clearcoat  # a quarter of Fresnel's
         coat = self._coat_density(h) * coat_g * strength / four
@@ -153,7 +153,7 @@ class Disney(BSDF):
             self.base_color * (_mix(diffuse, below, self.subsurface) * body * inv_pi),
             specular,
             tint * (at_h * self.sheen * body),
-            coat + 0.0 * self.base_color,
+            coat + ops.zeros_like(self.base_color),
         )
 
     @method
@@ -209,7 +209,7 @@ class Disney(BSDF):
         wi = where(u.x < shares.x, specular, where(on_coat, coat, square_to_cosine_hemisphere(u.y, u.z)))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base colour and F0."""

@@ -47,7 +47,7 @@ class _Slabs(OpenPBR):
 
     def _indices(self) -> tuple[Scalar, Scalar, Scalar]:
         eta = ops.maximum(self.specular_ior, 1.001)
-        return eta, eta, 1.0 + 0.0 * eta
+        return eta, eta, ops.ones_like(eta)
 
 
 class DisneyBSDF(BSDF):
@@ -133,7 +133,7 @@ class DisneyBSDF(BSDF):
     def _slabs(self) -> _Slabs:
         """The slabs that these dials stand for."""
         kind, colour = self._kind(), self.base_color
-        one, white = 1.0 + 0.0 * self.roughness, 1.0 + 0.0 * colour
+        one, white = ops.ones_like(self.roughness), ops.ones_like(colour)
         most = max_component(colour)
         tint = where(most > 0.0, colour / where(most > 0.0, most, 1.0), white)
         # alpha r^2 / a and r^2 a, a^2 = 1 - .9 anisotropic: the same ratio, and the roughness whose squares add up so
@@ -155,13 +155,13 @@ class DisneyBSDF(BSDF):
             "specular_ior": self.eta,
             "transmission_weight": self.spec_trans,
             "transmission_color": colour if self.thin else ops.safe_sqrt(colour),
-            "subsurface_weight": one if self.thin else 0.0 * one,
+            "subsurface_weight": one if self.thin else ops.zeros_like(one),
             "subsurface_color": colour,
             "subsurface_scatter_anisotropy": self.diff_trans - 1.0,
             "coat_weight": STRENGTH * self.clearcoat,
             "coat_roughness": sqrt(SATIN + (GLOSS - SATIN) * self.clearcoat_gloss),
             "coat_ior": COAT_INDEX * one,
-            "coat_darkening": 0.0 * one,
+            "coat_darkening": ops.zeros_like(one),
             "fuzz_weight": self.sheen * (1.0 - self.metallic),
             "fuzz_color": 1.0 + (tint - 1.0) * self.sheen_tint,
         }
@@ -221,7 +221,7 @@ class DisneyBSDF(BSDF):
             return None
         if not self.is_bound:
             return self.bind(backend.types("float64")).interior
-        return Interior(self._slabs()._indices()[1], 0.0 * self.base_color, 0.0 * self.eta)
+        return Interior(self._slabs()._indices()[1], ops.zeros_like(self.base_color), ops.zeros_like(self.eta))
 
     def tint(self, wo: Direction) -> Spectrum:
         """The slabs' colours."""

@@ -310,14 +310,14 @@ class OpenPBR(BSDF):
     @function
     def _clear_film(self, cos: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
         """R of the film over the dielectric."""
-        white = 1.0 + 0.0 * self.base_color
+        white = ops.ones_like(self.base_color)
         # one value for all channels, so that compilers do the work for one
         alike = ops.of_channels(white, [eta / medium] * len(ops.channels(white)))
         return self._film(cos, alike, None, medium)
 
     def _glossy(self, cos: Scalar, ratio: Scalar, eta: Scalar, medium: Scalar) -> Spectrum:
         """F of the dielectric from outside, without its tint."""
-        bare = (1.0 + 0.0 * self.base_color) * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
+        bare = ops.ones_like(self.base_color) * exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio)
         if not self._has("thin_film_weight"):
             return bare
         return mix(bare, self._clear_film(cos, eta, medium), self.thin_film_weight)
@@ -359,7 +359,7 @@ class OpenPBR(BSDF):
 
     def _kept_below(self, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
         """The same by what follows from the parameters."""
-        E = tables.reflected(cos, rough, ratio, self._masking) + 0.0 * self.base_color
+        E = tables.reflected(cos, rough, ratio, self._masking) + ops.zeros_like(self.base_color)
         return 1.0 - covered(E, filmed, tables.faced(cos, rough, self._masking) if filmed else ())
 
     @property
@@ -375,9 +375,9 @@ class OpenPBR(BSDF):
 
     def _interface(self) -> Dielectric:
         """The geometry of refraction at the base's facets; how much goes that way is said elsewhere."""
-        b, zero = self.derived, 0.0 * self.base_color
+        b, zero = self.derived, ops.zeros_like(self.base_color)
         kind = Dielectric(alpha=(0.1, 0.2) if self._two_widths else 0.1, masking=self._masking)
-        clear = {"rotation": None, "albedo": 1.0 + zero, "absorption": zero, "priority": 0.0 * b.eta}
+        clear = {"rotation": None, "albedo": 1.0 + zero, "absorption": zero, "priority": ops.zeros_like(b.eta)}
         return binding.bound_copy(kind, {"eta": b.eta, "alpha": b.alpha, **clear})
 
     def _pair(self, wo: Direction, wi: Direction) -> Sides:
@@ -397,7 +397,7 @@ class OpenPBR(BSDF):
     def _diffuse(self, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
         """What the body under the dielectric reflects and, of a thin wall, lets through, times cos theta_i."""
         b = self.derived
-        white = 1.0 + 0.0 * self.base_color
+        white = ops.ones_like(self.base_color)
         values = {"roughness": self.base_diffuse_roughness}
         base = (
             binding.bound_copy(Eon(), {**values, "albedo": self.base_color}).eval(pair.wo, pair.wi) * self.base_weight
@@ -407,11 +407,11 @@ class OpenPBR(BSDF):
         if self._bends:
             dimmed = dimmed * (layers.even(self, pair.wo, False) * layers.even(self, pair.wi, False))
         if not self._has("subsurface_weight"):
-            return base * dimmed, 0.0 * white
+            return base * dimmed, ops.zeros_like(white)
         S = self.subsurface_weight
         if not self.geometry_thin_walled:
             below = binding.bound_copy(Eon(), {**values, "albedo": self.subsurface_color}).eval(pair.wo, pair.wi)
-            return mix(base, below, S) * dimmed, 0.0 * white
+            return mix(base, below, S) * dimmed, ops.zeros_like(white)
         even = binding.bound_copy(Eon(), {**values, "albedo": white}).eval(pair.wo, pair.wi)
         half, g = even * self.subsurface_color * (0.5 * S), self.subsurface_scatter_anisotropy
         return (base * (1.0 - S) + half * (1.0 - g)) * dimmed, half * (1.0 + g) * dimmed
@@ -428,7 +428,7 @@ class OpenPBR(BSDF):
         cos = abs(wi.z) * lost.radiance(wo, wi, mode)
         if other is None:
             bare = lost.at(wo) * lost.at(wi) * lost.over_average(wi) * lost.share(wo, wi)
-            return (1.0 + 0.0 * self.base_color) * (bare * cos)
+            return ops.ones_like(self.base_color) * (bare * cos)
         into = where(wo.z > 0.0, other.into, other.out)
         share = where(wo.z * wi.z > 0.0, 1.0 - into, into)
         level = where(wi.z > 0.0, other.thin, other.dense)
@@ -463,7 +463,7 @@ class OpenPBR(BSDF):
         pair = self._pair(wo, wi)
         o, i = pair.wo, pair.wi
         M, T = self.base_metalness, self.transmission_weight
-        zero = 0.0 * self.base_color * o.z
+        zero = ops.zeros_like(self.base_color) * o.z
         h, cos = facet(o, i)
         smooth = self._smooth(b.alpha, "specular_roughness")
         facets = lobe_value(self._facets(o, i, h, b.alpha), smooth, ideal)
@@ -532,7 +532,7 @@ class OpenPBR(BSDF):
     ) -> tuple[Spectrum, Spectrum, Spectrum]:
         """(F, what glass reflects, what it lets through) of a pair of directions, from either side."""
         b, glass, T = self.derived, self._interface(), self.transmission_weight
-        white, above = 1.0 + 0.0 * self.base_color, wo.z > 0.0
+        white, above = ops.ones_like(self.base_color), wo.z > 0.0
         eta = glass._relative_eta(wo)
         at = glass._facet(wo, wi, eta)
         # F is a matter of the cosine outside, wherever light comes from
@@ -601,7 +601,7 @@ class OpenPBR(BSDF):
         some = self.transmission_depth > 0.0
         colour = maximum(self.transmission_color, 1e-6)
         loss = where(some, -log(colour) / where(some, self.transmission_depth, 1.0), 0.0)
-        return Interior(self._indices()[1], loss, 0.0 * self.transmission_depth)
+        return Interior(self._indices()[1], loss, ops.zeros_like(self.transmission_depth))
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base's colours under a cosine."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ... import ops
-from ...material import BSDF, Breach, Sample, file, method, never
+from ...material import BSDF, Breach, Sample, file, method
 from ...measure import SAMPLE, names_table, read
 from ...measure.tables.base import Measurement, above
 from ...ops import Direction, Mode, Scalar, Spectrum, where
@@ -89,4 +89,4 @@ class Measured(BSDF):
         pdf = where(above(wo, wi), pdf, 0.0)
         value = self.table.value(wo, wi)
         weight = where(pdf > 0.0, value * ops.safe_div(1.0, pdf), 0.0)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)

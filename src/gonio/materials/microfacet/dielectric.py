@@ -13,7 +13,7 @@ from ...material.calling import method
 from ...material.parameters import Angle, Colour, Index, Number, Width, flag, index, number, spectrum
 from ...material.polarization import Polarized
 from ...material.sample import Sample
-from ...ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
+from ...ops import abs, backend, dot, fma, function, maximum, ones_like, rsqrt, safe_div, sqr, where, zeros_like
 from ...ops.types import Direction, Mask, Mode, Pair, Scalar, Spectrum
 from ...optics import frame, fresnel, indices, masking
 from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass, refracted
@@ -108,7 +108,7 @@ class Dielectric(microfacet._Microfacet):
         alpha, smooth = self._widths()
         dot_o, dot_i = dot(wo, m), dot(wi, m)
         reflects = wo.z * wi.z > 0.0
-        spread = 0.25 + 0.0 * dot_o
+        spread = 0.25 + zeros_like(dot_o)
         if self.transmission:
             # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which keeps its digits where eta is near 1
             thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
@@ -150,7 +150,7 @@ class Dielectric(microfacet._Microfacet):
 
     def _share(self, f: Scalar) -> Scalar:
         """Probability of choosing reflection."""
-        return f if self.transmission else 1.0 + 0.0 * f
+        return f if self.transmission else ones_like(f)
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """albedo F or 1 - F of the lobe over the probability with which it is chosen, which is that where both are."""
@@ -211,7 +211,7 @@ class Dielectric(microfacet._Microfacet):
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
-        through = 1.0 - f if self.transmission else 0.0 * f
+        through = 1.0 - f if self.transmission else zeros_like(f)
         ideal = where(reflects, f, through if mode == "importance" else through / sqr(eta))
         value = where(delta, self.albedo * ideal, self.eval(wo, wi, mode))
         back, on = self._polarization(cos_o, cos_i, eta)
@@ -265,7 +265,7 @@ class Dielectric(microfacet._Microfacet):
 
     def normal_reflectance(self) -> Spectrum:
         """F at normal incidence, times the albedo."""
-        one = 1.0 + 0.0 * self.eta
+        one = ones_like(self.eta)
         return self.reflectance(one, one, self.eta) * self.albedo
 
     def mean_reflectance(self, average: str = "exact") -> Scalar:

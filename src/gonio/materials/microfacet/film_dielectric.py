@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...material.bsdf import Breach, InnerAlbedo, Microsurface
 from ...material.parameters import Colour, Number, choice, number, spectrum
-from ...ops import Mask, Scalar, Spectrum, abs, function, mean, safe_div, sqr, where
+from ...ops import Mask, Scalar, Spectrum, abs, function, mean, ones_like, safe_div, sqr, where, zeros_like
 from ...optics import fresnel
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel import film
@@ -43,9 +43,9 @@ class FilmDielectric(Dielectric):
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
         """F of the film at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
-        white = 1.0 + 0.0 * self.albedo
+        white = ones_like(self.albedo)
         if self.fresnel == "one":
-            return white * (1.0 + 0.0 * cos_o)
+            return white * ones_like(cos_o)
         found = film.reflectance(where(self._inside(eta), cos_t, cos_o), self._film())
         return where(cos_t > 0.0, found, white)
 
@@ -54,11 +54,11 @@ class FilmDielectric(Dielectric):
         return (eta - 1.0) * (self.eta - 1.0) < 0.0
 
     def _film(self) -> film.Film:
-        zero = 0.0 * self.albedo
+        zero = zeros_like(self.albedo)
         return film.Film(zero + self.eta, zero, self.film_eta, self.thickness, self.form, self.wavelengths)
 
     def _share(self, f: Spectrum) -> Scalar:  # type: ignore[override]
-        return mean(f) if self.transmission else 1.0 + 0.0 * mean(f)
+        return mean(f) if self.transmission else ones_like(mean(f))
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """The lobes are chosen by their mean colours."""
@@ -84,7 +84,7 @@ class FilmDielectric(Dielectric):
         size = 1.0 / (sqr(through.c) + sqr(through.s) + 1e-12)
         cos2, sin2 = (sqr(through.c) - sqr(through.s)) * size, 2.0 * through.c * through.s * size
         turned = Diattenuation(back.d, back.c * cos2 + back.s * sin2, back.c * sin2 - back.s * cos2)
-        total, white = reflected_by_glass(cos_o, eta), 1.0 + 0.0 * self.albedo
+        total, white = reflected_by_glass(cos_o, eta), ones_like(self.albedo)
 
         def chosen(place: int) -> Spectrum:
             return where(cos_t > 0.0, where(inside, turned[place], back[place]), white * total[place])
@@ -99,8 +99,8 @@ class FilmDielectric(Dielectric):
     def mean_reflectance(self, average: str = "exact") -> Spectrum:  # type: ignore[override]
         """From outside; the integral of F, whose rule of ten angles follows films up to about 1 um."""
         if self.fresnel == "one":
-            return 1.0 + 0.0 * self.albedo
-        one = 1.0 + 0.0 * self.film_eta
+            return ones_like(self.albedo)
+        one = ones_like(self.film_eta)
         return mean_over_angles(lambda mu: film.reflectance(mu * one, self._film()))
 
     def known_albedo(

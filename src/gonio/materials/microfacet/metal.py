@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from ...material.bsdf import Breach
 from ...material.parameters import Angle, Colour, Width, choice, spectrum
-from ...ops import Scalar, Spectrum, function
+from ...ops import Scalar, Spectrum, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel.f82 import GRAZING, f82
 from ...optics.fresnel.schlick import schlick
@@ -44,7 +44,7 @@ class Metal(_Reflector):
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F times albedo, at a facet seen under cos_theta."""
         if self.fresnel == "one":
-            return self.albedo * (1.0 + 0.0 * cos_theta)
+            return self.albedo * ones_like(cos_theta)
         return self.albedo * self._curve(cos_theta)
 
     def _curve(self, cos_theta: Scalar | float) -> Spectrum:
@@ -53,5 +53,5 @@ class Metal(_Reflector):
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
         """The curve's integral, whatever fit is asked for."""
         if self.fresnel == "one":
-            return 1.0 + 0.0 * self.r0
+            return ones_like(self.r0)
         return mean_over_angles(self._curve)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ...material.calling import method
 from ...material.parameters import Angle, Colour, Width
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, safe_div, where
+from ...ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, ones_like, safe_div, where
 from ...optics import frame, masking
 from ...optics.ndf import distribution
 from ...optics.roughness import widths
@@ -65,7 +65,7 @@ class _Reflector(microfacet._Microfacet):
         mirrors = smooth & _above(wo, turned)
         weight = self.reflectance(abs(dot(wo, m))) * where(mirrors, 1.0, facets)
         pdf = where(mirrors, 1.0, where(lit, density, 0.0))
-        return Sample(wi, weight, pdf, mirrors, 1.0 + 0.0 * pdf)
+        return Sample(wi, weight, pdf, mirrors, ones_like(pdf))
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Terms:
@@ -81,7 +81,7 @@ class _Reflector(microfacet._Microfacet):
 
     def normal_reflectance(self) -> Spectrum:
         """F at normal incidence."""
-        return self.reflectance(1.0 + 0.0 * self.alpha.x)
+        return self.reflectance(ones_like(self.alpha.x))
 
 
 def _above(wo: Direction, wi: Direction) -> Mask:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, InnerAlbedo, never
+from ...material.bsdf import BSDF, Breach, InnerAlbedo
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -92,7 +92,7 @@ class Sheen(BSDF):
         wi = frame.rotate_back(wi * ops.rsqrt(maximum(dot(wi, wi), frame.TINY)), frame.azimuth(wo))
         pdf = self._density(lobe, wo, wi)
         weight = self.albedo * where(pdf > 0.0, lobe.R, 0.0)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """albedo R."""
@@ -111,5 +111,5 @@ class Sheen(BSDF):
 @lru_cache(maxsize=1)
 def _table() -> ops.Table:
     """A, B and R by roughness and mu."""
-    text = (Path(__file__).parent / "published" / "zeltner2022.json").read_text()
+    text = Path(__file__).with_name("zeltner2022.json").read_text()
     return ops.Table("sheen", np.array(json.loads(text)["coefficients"]))

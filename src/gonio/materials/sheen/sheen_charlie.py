@@ -57,7 +57,7 @@ class SheenCharlie(BSDF):
         """exp L(mu) below mu = 1/2, exp(2 L(1/2) - L(1 - mu)) above."""
         low = mu < 0.5
         at = self._exponent(where(low, mu, 1.0 - mu))
-        return exp(where(low, at, 2.0 * self._exponent(0.5 + 0.0 * mu) - at))
+        return exp(where(low, at, 2.0 * self._exponent(0.5 + ops.zeros_like(mu)) - at))
 
     @function
     def _exponent(self, x: Scalar) -> Scalar:

@@ -32,6 +32,7 @@ from ...ops import (
     sqr,
     sqrt,
     where,
+    zeros_like,
 )
 from ...ops.types import Value
 from .. import colour
@@ -261,7 +262,7 @@ def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
 def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
     """The colour of R under daylight, summed over `NODES`."""
     mixing = WEIGHTS if len(channels(eta)) == 3 else np.tile((WEIGHTS @ colour.LUMINANCE)[:, None], 3)
-    seen = 0.0 * eta
+    seen = zeros_like(eta)
     for nm, (red, green, blue) in zip(NODES.tolist(), mixing.tolist(), strict=True):
         seen = seen + _node(cos_i, eta, k, film_eta, thickness, nm, red, green, blue)
     # colours that no three lights mix would be more than all, or less than nothing
@@ -444,7 +445,7 @@ def _through(
 ) -> Band:
     """Through a curve that is a sum of bells, each height, place and variance."""
     film = faces(cos_i, eta, k, film_eta, thickness)
-    mean, wave = 0.0 * cos_i, 0.0 * cos_i
+    mean, wave = zeros_like(cos_i), zeros_like(cos_i)
     trips: list[Amplitude] = []  # once through the film and back, without the way
     sizes: list[Scalar] = []
     for number, top in enumerate(film.top):

@@ -101,7 +101,7 @@ class Beckmann(Stretched):
         rise = gauss * facing
         x = where(rise > 1e-3, x - (0.5 * (1.0 + b) + 0.5 * tan_v * gauss - target) / maximum(rise, 1e-3), x)
         y = erfinv(clamp(2.0 * u2 - 1.0, -B_LIMIT, B_LIMIT))
-        return vec3(sin_phi * y - cos_phi * x, -sin_phi * x - cos_phi * y, 1.0 + 0.0 * x)
+        return vec3(sin_phi * y - cos_phi * x, -sin_phi * x - cos_phi * y, ops.ones_like(x))
 
 
 def _sine_and_cotangent(v: Direction) -> tuple[Scalar, Scalar]:
