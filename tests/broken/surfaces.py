@@ -12,7 +12,7 @@ from gonio.optics import frame, warp
 
 
 class RightDiffuse(BSDF):
-    """The sound one: albedo / pi, with the fall-back's cosine sampling."""
+    """The sound one: albedo / pi, sampled by the cosine."""
 
     caught_by: ClassVar[str] = ""
 
@@ -27,6 +27,9 @@ class RightDiffuse(BSDF):
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+    def sample(self, wo: Any, u: Any, mode: Any = "radiance") -> Any:
+        return self.sample_cosine(wo, u, mode)
 
 
 class NoCosine(RightDiffuse):

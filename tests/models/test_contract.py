@@ -297,3 +297,12 @@ def test_a_part_of_a_model_does_not_take_its_bases_name() -> None:
         pass
 
     assert _Facets.name == "" and go.model("conductor") is go.Conductor
+
+
+@pytest.mark.parametrize(("written", "missing"), [("pdf", "sample"), ("sample", "pdf")])
+def test_one_of_pdf_and_sample_alone_is_an_error_that_names_the_other(written: str, missing: str) -> None:
+    methods = {"eval": go.Lambert.eval, written: getattr(go.Lambert, written)}
+    with pytest.raises(InputError, match=f"Half has `{written}` and no `{missing}`") as error:
+        type("Half", (go.BSDF,), methods)
+    assert "lambert.py, line " in str(error.value) and f"write `{missing}` too, or neither" in str(error.value)
+    type("_Half", (go.BSDF,), methods)  # a part of materials, which may write the rest

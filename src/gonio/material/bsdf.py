@@ -18,6 +18,7 @@ values, or symbols while recording. Callers hand over NumPy arrays, lists or Dr.
 from __future__ import annotations
 
 import html
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -144,6 +145,7 @@ class BSDF(Material):
                 setattr(cls, formula, method(own[formula]))
         cls.derives = cls.derive is not Material.derive
         cls.has_terms = cls.terms is not BSDF.terms
+        _check_pair(cls)
         cls.guided = cls.pdf is BSDF.pdf and cls.sample is BSDF.sample and cls.eval is not BSDF.eval
         dataclass(frozen=True, eq=False, repr=False)(cls)
         cls._declared = declared(cls)  # on the class, and gone with it when a user's file is loaded anew
@@ -177,25 +179,28 @@ class BSDF(Material):
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes.
 
-        Here, where `sample` is not written either: that of a guide found from `eval` (`gonio.material.guide`).
+        Here that of a guide found from `eval` (`gonio.material.guide`). A class that writes one of `pdf` and `sample`
+        must write the other.
         """
-        if self.guided:
-            return guide_search.guide_of(self.plain).pdf(self, wo, wi)
-        same_side = wo.z * wi.z > 0.0
-        return ops.where(same_side, ops.abs(wi.z) * ops.inv_pi, 0.0)
+        return guide_search.guide_of(self.plain).pdf(self, wo, wi)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """Choose wi for wo.
 
-        u  three numbers in [0, 1) a ray, (N, 3): the first picks the lobe, the others the direction
-        Here: by a guide found from `eval`; where `pdf` is written, cosine sampling on wo's side.
+        u  three numbers in [0, 1) per ray, (N, 3): the first picks the lobe, the others the direction
+        Here by a guide found from `eval`.
         """
-        if self.guided:
-            wi = guide_search.guide_of(self.plain).draw(self, wo, u)
-        else:
-            local = warp.square_to_cosine_hemisphere(u.y, u.z)
-            wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
+        wi = guide_search.guide_of(self.plain).draw(self, wo, u)
+        return self._weighted(wo, wi, mode)
+
+    def sample_cosine(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """A `sample` for classes whose `pdf` is |cos theta_i| / pi on wo's side: the cosine-weighted hemisphere."""
+        local = warp.square_to_cosine_hemisphere(u.y, u.z)
+        return self._weighted(wo, ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z)), mode)
+
+    def _weighted(self, wo: Direction, wi: Direction, mode: Mode) -> Sample:
+        """The sample of a direction chosen by `pdf`."""
         pdf = self.pdf(wo, wi)
         valid = pdf > 0.0
         weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)
@@ -433,6 +438,21 @@ def _folders() -> list[str]:
 
 
 BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), where="model")
+
+
+def _check_pair(cls: type[BSDF]) -> None:
+    """Raise InputError for a class with `pdf` or `sample` alone: the other would be that of another density. A class
+    whose name starts with an underscore is a part of materials, which may leave the other to them."""
+    written = {"pdf": cls.pdf is not BSDF.pdf, "sample": cls.sample is not BSDF.sample}
+    if cls.__name__.startswith("_") or len(set(written.values())) == 1:
+        return
+    here, missing = sorted(written, key=lambda name: not written[name])
+    code = inspect.unwrap(getattr(cls, here)).__code__
+    hint = f"write `{missing}` too, or neither: a guide is then found from `eval`"
+    if missing == "sample":
+        hint += "; where pdf is |cos theta_i| / pi, `sample` is `return self.sample_cosine(wo, u, mode)`"
+    what = f"{cls.__name__} has `{here}` and no `{missing}`, which must be of the same density"
+    raise InputError(what, f"{code.co_filename}, line {code.co_firstlineno}", hint)
 
 
 def _alike(x: object, y: object) -> bool:

@@ -122,6 +122,9 @@ class Lottery(go.BSDF):
     def pdf(self, wo, wi):
         return ops.where(above(wo, wi), wi.z * ops.inv_pi, 0.0)
 
+    def sample(self, wo, u, mode="radiance"):
+        return self.sample_cosine(wo, u, mode)
+
 
 class BouncingLacquer(go.BSDF):
     """A smooth lacquer over a matte base, with all the light that is thrown back and forth between them."""

@@ -10,6 +10,7 @@ import numpy as np
 from ...material.bsdf import BSDF, Breach
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
+from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, function, inv_pi, maximum, sqr, where
 
 
@@ -58,6 +59,11 @@ class OrenNayar(BSDF):
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """cos theta_i / pi above the surface: B's part is small and as smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """By the cosine."""
+        return self.sample_cosine(wo, u, mode)
 
 
 def _grazing_albedo(sigma: float) -> float:

@@ -15,7 +15,8 @@ from ...ops import Direction, Mode, Node, Scalar, Spectrum, backend, clamp, max_
 from ...optics import frame
 from ...optics.roughness import SMOOTH
 from ..microfacet.microfacet import rotation_angle
-from .openpbr import Between, OpenPBR
+from ._openpbr_derived import Between
+from .openpbr import OpenPBR
 
 COAT_INDEX = 1.5  # of the clearcoat
 SATIN, GLOSS = 0.1, 0.001  # its widths at gloss 0 and 1
@@ -33,19 +34,19 @@ class _Slabs(OpenPBR):
         specular_ior: Number = number(1.5)
 
     # What there is of the slabs is known from the dials (`DisneyBSDF._kind`), whether those are recorded or not.
-    def _has(self, name: str) -> bool:
+    def has(self, name: str) -> bool:
         return bool(getattr(self.plain, name) != 0.0)
 
-    def _has_holes(self) -> bool:
+    def has_holes(self) -> bool:
         return False
 
-    def _may_be_smooth(self, name: str) -> bool:
+    def may_be_smooth(self, name: str) -> bool:
         return bool(getattr(self.plain, name) ** 2 < SMOOTH)
 
-    def _roughened(self) -> Scalar:
+    def roughened(self) -> Scalar:
         return self.specular_roughness
 
-    def _indices(self) -> tuple[Scalar, Scalar, Scalar]:
+    def indices(self) -> tuple[Scalar, Scalar, Scalar]:
         eta = ops.maximum(self.specular_ior, 1.001)
         return eta, eta, ops.ones_like(eta)
 
@@ -203,7 +204,7 @@ class DisneyBSDF(BSDF):
 
     @property
     def transmits(self) -> bool:
-        return self.thin or bool(self._kind()._refracts)
+        return self.thin or bool(self._kind().refracts)
 
     @property
     def delta(self) -> Delta:
@@ -217,11 +218,11 @@ class DisneyBSDF(BSDF):
 
     @property
     def interior(self) -> Interior | None:
-        if self.thin or not self._kind()._refracts:
+        if self.thin or not self._kind().refracts:
             return None
         if not self.is_bound:
             return self.bind(backend.types("float64")).interior
-        return Interior(self._slabs()._indices()[1], ops.zeros_like(self.base_color), ops.zeros_like(self.eta))
+        return Interior(self._slabs().indices()[1], ops.zeros_like(self.base_color), ops.zeros_like(self.eta))
 
     def tint(self, wo: Direction) -> Spectrum:
         """The slabs' colours."""
