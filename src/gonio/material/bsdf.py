@@ -179,8 +179,7 @@ class BSDF(Material):
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density with which `sample` chooses wi, 1/sr, (N,); 0 for delta lobes.
 
-        Here that of a guide found from `eval` (`gonio.material.guide`). A class that writes one of `pdf` and `sample`
-        must write the other.
+        Here, where `sample` is not written either: that of a guide found from `eval` (`gonio.material.guide`).
         """
         return guide_search.guide_of(self.plain).pdf(self, wo, wi)
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..energy.albedo import cubature
 from ..ops import Direction, Scalar, backend
+from ..optics.lattice import r_steps
 from . import directions
 
 if TYPE_CHECKING:
@@ -373,9 +374,8 @@ def _eval_over_pdf(
 
 
 def _stratified(count: int) -> np.ndarray:
-    """A sequence of low discrepancy in [0, 1)^3: multiples of powers of the root of x^4 = x + 1."""
-    steps = 1.2207440846057596 ** -np.arange(1.0, 4.0)
-    u = (0.5 + np.arange(count)[:, None] * steps) % 1.0
+    """A sequence of low discrepancy in [0, 1)^3: the R sequence."""
+    u = (0.5 + np.arange(count)[:, None] * r_steps(3)) % 1.0
     return directions.single(np.minimum(u, 1.0 - 2.0**-24))
 
 

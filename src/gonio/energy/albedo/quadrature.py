@@ -236,8 +236,7 @@ def _over_slopes(
     mu = dr.maximum(mu, SMALLEST_MU)
     alpha = type(alpha)(dr.maximum(alpha.x, SMALLEST_ALPHA), dr.maximum(alpha.y, SMALLEST_ALPHA))
     sin_o = dr.sqrt((1.0 - mu) * (1.0 + mu))
-    sin_phi, cos_phi = dr.sincos(phi)
-    wo = ops.vec3(sin_o * cos_phi, sin_o * sin_phi, mu)
+    wo = frame.spherical_direction(sin_o, mu, phi)
 
     # the direction b_o of the stretched o
     stretched = ops.vec2(alpha.x * wo.x, alpha.y * wo.y)

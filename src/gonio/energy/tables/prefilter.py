@@ -25,6 +25,7 @@ from scipy.fft import dct
 
 from ...errors import InputError
 from ...ops import Direction, Scalar, backend, normalize, vec2, vec3, where
+from ...optics.frame import spherical_array
 from ...optics.masking import masking_shadowing
 from ...optics.ndf import NDF, distribution
 from ..albedo import quadrature
@@ -355,7 +356,7 @@ def _of_texels(level: Array, start: int = 0, stop: int | None = None) -> Array:
     height, width = level.shape[:2]
     theta, phi = _centres(height)[start:stop, None], (np.arange(width) + 0.5) / width * 2.0 * np.pi
     sine = np.sin(theta)
-    return np.stack(np.broadcast_arrays(sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)), -1).reshape(-1, 3)
+    return spherical_array(sine, np.cos(theta), phi).reshape(-1, 3)
 
 
 def _spread(count: int) -> Array:
@@ -363,4 +364,4 @@ def _spread(count: int) -> Array:
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     phi = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))
     sine = np.sqrt(1.0 - z * z)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], -1)
+    return spherical_array(sine, z, phi)

@@ -15,6 +15,7 @@ from ...material.bsdf import Delta, InnerAlbedo
 from ...material.polarization import Polarized
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
 from ...ops.backend import Array
+from ...optics import frame
 from ...optics.special import gauss
 
 ALMOST_ONE = 0.99999994  # the largest float32 under 1
@@ -177,4 +178,4 @@ def lobe_ratio(added: Spectrum, lost: MissingEnergy) -> Scalar:
 
 def _direction(types: backend.Types, mu: NDArray[np.float64], phi: float = 0.0) -> Array:
     sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
-    return backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)
+    return backend.vector_of(frame.spherical_array(sin, mu, phi), 3, types)

@@ -14,6 +14,7 @@ from ...energy.compensation.missing import missing_energy
 from ...material import BSDF, Breach, Sample, bsdf, method
 from ...material.bsdf import InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
+from ...optics import frame
 from ._compensated import AllParts, Parts, _OnBase, with_terms
 
 
@@ -47,7 +48,7 @@ class Turquin(_OnBase):
             return None
         types = backend.types("float64")
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
-        wo = backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)
+        wo = backend.vector_of(frame.spherical_array(sin, mu, phi), 3, types)
         return of_base * backend.to_numpy(self.bind(types)._factor(wo), len(mu))
 
     def derive(self) -> Derived:

@@ -16,6 +16,7 @@ from ...ops.backend import Array
 from ...ops.table import read_in_numpy
 from ...optics import frame, fresnel
 from ...optics import masking as terms
+from ...optics.lattice import r_sequence
 from ...optics.ndf import NDF
 from ...optics.roughness import SMOOTH
 from ...optics.special import gauss
@@ -127,8 +128,7 @@ def _scattering(masking: str) -> Table:
     def build() -> np.ndarray:
         cos = np.maximum(np.linspace(0.0, 1.0, COSINES) ** 2, 1e-4)
         wo = np.repeat(np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1), DRAWS, 0)
-        # R3, powers of x^4 = x + 1
-        u = np.tile(np.arange(1, DRAWS + 1)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0) % 1.0, (COSINES, 1))
+        u = np.tile(r_sequence(DRAWS, 3), (COSINES, 1))
         found = []
         for roughness in _rows(ROUGHNESSES):
             drawn = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking)).sample(wo, u)

@@ -39,6 +39,8 @@ from ...material import BSDF, guide_search, tree
 from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, Table, backend
 from ...ops.backend import Array
+from ...optics import frame
+from ...optics.lattice import r_sequence
 from ...optics.roughness import SMOOTH
 from ..compensated.kulla_conty import KullaConty
 from ..microfacet.dielectric import Dielectric
@@ -206,7 +208,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
         )
     surface = KullaConty(glass)
     root = np.linspace(0.0, 1.0, ROUGH)
-    lattice = _lattice(POINTS)
+    lattice = r_sequence(POINTS, 4)
     wo, u = _directions(np.maximum(root**2, 1e-4), lattice), np.tile(lattice[:, :3], (ROUGH, 1))
     up = surface.sample(wo, u, "importance", "float64")
     weight = np.where(up.pdf > 0.0, up.weight.mean(1), 0.0).reshape(ROUGH, POINTS)
@@ -239,15 +241,10 @@ def _interface(coat: Coated, index: float) -> _Interface:
     )
 
 
-def _lattice(count: int) -> Floats:
-    """R4, powers of x^5 = x + 1."""
-    return np.arange(1, count + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5.0) % 1.0
-
-
 def _directions(mu: Floats, lattice: Floats) -> Floats:
     """Directions of each cosine at the lattice's azimuths, (len(mu) * len(lattice), 3)."""
     phi, sin = np.tile(2.0 * np.pi * lattice[:, 3], len(mu)), np.repeat(np.sqrt(1.0 - mu**2), len(lattice))
-    return np.stack([sin * np.cos(phi), sin * np.sin(phi), np.repeat(mu, len(lattice))], -1)
+    return frame.spherical_array(sin, np.repeat(mu, len(lattice)), phi)
 
 
 def _places(index: float) -> tuple[Floats, Floats]:
@@ -291,7 +288,7 @@ def _drawn(base: BSDF, index: float) -> _Seen:
     the brightest channel is met."""
     white = base.white()
     place, mu = _places(index)
-    lattice = _lattice(POINTS)
+    lattice = r_sequence(POINTS, 4)
     wo = _directions(mu, lattice)
     drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
     channels = drawn.weight

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...material.bsdf import BSDF, Delta, InnerAlbedo, Microsurface
 from ...material.parameters import Angle, Colour, Width, angle, choice, pair_of, spectrum, width
 from ...ops import Direction, Pair, Scalar, Spectrum, abs, backend, dot, function, safe_div, where
-from ...optics import fresnel, masking
+from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
 from ...optics.roughness import SMOOTH
 
@@ -102,7 +102,7 @@ class _Microfacet(BSDF):
         if self.delta != "always":
             return None
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
-        wo = np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
+        wo = frame.spherical_array(sin, mu, phi)
         drawn = self.sample(wo, np.full((len(mu), 3), 0.5), precision="float64")
         return np.asarray(drawn.weight, np.float64) * (mu > 0.0)[:, None]
 
