@@ -208,7 +208,7 @@ class RightCompensation(BSDF):
     """The sound one: a base that loses light, f = mu_o mu_i / pi with E = 2/3 mu, and Kulla and Conty's term on top."""
 
     caught_by: ClassVar[str] = ""
-    lossless: ClassVar[float | None] = 1e-3
+    lossless_tolerance: ClassVar[float | None] = 1e-3
     average: ClassVar[float] = 4.0 / 9.0  # 2 int 2/3 mu mu dmu
 
     albedo: Value = spectrum(1.0, "albedo", low=0.0, high=1.0)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..catalog import notation
 from ..errors import GonioError, InputError
-from ..material import BSDF, Breach, Parameter, Sample, models, tree
+from ..material import BSDF, KnownViolation, Parameter, Sample, models, tree
 from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
 from . import directions, severity
@@ -69,7 +69,7 @@ class Subject:
     @property
     def leans(self) -> bool:
         """Whether its mirror is another than the surface."""
-        return self.model.leans
+        return self.model.perturbs_normal
 
     @property
     def stochastic(self) -> bool:
@@ -95,9 +95,9 @@ class Subject:
         return self.model.parameters()
 
     @property
-    def breaches(self) -> dict[str, Breach]:
+    def breaches(self) -> dict[str, KnownViolation]:
         """Laws that it declares to break."""
-        return self.model.breaches()
+        return self.model.violations()
 
     @property
     def by_nature(self) -> Mapping[str, str]:

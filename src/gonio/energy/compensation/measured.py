@@ -105,7 +105,7 @@ def measured(base: BSDF) -> Measured:
     base = _uniform(base)
     dr = backend.drjit()
     types = _types(base)
-    of_white, of_base = _albedos(base, base.white(), types)
+    of_white, of_base = _albedos(base, base.lossless(), types)
     weight = types.float(_averaging())
     lost = maximum(1.0 - max_component(of_white), 0.0)
     average = dr.sum(lost * weight)

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, Delta
+from ...material.bsdf import BSDF, Delta, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Number, bsdf, number
 from ...material.sample import Sample
@@ -53,10 +53,10 @@ class NormalMap(BSDF):
     lean_x: Number = number(default=0.0, doc="tilt of the normal along x", low=-STEEPEST, high=STEEPEST)
     lean_y: Number = number(default=0.0, doc="tilt of the normal along y", low=-STEEPEST, high=STEEPEST)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "the view bends the normal, and what is sent below the surface goes up again",
-            lambda model: 2.0 if model.leans else 0.0,
+            lambda model: 2.0 if model.perturbs_normal else 0.0,
             certain=False,
         ),
     }
@@ -137,10 +137,10 @@ class NormalMap(BSDF):
         return self.base.tint(frame.local(wo))
 
     @property
-    def leans(self) -> bool:
+    def perturbs_normal(self) -> bool:
         """Whether its normal is another than the surface's, as far as plain numbers tell."""
         values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
-        return self.base.leans or not all(isinstance(value, int | float) and value == 0 for value in values)
+        return self.base.perturbs_normal or not all(isinstance(value, int | float) and value == 0 for value in values)
 
     @property
     def transmits(self) -> bool:
@@ -148,7 +148,7 @@ class NormalMap(BSDF):
 
     @property
     def isotropic(self) -> bool:
-        return not self.leans and self.base.isotropic
+        return not self.perturbs_normal and self.base.isotropic
 
     @property
     def delta(self) -> Delta:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...errors import InputError
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import bsdf
 from ...material.polarization import Polarized
@@ -23,8 +23,8 @@ class Sum(BSDF):
     a: BSDF = bsdf("the one material")
     b: BSDF = bsdf("the other")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach("what two materials reflect may add up to more than arrives", 1e3, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation("what two materials reflect may add up to more than arrives", 1e3, certain=False)
     }
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ from ...energy.compensation import lobe
 from ...energy.compensation.missing import missing_energy
 from ...energy.compensation.reflecting import Reflecting
 from ...energy.tables import split_sum
-from ...material import Breach, method
+from ...material import KnownViolation, method
 from ...ops import Direction, Mode, Scalar, Spectrum, abs, maximum, where
 from ...optics.fresnel.schlick import schlick_average
 from ...optics.roughness import widths
@@ -41,10 +41,10 @@ class FdezAguera(_Compensated):
     as a BSDF the second term is a diffuse lobe that sees wo alone: not reciprocal. Schlick's Fresnel is assumed in it.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
     }
-    lossless: ClassVar[float | None] = 2e-3
+    lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
 
     @method

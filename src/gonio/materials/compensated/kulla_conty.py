@@ -9,7 +9,7 @@ import numpy as np
 
 from ...energy.compensation.lobe import MissingEnergy
 from ...energy.compensation.missing import missing_energy
-from ...material import Breach, choice, method
+from ...material import KnownViolation, choice, method
 from ...ops import Direction, Mode, Scalar, Spectrum, abs, backend, function
 from ...optics.fresnel.artist import AVERAGES
 from ._compensated import _Compensated, lobe_ratio
@@ -78,18 +78,18 @@ class KullaConty(_Compensated):
     lays a false bright rim on smooth surfaces.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "gradients": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "gradients": KnownViolation(
             "a measured base is drawn from anew for each value, and samples that change lobes shift E by 1e-4",
             lambda model: 2.0 if model.needs_uniform else 0.0,
             certain=False,
         ),
-        "precision": Breach(
+        "precision": KnownViolation(
             "a measured base is drawn from anew in each precision",
             lambda model: 0.01 if model.needs_uniform else 0.0,
             certain=False,
         ),
-        "energy": Breach(
+        "energy": KnownViolation(
             "tables of rough glass, and of two widths, are met to so much (benchmarks/energy.py)",
             _off,
             certain=False,
@@ -126,7 +126,7 @@ class KullaConty(_Compensated):
         return self.base.microsurface is None
 
     @property
-    def lossless(self) -> float:  # type: ignore[override]
+    def lossless_tolerance(self) -> float:  # type: ignore[override]
         """What a white furnace may miss: the error of polynomials or of the measurement, see docs/energy.md."""
         if self.base.transmits and self.two_widths:
             return 0.2

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ... import ops
 from ...energy.compensation.lobe import MissingEnergy
 from ...energy.compensation.missing import missing_energy
-from ...material import BSDF, Breach, Sample, bsdf, method
+from ...material import BSDF, KnownViolation, Sample, bsdf, method
 from ...material.bsdf import InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
 from ...optics import frame
@@ -33,10 +33,10 @@ class Turquin(_OnBase):
     """
 
     base: BSDF = bsdf("the material to be compensated; it must not transmit")
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation("the factor depends on the viewer's direction alone", 4.0, certain=False)
     }
-    lossless: ClassVar[float | None] = 2e-3
+    lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
 
     def known_albedo(

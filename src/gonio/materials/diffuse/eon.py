@@ -45,7 +45,7 @@ class Eon(BSDF):
     roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
     energy: str = choice("exact", "how E is found", FORMS)
 
-    lossless: ClassVar[float | None] = 1e-3  # what the fit is off; exact: nothing
+    lossless_tolerance: ClassVar[float | None] = 1e-3  # what the fit is off; exact: nothing
 
     @function
     def _lost(self, w: Direction) -> Scalar:

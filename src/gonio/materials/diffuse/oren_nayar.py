@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -31,8 +31,8 @@ class OrenNayar(BSDF):
     )
     sigma: Number = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
             certain=False,  # below sigma = 0.04 it is under a thousandth

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -32,8 +32,8 @@ class ModifiedPhong(BSDF):
     )
     p: Number = number(default=32.0, doc="falloff of the lobe", low=0.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "kd + ks is over 1",
             lambda model: max(float(np.max(np.asarray(model.kd) + np.asarray(model.ks))) - 1.0, 0.0),
             certain=False,  # met at the normal alone, which not every check looks along
@@ -73,7 +73,7 @@ class ModifiedPhong(BSDF):
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample.of_density(wi, weight, pdf)
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Itself: no two albedos whose sum is 1 return all light."""
         return self
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import ops
 from ...errors import InputError
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, flag, number, spectrum
 from ...material.sample import Sample
@@ -31,12 +31,12 @@ class _Empirical(BSDF):
     ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "the specular term has no cosine, so f divides it by cos theta_i alone",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
         ),
-        "energy": Breach(
+        "energy": KnownViolation(
             "neither term is normalized: kd = 1 reflects pi times what it receives",
             lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
         ),

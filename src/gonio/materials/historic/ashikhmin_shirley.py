@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, choice, flag, spectrum, width
 from ...ops import Direction, Pair, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
 from ...optics import frame, fresnel
@@ -34,7 +34,7 @@ class AshikhminShirley(_Glossy):
     fresnel: str = choice("schlick", "Fresnel reflectance", lambda: fresnel.Fresnel.family.titles(), white="one")
     coupled: bool = flag(default=False, doc="the paper's diffuse part, which gives way to the lobe")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     def _most(self) -> np.ndarray:
         """specular: F (n.i) / max((n.o), (n.i)) is the weight of a sample."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, spectrum, width
 from ...ops import Direction, Scalar, Spectrum, function, zeros_like
 from ...optics import frame, fresnel
@@ -33,7 +33,7 @@ class CookTorrance(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("D G / (pi cos cos) is four times what facets reflect, "),
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import ops
 from ...catalog import library
-from ...material.bsdf import BSDF, Breach, Preset
+from ...material.bsdf import BSDF, KnownViolation, Preset
 from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.sample import Sample
@@ -29,7 +29,7 @@ class _Glossy(BSDF):
     The lobe is asked of two directions above the surface only: where one is not, for the normal in its place.
     """
 
-    gives_way: ClassVar[bool] = True
+    overridable: ClassVar[bool] = True
 
     diffuse: Colour = spectrum(default=0.2, doc="albedo of Lambert's part", low=0.0, high=1.0, soft_high=True)
 
@@ -103,7 +103,7 @@ class _Glossy(BSDF):
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample.of_density(wi, weight, pdf)
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Itself: the two parts are simply added, so no values of theirs return all light without any loss."""
         return self
 
@@ -112,9 +112,9 @@ class _Glossy(BSDF):
         return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, upright(wo))), 0.0)
 
 
-def sum_breach(more: str = "") -> Breach:
+def sum_breach(more: str = "") -> KnownViolation:
     """The breach of energy that adding two lobes is, with what makes the lobe itself gain energy."""
-    return Breach(
+    return KnownViolation(
         f"{more}the two parts are added, and nothing keeps their sum below 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be met

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
 from ...optics.frame import upright
@@ -35,7 +35,7 @@ class Lafortune(_Glossy):
     cz: Number = number(default=1.0, doc="factor of o_z i_z", low=-1.0, high=1.0)
     exponent: Number = number(default=50.0, doc="falloff of the lobe", low=0.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     @property
     def isotropic(self) -> bool:

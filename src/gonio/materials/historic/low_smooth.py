@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import (
     Direction,
@@ -50,7 +50,7 @@ class LowSmooth(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
 
     def _most(self) -> np.ndarray:
         """specular times the lobe's integral over a disk of radius 2, the farthest that |Dp| gets."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, spectrum
 from ...ops import (
     Direction,
@@ -60,9 +60,9 @@ class ShiftedGamma(_Glossy):
     k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)
     theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("F and G are fitted factors, which no law bounds, "),
-        "positivity": Breach(
+        "positivity": KnownViolation(
             "F is negative where f1 cos is more than Schlick's curve, and G1 may be at the horizon",
             1.0,
             certain=False,

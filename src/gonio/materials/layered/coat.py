@@ -9,8 +9,8 @@ from ... import ops
 from ...errors import InputError
 from ...material import (
     BSDF,
-    Breach,
     Colour,
+    KnownViolation,
     Number,
     Sample,
     Width,
@@ -59,8 +59,8 @@ class Coat(BSDF):
     other value may, and derivatives leave the change of the tables out.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "what a rough top reflects and lets through is met to so much, by draws of rough glass",
             lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
             certain=False,
@@ -263,9 +263,9 @@ class Coat(BSDF):
         tint = self.base.tint(inner)
         return sqr(through) * left2 / (1.0 - (k if self.bounces == "white" else k * tint))
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Over the white base, and without absorption."""
-        white = self.base.white()
+        white = self.base.lossless()
         values = {"base": white, "absorption": self.absorption * 0.0 if self.is_bound else 0.0}
         return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple, Self
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Angle, Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -79,20 +79,20 @@ class Disney(BSDF):
     clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "the lobes are added, and rough diffuse reflection gains at grazing angles: nothing bounds their sum",
             2.5,
             certain=False,
         ),
-        "linearity": Breach("tints are ratios of the base colour to its mean", 10.0, certain=False),
+        "linearity": KnownViolation("tints are ratios of the base colour to its mean", 10.0, certain=False),
     }
 
     @property
     def isotropic(self) -> bool:
         return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Itself: no values of the added lobes return all light."""
         return self
 

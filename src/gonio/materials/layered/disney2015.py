@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ... import ops
-from ...material import BSDF, Breach, Colour, Number, Sample, binding, flag, method, number, spectrum
+from ...material import BSDF, Colour, KnownViolation, Number, Sample, binding, flag, method, number, spectrum
 from ...material.bsdf import Delta, Interior
 from ...material.parameters import Angle
 from ...ops import Direction, Mode, Node, Scalar, Spectrum, backend, clamp, max_component, sqrt, where
@@ -89,18 +89,20 @@ class DisneyBSDF(BSDF):
     flatness: Number = number(default=0.0, doc="1 takes the roughness from the diffuse lobe", low=0.0, high=1.0)
     thin: bool = flag(default=False, doc="whether it is a sheet without an inside")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "the sheen's table of lobes is one of the viewer's direction alone",
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
-        "energy": Breach(
-            OpenPBR.breaks["energy"].reason,
+        "energy": KnownViolation(
+            OpenPBR.known_violations["energy"].reason,
             lambda model: 0.15 if _some(model.anisotropic) else 0.01,
             certain=False,
         ),
-        "linearity": Breach("tints are ratios of the base colour, and glass takes its root", 10.0, certain=False),
+        "linearity": KnownViolation(
+            "tints are ratios of the base colour, and glass takes its root", 10.0, certain=False
+        ),
     }
 
     # ------------------------------------------------------------------ as slabs

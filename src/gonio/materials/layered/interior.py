@@ -126,7 +126,7 @@ def colour_of(base: BSDF, up: Direction) -> Spectrum:
     """a: the tint of a bound base seen straight down, over that of its white twin; of a base that is its own white twin
     over its brightest channel."""
     tint = base.tint(up)
-    white = base.white()
+    white = base.lossless()
     if white is base:
         return ops.safe_div(tint, functools.reduce(ops.maximum, ops.channels(tint)))
     return ops.safe_div(tint, white.tint(up))
@@ -286,7 +286,7 @@ class _Seen(NamedTuple):
 def _drawn(base: BSDF, index: float) -> _Seen:
     """Draws of the white base's own sampling from the nodes, over all azimuths. Of a base that is its own white twin
     the brightest channel is met."""
-    white = base.white()
+    white = base.lossless()
     place, mu = _places(index)
     lattice = r_sequence(POINTS, 4)
     wo = _directions(mu, lattice)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Self
 
-from ...material import Breach, Sample, binding, method
+from ...material import KnownViolation, Sample, binding, method
 from ...ops import Direction, Mode, Scalar, Spectrum
 from . import _openpbr_derived as derived
 from . import _openpbr_lobes as lobes
@@ -71,18 +71,18 @@ class OpenPBR(_OpenPBR):
         """u1 picks the lobe."""
         return sampling.drawn(self._settled(), wo, u, mode)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "fuzz is a table of the viewer's direction alone, and so is a coat where layering is albedo",
             lambda model: 4.0 if model.has("fuzz_weight") or model.by_albedo() else 0.0,
             certain=False,
         ),
-        "energy": Breach(
+        "energy": KnownViolation(
             "tables of what layers let through are interpolated, and are of one width, which stands for two",
             lambda model: 0.15 if model.any_anisotropic else 0.01,
             certain=False,
         ),
-        "linearity": Breach(
+        "linearity": KnownViolation(
             "colours of layers multiply, and light that bounces takes them more than once", 10.0, certain=False
         ),
     }

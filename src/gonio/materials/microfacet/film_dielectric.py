@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.bsdf import Breach, InnerAlbedo, Microsurface
+from ...material.bsdf import InnerAlbedo, KnownViolation, Microsurface
 from ...material.parameters import Colour, Number, choice, number, spectrum
 from ...ops import Mask, Scalar, Spectrum, abs, function, mean, ones_like, safe_div, sqr, where, zeros_like
 from ...optics import fresnel
@@ -36,8 +36,8 @@ class FilmDielectric(Dielectric):
     form: str = film_form()
 
     reads_wavelengths: ClassVar[bool] = True
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "delta": Breach("it reflects as its film does, not as the bare index would", 1.0, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "delta": KnownViolation("it reflects as its film does, not as the bare index would", 1.0, certain=False)
     }
 
     @function

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, choice, spectrum
 from ...ops import Scalar, Spectrum, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
@@ -25,9 +25,9 @@ class Metal(_Reflector):
     films and polarization want a `conductor`.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "linearity": Breach("where the edge is below a half and r0 dark, F is held at 0", 1.0, certain=False),
-        "precision": Breach("beside the places where F is held at 0 it is a difference", 0.01, certain=False),
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "linearity": KnownViolation("where the edge is below a half and r0 dark, F is held at 0", 1.0, certain=False),
+        "precision": KnownViolation("beside the places where F is held at 0 it is a difference", 0.01, certain=False),
     }
 
     r0: Colour = spectrum(default=0.9, doc="reflectance from above", low=0.0, high=1.0, soft_high=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, InnerAlbedo
+from ...material.bsdf import BSDF, InnerAlbedo, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -53,8 +53,8 @@ class Sheen(BSDF):
         high=1.0,
     )
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach("its table of lobes is one of the viewer's direction alone", 2.0)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation("its table of lobes is one of the viewer's direction alone", 2.0)
     }
 
     @function

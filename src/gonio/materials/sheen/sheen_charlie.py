@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Mode, Scalar, Spectrum, exp, function, inv_pi, log, sqr, where
@@ -35,8 +35,8 @@ class SheenCharlie(BSDF):
     albedo: Colour = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
     alpha: Number = number(default=0.3, doc="how far fibres lean from the surface's plane", low=0.01, high=1.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "Lambda's fit masks too little where alpha is under .07: at 89 degrees the albedo is then over 1",
             lambda model: _gain(model),
             certain=False,

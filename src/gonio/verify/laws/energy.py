@@ -63,7 +63,7 @@ class Energy(Law):
             finding.trials.append(Trial(p, text, again))
         self._known(subject, wo, value, error, finding)
         white = white_twin(subject)
-        if white is None and getattr(subject.model, "lossless", None) is not None:
+        if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
             white = subject  # nothing in it can be whitened, and it claims to lose nothing
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
@@ -154,7 +154,7 @@ class Energy(Law):
         known = float(error.max())
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
-        claim = getattr(white.model, "lossless", None)
+        claim = getattr(white.model, "lossless_tolerance", None)
         # a black one keeps nothing, whatever it claims of the rest
         if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
@@ -262,7 +262,7 @@ def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np
 def white_twin(subject: Subject) -> Subject | None:
     """The subject's white twin, every albedo 1 and F = 1; None where it has neither."""
     try:
-        twin = subject.model.white()
+        twin = subject.model.lossless()
     except InputError:
         return None
     return None if twin is subject.model else Subject(twin, subject.target, subject.settings)
