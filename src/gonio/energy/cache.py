@@ -90,13 +90,13 @@ def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
     made: dict[tuple[object, ...], Kept] = {}
 
     @functools.wraps(build)
-    def kept(*names: str) -> Kept:
+    def remembered(*names: str) -> Kept:
         key = tuple(family.get(name) for family, name in zip(FAMILIES, names, strict=False))
         if key not in made:
             made[key] = build(*names)
         return made[key]
 
-    return kept
+    return remembered
 
 
 def origin(*names: str) -> tuple[str, ...]:

@@ -155,9 +155,9 @@ class BSDF(Material):
     def __post_init__(self) -> None:
         for parameter in self.parameters().values():
             given = getattr(self, parameter.name)
-            taken = parameter.taken(given, f"{type(self).__name__}.{parameter.name}")
-            if taken is not given:
-                object.__setattr__(self, parameter.name, taken)
+            coerced = parameter.coerce(given, f"{type(self).__name__}.{parameter.name}")
+            if coerced is not given:
+                object.__setattr__(self, parameter.name, coerced)
         object.__setattr__(self, "_count", tree.count(self))
 
     @classmethod
@@ -245,7 +245,7 @@ class BSDF(Material):
 
     @property
     def perturbs_normal(self) -> bool:
-        """Whether its normal, or that of an inner material, may differ from the surface's: its mirror direction does."""
+        """Whether its normal, or that of an inner material, may differ from the surface's."""
         return any(inner.perturbs_normal for inner in tree.children(self).values())
 
     @property
@@ -266,8 +266,8 @@ class BSDF(Material):
     @property
     def interior(self) -> Interior | None:
         """What lies behind the surface, of a material that light enters, or of the first inside it; None: nothing."""
-        found = (inner.interior for inner in tree.children(self).values())
-        return next((interior for interior in found if interior is not None), None)
+        interiors = (inner.interior for inner in tree.children(self).values())
+        return next((interior for interior in interiors if interior is not None), None)
 
     @property
     def needs_uniform(self) -> bool:
@@ -277,8 +277,8 @@ class BSDF(Material):
     @property
     def fixed(self) -> frozenset[str]:
         """Paths of the parameters that must not vary from ray to ray: tables are found from them once."""
-        found = {f"{name}.{path}" for name, inner in tree.children(self).items() for path in inner.fixed}
-        return frozenset(found)
+        paths = {f"{name}.{path}" for name, inner in tree.children(self).items() for path in inner.fixed}
+        return frozenset(paths)
 
     def normal_reflectance(self) -> Spectrum | None:
         """F0, the reflectance at normal incidence, its albedo included; None where there is no such thing."""
@@ -344,7 +344,7 @@ class BSDF(Material):
 
     def lossless(self) -> Self:
         """The lossless variant: every share of light 1 and F = 1, here and in inner materials; itself where nothing
-        changes. Light that a white furnace finds missing is lost by the shape of the lobe. Bound copies give bound ones.
+        changes. What a furnace finds missing is lost by the lobe's shape. Bound copies give bound ones.
         """
         values: dict[str, object] = {}
         for name, parameter in self.parameters().items():

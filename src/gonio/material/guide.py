@@ -197,10 +197,10 @@ class Guide(NamedTuple):
 
     def pdf(self, material: object, wo: Direction, wi: Direction) -> Scalar:
         """Density of `sample`, 1/sr."""
-        seen = self._seen(wo)
+        visible = self._seen(wo)
         crosses = wo.z * wi.z < 0.0
         if not self.lobes:
-            return where(seen & ~crosses & (wi.z != 0.0), ops.abs(wi.z) * inv_pi, 0.0)
+            return where(visible & ~crosses & (wi.z != 0.0), ops.abs(wi.z) * inv_pi, 0.0)
         place = self._place(material, wo)
         turn, above = self._turn(wo), _above(wo)
         (cosine,) = fetch(self.cosine, ops.zeros_like(wo.z))
@@ -215,9 +215,9 @@ class Guide(NamedTuple):
                 here = here + self._share(lobe, index) * weight * lobe.at(index, s, phi)
             here = here * (1.0 if lobe.full else 0.5)
             smooth = (0.5 if both else 1.0) * ops.abs(wi.z) * inv_pi
-            found = (1.0 - cosine) * ops.safe_div(here, jacobian) + cosine * smooth
-            density = where(on_side, found, density)
-        return where(seen & (wi.z != 0.0), density, 0.0)
+            mixed = (1.0 - cosine) * ops.safe_div(here, jacobian) + cosine * smooth
+            density = where(on_side, mixed, density)
+        return where(visible & (wi.z != 0.0), density, 0.0)
 
     def draw(self, material: object, wo: Direction, u: Direction) -> Direction:
         """A direction; u1 picks the slice and the side. It may lie on a side where nothing is: its pdf is 0 then."""
@@ -267,8 +267,8 @@ class Guide(NamedTuple):
             return vec3(1.0 + zero, zero, zero)
         squared = wo.x * wo.x + wo.y * wo.y
         scale = ops.rsqrt(maximum(squared, 1e-20))
-        upright = squared < 1e-20
-        return vec3(where(upright, 1.0, wo.x * scale), where(upright, 0.0, wo.y * scale), zero)
+        at_pole = squared < 1e-20
+        return vec3(where(at_pole, 1.0, wo.x * scale), where(at_pole, 0.0, wo.y * scale), zero)
 
     def _place(self, material: object, wo: Direction) -> Place:
         """The slices on both sides of wo's angle, and of every other axis."""
@@ -324,14 +324,14 @@ def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
 
 def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
     """The last but one node at most, up to which there is no more than u."""
-    found: Array = ops.zeros_like(u)
+    node: Array = ops.zeros_like(u)
     step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
     while step:
-        ahead = found + float(step)
+        ahead = node + float(step)
         inside = minimum(ahead, count - 2.0)
-        found = where((ahead < count - 1.5) & (below(inside) <= u), ahead, found)
+        node = where((ahead < count - 1.5) & (below(inside) <= u), ahead, node)
         step >>= 1
-    return found
+    return node
 
 
 @function

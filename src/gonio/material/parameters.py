@@ -141,7 +141,7 @@ class Parameter:
     def check(self, value: object, where: str) -> None:
         """Raise InputError, or warn, where `value` cannot stand for this parameter."""
 
-    def taken(self, value: object, where: str) -> Value:
+    def coerce(self, value: object, where: str) -> Value:
         """What a material holds where the user gave `value`: here that itself, once it is checked."""
         self.check(value, where)
         return value
@@ -227,8 +227,8 @@ class IndexParameter(NumberParameter):
     A name becomes a `DispersiveIndex`, which is a number to all but spectral renders.
     """
 
-    def taken(self, value: object, where: str) -> Value:
-        return super().taken(indices.dispersive(value, where) if isinstance(value, str) else value, where)
+    def coerce(self, value: object, where: str) -> Value:
+        return super().coerce(indices.dispersive(value, where) if isinstance(value, str) else value, where)
 
 
 class ColourParameter(_Numeric):
@@ -452,9 +452,9 @@ def bsdf(doc: str, default: Material | None = None) -> Value:
 
 def declared(cls: type) -> dict[str, Parameter]:
     """The parameters that a class declares, by name, in order."""
-    found = {}
+    parameters = {}
     for field in dataclasses.fields(cls):
         if field.metadata:
             more = dict(field.metadata)
-            found[field.name] = more.pop("kind")(name=field.name, default=field.default, **more)
-    return found
+            parameters[field.name] = more.pop("kind")(name=field.name, default=field.default, **more)
+    return parameters

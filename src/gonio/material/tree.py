@@ -32,16 +32,16 @@ class Leaf(NamedTuple, Generic[M]):
     owner: M
 
 
-MOST = 64  # materials in a tree: its formula then takes about a second to compile
+MAX_MATERIALS = 64  # materials in a tree: its formula then takes about a second to compile
 
 
 def count(material: Material) -> int:
     """How many materials a tree holds, itself among them. InputError where these are more than MOST."""
-    found = 1 + sum(inner._count for inner in children(material).values())
-    if found > MOST:
-        what = f"{found} materials inside each other, {MOST} at most are expected"
+    total = 1 + sum(inner._count for inner in children(material).values())
+    if total > MAX_MATERIALS:
+        what = f"{total} materials inside each other, {MAX_MATERIALS} at most are expected"
         raise InputError(what, type(material).__name__, "mix fewer materials")
-    return found
+    return total
 
 
 def children(material: M) -> dict[str, M]:

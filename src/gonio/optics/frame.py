@@ -44,7 +44,7 @@ def spherical_array(sin_theta: ArrayLike, cos_theta: ArrayLike, phi: ArrayLike) 
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
-def upright(like: Direction) -> Direction:
+def normal_like(like: Direction) -> Direction:
     """The surface normal, one for every ray of `like`."""
     zero = ops.zeros_like(like.z)
     return vec3(zero, zero, 1.0 + zero)

@@ -133,8 +133,8 @@ def _constants() -> dict[str, OpticalConstants]:
         ),
         "diamond": ("diamond", _glass(226.0, 760.0, (0.3306, 0.175**2), (4.3356, 0.106**2)), "Peter1923"),
     }  # fmt: skip
-    found = {name: OpticalConstants(name, *facts) for name, facts in media.items()}
-    return found | {s: OpticalConstants(s, m.name, tables[s], m.source) for s, m in METALS.items()}
+    substances = {name: OpticalConstants(name, *facts) for name, facts in media.items()}
+    return substances | {s: OpticalConstants(s, m.name, tables[s], m.source) for s, m in METALS.items()}
 
 
 _CONSTANTS = _constants()
@@ -186,22 +186,22 @@ def constants(name: str, where: str = "name") -> OpticalConstants:
 def dispersive(name: str, where: str) -> DispersiveIndex:
     """The index of a transparent medium by name, as a dielectric's `eta` takes it. InputError for a metal, for an index
     that is not positive, and where the visible is not covered."""
-    found = constants(name, where)
-    low, high = found.range
+    optical = constants(name, where)
+    low, high = optical.range
     if low > VISIBLE[0] or high < VISIBLE[1]:
         what = f"{name} is known from {low:g} to {high:g} nm, not where light is visible"
         raise InputError(what, where, "take another source")
     try:
-        seen = found.at(np.linspace(*VISIBLE, 31))
+        visible = optical.at(np.linspace(*VISIBLE, 31))
     except InputError as error:
         raise InputError(error.what, where, error.hint) from None
-    if seen.k.max() > 0.01:
+    if visible.k.max() > 0.01:
         hint = "a dielectric is transparent; see Conductor.preset"
-        raise InputError(f"{name} absorbs light within a wavelength: k is {seen.k.max():.3g}", where, hint)
-    if seen.eta.min() < 0.2 or seen.eta.max() > 5.0:
-        worst = seen.eta[(seen.eta < 0.2) | (seen.eta > 5.0)][0]
+        raise InputError(f"{name} absorbs light within a wavelength: k is {visible.k.max():.3g}", where, hint)
+    if visible.eta.min() < 0.2 or visible.eta.max() > 5.0:
+        worst = visible.eta[(visible.eta < 0.2) | (visible.eta > 5.0)][0]
         raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", where, "lambda in micrometres")
-    return DispersiveIndex(found)
+    return DispersiveIndex(optical)
 
 
 def _formula(text: str, kind: str, given: str, where: str) -> OpticalConstants:

@@ -50,7 +50,7 @@ def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
 
 
 @function
-def around(axis: Direction, w: Direction) -> Direction:
+def to_frame(axis: Direction, w: Direction) -> Direction:
     """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
     side = ops.copysign(ops.ones_like(axis.z), axis.z)
     a = -1.0 / (side + axis.z)

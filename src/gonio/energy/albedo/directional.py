@@ -178,8 +178,8 @@ def _by_cubature(model: BSDF, mu: np.ndarray, phi: np.ndarray, seed: int) -> Alb
     def power(wo: Direction, wi: Direction) -> Spectrum:
         return bound.eval(wo, wi, "importance")
 
-    found = cubature.integrate(model.sample, power, direction(mu, phi), TOLERANCE, seed)
-    return Albedo(found.value, found.error, "quadrature")
+    integral = cubature.integrate(model.sample, power, direction(mu, phi), TOLERANCE, seed)
+    return Albedo(integral.value, integral.error, "quadrature")
 
 
 SHIFTS = 16

@@ -176,9 +176,9 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
         value = model.eval(wo, wi)
         return type(value)(*[dr.block_sum(channel * share, POINTS) for channel in value])
 
-    found = albedo(white), albedo(base)
-    dr.eval(found)
-    return found
+    albedos = albedo(white), albedo(base)
+    dr.eval(albedos)
+    return albedos
 
 
 def _averaging() -> np.ndarray:

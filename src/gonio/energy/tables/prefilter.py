@@ -37,7 +37,7 @@ Environment: TypeAlias = NDArray[np.floating]
 
 LEVELS = 6
 MOST_LEVELS = 10  # narrower lobes than (1 / 9)^2 want grids of several thousand rows
-SMALLEST, LARGEST = 4, 4096  # rows
+MIN_ROWS, MAX_ROWS = 4, 4096  # rows
 STEPS = 8.0  # rows of the map across a lobe's half width, and
 LEAST_ROWS = 128  # in all: the blur then errs by about 1e-3 at most
 JUDGE_STEPS, JUDGE_ROWS = 16.0, 256
@@ -118,8 +118,8 @@ def _checked(environment: Environment, levels: int, where: str) -> Array:
     if bad:
         raise InputError(f"{bad} values are negative or not finite", where, "radiance is 0 or more: mend the picture")
     height = source.shape[0]
-    if not SMALLEST <= height <= LARGEST:
-        raise InputError(f"a map of {height} rows, expected {SMALLEST} to {LARGEST}", where, "scale the picture")
+    if not MIN_ROWS <= height <= MAX_ROWS:
+        raise InputError(f"a map of {height} rows, expected {MIN_ROWS} to {MAX_ROWS}", where, "scale the picture")
     if not 2 <= levels <= MOST_LEVELS:
         raise InputError(f"{levels} levels asked for", "--levels", f"give 2 to {MOST_LEVELS}")
     if height >> (levels - 1) < 2:
@@ -175,8 +175,8 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
         z = np.cos(theta) * np.cos(theta_i[:, None]) + np.sin(theta) * np.sin(theta_i[:, None]) * offsets
         kernel = dct(_kernel(lobe, alpha, z), type=1)[..., :-1]  # Fourier series of an even function
         mean = kernel[..., 0] @ _bands(rows)
-        found = np.matmul(kernel.transpose(2, 0, 1), both).transpose(1, 0, 2) / mean[:, None, None]
-        values = _at_centres(found, width) / columns
+        filtered = np.matmul(kernel.transpose(2, 0, 1), both).transpose(1, 0, 2) / mean[:, None, None]
+        values = _at_centres(filtered, width) / columns
         result[start : start + len(theta)] = values[..., :channels]
         for row, mirrored in enumerate(values[..., channels:]):
             result[height - 1 - start - row] = mirrored
@@ -206,9 +206,9 @@ def _divided(source: Array, parts: int) -> Array:
         return source
     height, width = source.shape[:2]
     across = np.concatenate([source[:, -1:], source, source[:, :1]], axis=1)
-    whole = np.concatenate([across[:1], across, across[-1:]], axis=0)
+    padded = np.concatenate([across[:1], across, across[-1:]], axis=0)
     at = (np.arange(height * parts) + 0.5) / parts + 0.5
-    rows = _between(whole, at, 0)
+    rows = _between(padded, at, 0)
     return _between(rows, (np.arange(width * parts) + 0.5) / parts + 0.5, 1)
 
 
@@ -257,7 +257,7 @@ def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, f
     """
     lobe, source = distribution(ndf), levels[0]
     spread = _spread(8)
-    found = {"level_0": {"max": 0.0, "rms": 0.0}}
+    errors = {"level_0": {"max": 0.0, "rms": 0.0}}
     for level in range(1, len(levels)):
         values, roughness = levels[level], roughness_of(level, len(levels))
         directions = _of_texels(values)
@@ -271,11 +271,11 @@ def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, f
         figures["interpolation"] = _figures(
             0.5 * (read(values, spread) + read(levels[level - 1], spread)) - right, right
         )["max"]
-        albedo = quadrature.moments(lobe.name, masking, np.array(COSINES), roughness**2).whole
+        albedo = quadrature.moments(lobe.name, masking, np.array(COSINES), roughness**2).white
         split = np.concatenate([e * read(values, chosen) for e in albedo])
         right = np.stack([sky.reflected(lobe, masking, *_mirrored(r, mu)) for mu in COSINES for r in chosen])
-        found[f"level_{level}"] = figures | {"split sum": _figures(split - right, right)["rms"]}
-    return found
+        errors[f"level_{level}"] = figures | {"split sum": _figures(split - right, right)["rms"]}
+    return errors
 
 
 def _figures(difference: Array, right: Array) -> dict[str, float]:

@@ -35,8 +35,8 @@ class Mix(BSDF):
         """u1 picks a material and is stretched to serve it again; a density sample is weighed against both."""
         w = self.weight
         pick_b = u.x < w
-        again = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
-        u = vec3(where(again < ALMOST_ONE, again, ALMOST_ONE), u.y, u.z)
+        u_remapped = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
+        u = vec3(where(u_remapped < ALMOST_ONE, u_remapped, ALMOST_ONE), u.y, u.z)
         sa, sb = self.a.sample(wo, u, mode), self.b.sample(wo, u, mode)
         wi = where(pick_b, sb.wi, sa.wi)
         delta = where(pick_b, sb.delta, sa.delta)

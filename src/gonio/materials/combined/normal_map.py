@@ -15,7 +15,7 @@ from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
 
 STEEPEST = 20.0  # lean of a normal to which a map's are held, 87 degrees
-LEAST = 0.01  # cosine under which a leaning surface is not seen, unless the level one is
+MIN_COSINE = 0.01  # cosine under which a leaning surface is not seen, unless the level one is
 
 
 class _Frame(NamedTuple):
@@ -109,22 +109,22 @@ class NormalMap(BSDF):
         frame, valid = self._bent(wo)
         s = self.base.sample(frame.local(wo), u, mode)
         wi = frame.back(s.wi)
-        found = valid & (s.pdf > 0.0)
+        drawn = valid & (s.pdf > 0.0)
         if self.base.transmits:
-            found = found & (wi.z * s.wi.z > 0.0)
-            return Sample(wi, where(found, s.weight, 0.0), where(found, s.pdf, 0.0), s.delta & found, s.eta)
+            drawn = drawn & (wi.z * s.wi.z > 0.0)
+            return Sample(wi, where(drawn, s.weight, 0.0), where(drawn, s.pdf, 0.0), s.delta & drawn, s.eta)
         wi = where(wi.z < 0.0, _turned(wi), wi)
-        found = found & (wo.z > 0.0)
+        drawn = drawn & (wo.z > 0.0)
         density = self.pdf(wo, wi)
         smooth = self.eval(wo, wi, mode) * safe_div(1.0, density)
-        weight = where(found, where(s.delta, s.weight, smooth), 0.0)
-        return Sample(wi, weight, where(found, where(s.delta, s.pdf, density), 0.0), s.delta & found, s.eta)
+        weight = where(drawn, where(s.delta, s.weight, smooth), 0.0)
+        return Sample(wi, weight, where(drawn, where(s.delta, s.pdf, density), 0.0), s.delta & drawn, s.eta)
 
     def _bent(self, wo: Direction) -> tuple[_Frame, ops.Mask]:
         """The leaning frame, bent until wo lies on its own side; whether it does."""
         n = self._normal()
         side = where(wo.z < 0.0, -1.0, ops.ones_like(wo.z))
-        lacking = maximum(minimum(wo.z * side, LEAST) - dot(wo, n) * side, 0.0)
+        lacking = maximum(minimum(wo.z * side, MIN_COSINE) - dot(wo, n) * side, 0.0)
         n = n + wo * (side * lacking)
         n = n * ops.rsqrt(dot(n, n))
         return self._frame(n), dot(wo, n) * side > 0.0

@@ -15,7 +15,7 @@ from ...ops import Direction, Mode, Scalar, Spectrum, abs, maximum, where
 from ...optics.fresnel.schlick import schlick_average
 from ...optics.roughness import widths
 from ._compensated import _Compensated, lobe_ratio
-from .kulla_conty import returned
+from .kulla_conty import f_add
 
 
 class Derived(NamedTuple):
@@ -50,9 +50,9 @@ class FdezAguera(_Compensated):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """f_base + F_ms E_ms / pi, times cos theta_i."""
-        return self.base.eval(wo, wi, mode) + self.added(wo, wi, mode)
+        return self.base.eval(wo, wi, mode) + self.compensation(wo, wi, mode)
 
-    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+    def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """F_ms E_ms cos theta_i / pi."""
         _, f0, f_avg, _ = self.derived
         E_ms = self.M(wo)
@@ -68,4 +68,4 @@ class FdezAguera(_Compensated):
         lost = missing_energy(self.base)
         f0 = self.base.normal_reflectance()
         assert isinstance(lost, Reflecting) and f0 is not None, "checked when it was made"
-        return Derived(lost, f0, schlick_average(f0), lobe_ratio(returned(lost, "bounce"), lost))
+        return Derived(lost, f0, schlick_average(f0), lobe_ratio(f_add(lost, "bounce"), lost))

@@ -43,7 +43,7 @@ class Turquin(_OnBase):
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
         """The base's, times the factor."""
-        of_base = None if nodes is None or self.two_widths else inner(self.base, mu, phi)
+        of_base = None if nodes is None or self.anisotropic else inner(self.base, mu, phi)
         if of_base is None:
             return None
         types = backend.types("float64")

@@ -83,8 +83,8 @@ class Eon(BSDF):
         s = wo.x * wi.x + wo.y * wi.y
         t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both vanish only where this is masked
         once = self.albedo * (A * (1.0 + r * s / t))
-        again = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
-        return (once + again) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+        multiple = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
+        return (once + multiple) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -123,8 +123,8 @@ class Eon(BSDF):
         g = sin * (theta - sin * mu) + 2.0 / 3.0 * (sin * mu * (1.0 + sin + sin**2) / (1.0 + sin) - sin)
         A = 1.0 / (1.0 + GRAZING * r)
         E, E_avg = A * (1.0 + r * g / np.pi), A * (1.0 + AVERAGE * r)
-        again = rho**2 * E_avg / (1.0 - rho * (1.0 - E_avg))
-        value = rho * E[:, None] + again * (1.0 - E[:, None])
+        multiple = rho**2 * E_avg / (1.0 - rho * (1.0 - E_avg))
+        value = rho * E[:, None] + multiple * (1.0 - E[:, None])
         return np.where(mu > 0.0, 1.0, 0.0)[:, None] * np.broadcast_to(value, (len(mu), 3))
 
 
@@ -172,8 +172,8 @@ class _Clipped:
         radius = ops.sqrt(u1)
         sin, cos = ops.sincos((2.0 * ops.pi) * u2)
         y = radius * sin
-        kept = self._kept()
-        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - kept) + radius * cos * kept)
+        share = self._kept()
+        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - share) + radius * cos * share)
         z = ops.safe_sqrt(1.0 - (x * x + y * y))
         return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
 

@@ -23,9 +23,9 @@ class BlinnPhong(_Empirical):
     """
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
-        **_Empirical.breaks,
+        **_Empirical.known_violations,
         # the bound below is not met: close under it nothing need be gained
-        "energy": _Empirical.breaks["energy"]._replace(certain=False),
+        "energy": _Empirical.known_violations["energy"]._replace(certain=False),
     }
 
     def _highlight_power(self) -> np.ndarray:

@@ -15,7 +15,7 @@ from ...material.parameters import Colour, Number, flag, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, where
 from ...optics.frame import mirror
-from ...optics.warp import around, square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
+from ...optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf, to_frame
 
 
 class _Empirical(BSDF):
@@ -141,4 +141,4 @@ class Phong(_Empirical):
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """A direction of a cos^p lobe about the mirrored viewer."""
-        return around(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))
+        return to_frame(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))

@@ -49,8 +49,8 @@ class AshikhminShirley(_Glossy):
         """diffuse / pi, or 28 diffuse / (23 pi) (1 - Rs) (1 - (1 - (n.o) / 2)^5) (1 - (1 - (n.i) / 2)^5)."""
         if not self.coupled:
             return self._lambert * (wi.z * inv_pi)
-        kept = 1.0 - self.specular * self.reflectance(ops.ones_like(wo.z))
-        return self._lambert * kept * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
+        left = 1.0 - self.specular * self.reflectance(ops.ones_like(wo.z))
+        return self._lambert * left * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
 
     @function
     def _focus(self) -> Scalar:
@@ -62,9 +62,9 @@ class AshikhminShirley(_Glossy):
     def _density(self, h: Direction) -> Scalar:
         """p(h), 1/sr."""
         n = self.exponent
-        turned = frame.rotate(h, self.rotation)
-        sin2 = frame.sin2(turned)
-        power = (n.x * sqr(turned.x) + n.y * sqr(turned.y)) / maximum(sin2, frame.TINY)
+        h_local = frame.rotate(h, self.rotation)
+        sin2 = frame.sin2(h_local)
+        power = (n.x * sqr(h_local.x) + n.y * sqr(h_local.y)) / maximum(sin2, frame.TINY)
         norm = sqrt((n.x + 1.0) * (n.y + 1.0)) * (0.5 * inv_pi)
         return norm * power_of_cosine(h.z, sin2, power)
 

@@ -56,15 +56,15 @@ class CookTorrance(_Glossy):
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of Beckmann's visible normals over 4 (o.h) (Walter2007, eq. 14)."""
         h, _ = facet(wo, wi)
-        turned, normal = frame.rotate(wo, self.rotation), frame.rotate(h, self.rotation)
-        return 0.25 * distribution("beckmann").visible_per_cosine(turned, normal, self.alpha)
+        wo_local, normal = frame.rotate(wo, self.rotation), frame.rotate(h, self.rotation)
+        return 0.25 * distribution("beckmann").visible_per_cosine(wo_local, normal, self.alpha)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
         """wo mirrored at a visible normal."""
-        turned = frame.rotate(wo, self.rotation)
-        h = distribution("beckmann").sample_visible(turned, u.y, u.z, self.alpha)
-        return frame.rotate_back(frame.reflect(turned, h), self.rotation)
+        wo_local = frame.rotate(wo, self.rotation)
+        h = distribution("beckmann").sample_visible(wo_local, u.y, u.z, self.alpha)
+        return frame.rotate_back(frame.reflect(wo_local, h), self.rotation)
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """4 specular F: of a narrow lobe."""

@@ -15,12 +15,12 @@ from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, dot, function, inv_pi, maximum, mean, sqrt, where
-from ...optics.frame import TINY, upright
+from ...optics.frame import TINY, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
 
 # Of all samples at most so many follow the lobe: where it comes out larger than its density says, as at grazing light,
 # the cosine keeps the weight bounded.
-MOST = 0.95
+MAX_LOBE_SHARE = 0.95
 
 
 class _Glossy(BSDF):
@@ -76,7 +76,7 @@ class _Glossy(BSDF):
         """Probability of the lobe: its albedo against that of the diffuse part, less where it is as wide as that."""
         lobe = maximum(mean(self._lobe_albedo(wo)), 0.0)
         both = lobe + mean(self._lambert)
-        return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MOST)
+        return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MAX_LOBE_SHARE)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -94,11 +94,11 @@ class _Glossy(BSDF):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks a lobe; a direction below the surface is a failed sample."""
-        o = where(wo.z > 0.0, wo, upright(wo))
+        o = where(wo.z > 0.0, wo, normal_like(wo))
         share = self._share(o)
         pick = u.x < share
-        again = ops.vec3(ops.safe_div(u.x, share), u.y, u.z)
-        wi = where(pick, self._lobe_sample(o, again), square_to_cosine_hemisphere(u.y, u.z))
+        u_remapped = ops.vec3(ops.safe_div(u.x, share), u.y, u.z)
+        wi = where(pick, self._lobe_sample(o, u_remapped), square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
         return Sample.of_density(wi, weight, pdf)
@@ -109,7 +109,7 @@ class _Glossy(BSDF):
 
     def tint(self, wo: Direction) -> Spectrum:
         """The two albedos."""
-        return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, upright(wo))), 0.0)
+        return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, normal_like(wo))), 0.0)
 
 
 def sum_breach(more: str = "") -> KnownViolation:
@@ -139,4 +139,4 @@ def lit(wo: Direction, wi: Direction) -> _Lit:
     """(whether both are above the surface, both, with the normal in their place where they are not): what is masked
     anyway must not bring an infinity or a root of a negative number into a gradient."""
     above = (wo.z > 0.0) & (wi.z > 0.0)
-    return _Lit(above, where(above, wo, upright(wo)), where(above, wi, upright(wi)))
+    return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

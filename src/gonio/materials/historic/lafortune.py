@@ -11,9 +11,9 @@ from ... import ops
 from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
-from ...optics.frame import upright
+from ...optics.frame import normal_like
 from ...optics.special import logrel
-from ...optics.warp import around, power_about, square_to_power_lobe
+from ...optics.warp import power_about, square_to_power_lobe, to_frame
 from .glossy import _Glossy, sum_breach
 
 SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which there is no lobe to speak of
@@ -54,7 +54,7 @@ class Lafortune(_Glossy):
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
         missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
         missing = minimum(missing, 1.0 - SHORTEST)
-        axis = where(dot(axis, axis) > SHORTEST, axis, upright(wo))
+        axis = where(dot(axis, axis) > SHORTEST, axis, normal_like(wo))
         return normalize(axis), exp(self.exponent * (-0.5 * missing * logrel(-missing)))
 
     @function
@@ -79,7 +79,7 @@ class Lafortune(_Glossy):
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
         """A direction of the power lobe about the axis."""
         axis, _ = self._axis(wo)
-        return around(axis, square_to_power_lobe(u.y, u.z, self.exponent))
+        return to_frame(axis, square_to_power_lobe(u.y, u.z, self.exponent))
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:

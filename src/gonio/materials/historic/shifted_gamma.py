@@ -33,7 +33,7 @@ from .glossy import _Glossy, facet, sum_breach
 
 # G1 ends here. Those of the paper reach -0.002 at 90 degrees, which is kept; further down, where only parameters of
 # one's own lead, two negative G1 would multiply to a positive light without bound.
-LEAST = -0.01
+MIN_COSINE = -0.01
 
 
 class ShiftedGamma(_Glossy):
@@ -81,7 +81,7 @@ class ShiftedGamma(_Glossy):
         t = maximum(theta - self.theta0, 1e-6) / self.reach
         power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 stays in float32, and is far below the least G1
         depth = self.Lambda * power * exprel(power)
-        return maximum(1.0 - depth, LEAST)
+        return maximum(1.0 - depth, MIN_COSINE)
 
     @function
     def _density(self, h: Direction) -> Spectrum:

@@ -126,9 +126,9 @@ def derive(model: _OpenPBR) -> Between:
     if model.refracts:
         kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=model.masking)
         clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
-        found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": zeros_like(eta)}))
-        assert isinstance(found, Glass), "a dielectric's"
-        glass = found
+        lost = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": zeros_like(eta)}))
+        assert isinstance(lost, Glass), "a dielectric's"
+        glass = lost
         if filmed or model.has("coat_weight"):
             other = misses_otherwise(model, glass, bare, filmed, rough, eta)
     return Between(
@@ -183,7 +183,7 @@ def misses_otherwise(
     shares = tables.spared_on_average(rough, eta, model.masking)
     count = len(few)
     thin, dense = (
-        maximum(over_pi(side.whole) + total_of([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
+        maximum(over_pi(side.true_scale) + total_of([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
         for side, part in ((glass.thin, shares[:count]), (glass.dense, shares[count:]))
     )
     enters = (1.0 - reflected) / (thin + dense)
@@ -192,15 +192,15 @@ def misses_otherwise(
 
 def kept_at_nodes(model: _OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
     """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
-    found = []
+    kept_of = []
     E_of = tables.reflected_at_nodes(rough, ratio, model.masking)[HATS:]
     faced = tables.faced_at_nodes(rough, model.masking) if filmed else [()] * len(E_of)
     for E, shares in zip(E_of, faced, strict=True):
-        found.append(1.0 - covered(E + zeros_like(model.base_color), filmed, shares))
-    return found
+        kept_of.append(1.0 - covered(E + zeros_like(model.base_color), filmed, shares))
+    return kept_of
 
 
-def balanced(model: _OpenPBR, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar, ...]:
+def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple[Scalar, ...]:
     """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
 
     A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
@@ -209,25 +209,25 @@ def balanced(model: _OpenPBR, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar
     kept  1 - E_coat at the nodes
     """
     rows, w = tables.scattered_at_nodes(rough, model.masking), []
-    q = sqrt(kept[round(0.67 * (HATS - 1))])  # where most light is
-    for n, one in enumerate(kept):
+    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # where most light is
+    for n, one in enumerate(transmitted):
         cos = (n / (HATS - 1.0)) ** 2
         b = sqr(rough) / (sqr(rough) + cos + 1e-3)
         w.append(2.0 * one / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * one + 1e-12)))
     for _ in range(STEPS):
-        met = [total_of([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
-        w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
+        gathered = [total_of([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
+        w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, transmitted, gathered, strict=True)]
     return tuple(w)
 
 
 def returned_less(
-    model: _OpenPBR, rough: Scalar, ratio: Scalar, kept: list[Scalar], facets: tuple[Scalar, ...]
+    model: _OpenPBR, rough: Scalar, ratio: Scalar, transmitted: list[Scalar], facets: tuple[Scalar, ...]
 ) -> Scalar:
     """The mean of E (1 - E_coat - w <w>), see `layers.under`."""
     E_of = tables.reflected_at_nodes(rough, ratio, model.masking)[:HATS]
     rows = tables.scattered_at_nodes(rough, model.masking)
     less = []
-    for n, (E, one, w, row) in enumerate(zip(E_of, kept, facets, rows, strict=True)):
+    for n, (E, one, w, row) in enumerate(zip(E_of, transmitted, facets, rows, strict=True)):
         cos = (n / (HATS - 1.0)) ** 2 + zeros_like(rough)
         less.append(E * (one - w * seen_by(cos, ratio, row, facets)) * tables.MEANS[n])
     return total_of(less)

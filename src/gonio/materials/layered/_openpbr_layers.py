@@ -125,14 +125,14 @@ def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scal
     A last step of the iteration (`balanced`): of a mirror the root of 1 - E, as exact as that itself.
     """
     b, cos = model.derived, w.z
-    kept = coat_kept(model, w)
+    transmitted = coat_kept(model, w)
     tint = power(model.coat_color, 0.5 / inside(model, cos)) * sqrt(darkened(model, cos))
     place = sqrt(maximum(cos, 0.0)) * (HATS - 1.0)
     here = total_of([maximum(1.0 - abs(place - float(n)), 0.0) * w for n, w in enumerate(b.facets)])
     row = tables.scattered(cos, b.rough, model.masking)
-    met = total_of([p * w for p, w in zip(row, b.facets, strict=True)])
-    facets = sqrt(here * kept / maximum(met, 1e-4))
-    return kept, tint, facets, kept - facets * seen_by(cos, b.ratio, row, b.facets)
+    gathered = total_of([p * w for p, w in zip(row, b.facets, strict=True)])
+    facets = sqrt(here * transmitted / maximum(gathered, 1e-4))
+    return transmitted, tint, facets, transmitted - facets * seen_by(cos, b.ratio, row, b.facets)
 
 
 def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
@@ -150,8 +150,8 @@ def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]
     tint = tint_o * tint_i
     facets = (1.0 - C) + tint * (facet_o * facet_i * C)
     both = 1.0 / model.derived.joint
-    for kept, less, let in ((kept_o, less_o, let_in[0]), (kept_i, less_i, let_in[1])):
-        both = both * covered_less(kept, less, let)
+    for transmitted, less, let in ((kept_o, less_o, let_in[0]), (kept_i, less_i, let_in[1])):
+        both = both * covered_less(transmitted, less, let)
     if model.balances_diffuse:
         for w in (pair.wo, pair.wi):
             both = both * (even(model, w, True) / even(model, w, False))
@@ -163,8 +163,8 @@ def past_layers(model: _OpenPBR, w: Direction) -> Spectrum:
     """What coat and fuzz leave of light that passes them once, on its way in or out."""
     left = ones_like(model.base_color)
     if model.has("coat_weight"):
-        kept, tint, _, less = under(model, w)
-        left = mix(1.0, tint * covered_less(kept, less, let_in(model, w)), model.coat_weight) * left
+        transmitted, tint, _, less = under(model, w)
+        left = mix(1.0, tint * covered_less(transmitted, less, let_in(model, w)), model.coat_weight) * left
     if model.has("fuzz_weight"):
         left = left * (1.0 - model.fuzz_weight * fuzz_lobe(model)._lobe(w).R)
     return left

@@ -32,7 +32,7 @@ def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Ma
     h, cos = facet(o, i)
     smooth = model.smooth(b.alpha, "specular_roughness")
     facets = lobe_value(facet_lobe(model, o, i, h, b.alpha), smooth, ideal)
-    again = lobe_value(multiple_scattering(model, o, i), None, ideal)
+    multiple = lobe_value(multiple_scattering(model, o, i), None, ideal)
     through = zero
     if model.refracts:
         glossy, dielectric, through = glass_lobes(model, wo, wi, pair, cos, mode, facets, smooth, ideal)
@@ -42,12 +42,12 @@ def surface(model: _OpenPBR, wo: Direction, wi: Direction, mode: Mode, ideal: Ma
     if model.geometry_thin_walled and model.has("transmission_weight"):
         assert b.sheet_again is not None, "derived where walls are thin"
         back, on = model.sheet(cos, glossy, b.eta)
-        sheet = (back * facets + b.sheet_again[0] * again) * model.specular_color
+        sheet = (back * facets + b.sheet_again[0] * multiple) * model.specular_color
         dielectric = mix(dielectric, sheet, T)
-        through = (on * facets + b.sheet_again[1] * again) * ((1.0 - M) * T)
+        through = (on * facets + b.sheet_again[1] * multiple) * ((1.0 - M) * T)
     base = dielectric * (1.0 - M)
     if model.has("base_metalness"):
-        metal = model.metal(cos, b.eta, b.medium) * facets + b.metal_again * again
+        metal = model.metal(cos, b.eta, b.medium) * facets + b.metal_again * multiple
         base = base + metal * M
     let_in = layers.let_in(model, pair.wo), layers.let_in(model, pair.wi)
     body, passed = (lobe_value(one, None, ideal) for one in diffuse_lobes(model, pair, let_in))
@@ -146,7 +146,7 @@ def sides(model: _OpenPBR, wo: Direction, wi: Direction) -> Sides:
     elif not model.two_faced:
         valid = near = near & above
     o, i = upper(wo), where(wi.z < 0.0, -wi, wi)
-    return Sides(where(valid, o, frame.upright(o)), where(valid, i, frame.upright(i)), near & valid, above)
+    return Sides(where(valid, o, frame.normal_like(o)), where(valid, i, frame.normal_like(i)), near & valid, above)
 
 
 def diffuse_lobes(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:

@@ -119,7 +119,7 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
         covered = u.x < model.geometry_opacity
         pick = minimum(safe_div(u.x, model.geometry_opacity), ALMOST_ONE)
     o = upper(wo) if model.two_faced else wo
-    o = where(o.z > 0.0, o, frame.upright(o))
+    o = where(o.z > 0.0, o, frame.normal_like(o))
     ends = [shares.fuzz]
     for share in shares[1:]:
         ends.append(ends[-1] + share)
@@ -130,7 +130,7 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
     m = distribution("ggx").sample_visible(o, u.y, u.z, alpha)
     smooth = model.smooth(b.alpha, "specular_roughness")
     smooth_coat = model.smooth(b.coat_alpha, "coat_roughness") if model.has("coat_weight") else None
-    ideal, found = None, ops.zeros_like(pick)  # rays on smooth facets, and the probability of their direction
+    ideal, probability = None, ops.zeros_like(pick)  # rays on smooth facets, and the probability of their direction
     for mirror, here, joins, share in (
         (smooth_coat, on_coat, on_coat | on_facets, shares.coat),
         (smooth, on_facets, on_coat | on_facets, shares.mirrored),
@@ -138,9 +138,9 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
     ):
         if mirror is not None:
             ideal = here & mirror if ideal is None else ideal | (here & mirror)
-            found = found + where(joins & mirror, share, 0.0)
+            probability = probability + where(joins & mirror, share, 0.0)
     if ideal is not None:
-        m = where(ideal, frame.upright(o), m)
+        m = where(ideal, frame.normal_like(o), m)
     mirrored = frame.reflect(o, m)
     cosine = square_to_cosine_hemisphere(u.y, u.z)
     wi = where(on_coat | on_facets, mirrored, cosine)
@@ -165,7 +165,7 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
         wi = where(wo.z < 0.0, -wi, wi)
     density = density_of(model, shares, wo, wi)
     if ideal is not None:
-        density = where(ideal, found, density)
+        density = where(ideal, probability, density)
     density = where(valid, density, 0.0)
     weight = lobes.surface(model, wo, wi, mode, ideal) * safe_div(1.0, density)
     one = ops.ones_like(density)

@@ -227,11 +227,11 @@ class _OpenPBR(BSDF):
         """
         base, coat = self.specular_ior, self.coat_ior
         ratio = base / coat
-        met = mix(base, maximum(ratio, 1.0 / ratio), self.coat_weight)
+        reflecting = mix(base, maximum(ratio, 1.0 / ratio), self.coat_weight)
         below = mix(base, ratio, self.coat_weight)
         medium = base / below
         eta = maximum(medium * modulated(below, self.specular_weight), NEAREST)
-        return modulated(met, self.specular_weight), eta, medium
+        return modulated(reflecting, self.specular_weight), eta, medium
 
     # ------------------------------------------------------------------ reflectances
 

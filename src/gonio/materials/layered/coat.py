@@ -30,7 +30,7 @@ from ...optics.roughness import widths
 from ...optics.warp import square_to_cosine_hemisphere
 from ..microfacet import microfacet  # fmt: skip
 from ..microfacet.dielectric import Dielectric
-from .interior import Account, account_of, colour_of, colour_place, left_place
+from .interior import LayerTables, colour_of, colour_place, left_place, tables_of
 
 BOUNCES = {
     "coloured": "the base's, once more with each bounce: deeper and darker than the base alone",
@@ -98,11 +98,11 @@ class Coat(BSDF):
 
     def prepare(self) -> None:
         """Find the tables, before a loop is recorded."""
-        account_of(self.plain)
+        tables_of(self.plain)
 
     @property
-    def _account(self) -> Account:
-        return account_of(self.plain)
+    def _tables(self) -> LayerTables:
+        return tables_of(self.plain)
 
     @property
     def _mirror(self) -> bool:
@@ -134,7 +134,7 @@ class Coat(BSDF):
 
     def _at(self, w: Direction) -> tuple[Scalar, ...]:
         """The coat's table at a direction outside."""
-        table = self._account.coat
+        table = self._tables.coat
         at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
         return ops.lookup(table, at)
 
@@ -162,18 +162,16 @@ class Coat(BSDF):
 
     def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
         """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
-        met = ops.ones_like(a) if self.bounces == "white" else a
+        bounce_color = ops.ones_like(a) if self.bounces == "white" else a
         u = self._crossed() + ops.zeros_like(a)
-        account, ends = self._account, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
+        tables, ends = self._tables, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
         factors, rests = [], []
-        for colour, left in zip(ops.channels(colour_place(met)), ops.channels(left_place(u)), strict=True):
-            place = [ops.inset(x, n) for x, n in zip((colour, left), account.again.shape, strict=True)]
-            over_factor, norm = ops.lookup(account.again, *place)
+        for colour, left in zip(ops.channels(colour_place(bounce_color)), ops.channels(left_place(u)), strict=True):
+            place = [ops.inset(x, n) for x, n in zip((colour, left), tables.bounced.shape, strict=True)]
+            over_factor, norm = ops.lookup(tables.bounced, *place)
             factors.append(1.0 / over_factor)
-            if account.rest is not None:
-                at_o, at_i = (
-                    ops.lookup(account.rest, ops.inset(end, account.rest.shape[0]), *place)[0] for end in ends
-                )
+            if tables.rest is not None:
+                at_o, at_i = (ops.lookup(tables.rest, ops.inset(end, tables.rest.shape[0]), *place)[0] for end in ends)
                 rests.append(at_o * at_i * ops.safe_div(1.0, norm))
         rest = ops.of_channels(a, rests) * a * sqr(u) if rests else ops.zeros_like(a)
         return ops.of_channels(a, factors), rest

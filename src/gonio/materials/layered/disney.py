@@ -195,11 +195,11 @@ class Disney(BSDF):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the lobe."""
-        o = where(wo.z > 0.0, wo, frame.upright(wo))
+        o = where(wo.z > 0.0, wo, frame.normal_like(wo))
         shares = self._shares(o)
-        turned = frame.rotate(o, self.rotation)
-        m = distribution("ggx").sample_visible(turned, u.y, u.z, self._widths())
-        specular = frame.rotate_back(frame.reflect(turned, m), self.rotation)
+        wo_local = frame.rotate(o, self.rotation)
+        m = distribution("ggx").sample_visible(wo_local, u.y, u.z, self._widths())
+        specular = frame.rotate_back(frame.reflect(wo_local, m), self.rotation)
         # GTR1: cos^2 = (1 - a^(2 - 2 u)) / (1 - a^2)
         a2 = sqr(self._coat_width())
         sin2 = clamp((ops.exp(log(a2) * (1.0 - u.y)) - a2) / (1.0 - a2), 0.0, 1.0)

@@ -46,7 +46,7 @@ class OpenPBR(_OpenPBR):
         """A copy that holds what is derived, where that differs from ray to ray: it is asked for in many places."""
         if self._derived is not None:
             return self
-        derived = binding.settled(self, MOST_RAYS) if self.wavelengths is None else None
+        derived = binding.evaluate_derived(self, MOST_RAYS) if self.wavelengths is None else None
         return binding.with_derived(self, self.derive() if derived is None else derived)
 
     def prepare(self) -> None:

@@ -177,17 +177,17 @@ class Dielectric(microfacet._Microfacet):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
-        turned = frame.rotate(wo, self.rotation)
+        wo_local = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
-        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
+        m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
         facing = where(wo.z < 0.0, -m, m)  # a facet faces the side of wo
-        cos_o = abs(dot(turned, facing))
+        cos_o = abs(dot(wo_local, facing))
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         f = self.reflectance(cos_o, cos_t, eta)
         share = self._share(f)
         reflects = u.x < share
-        wi = where(reflects, frame.reflect(turned, facing), frame.refract(turned, facing, cos_t, eta))
+        wi = where(reflects, frame.reflect(wo_local, facing), frame.refract(wo_local, facing, cos_t, eta))
         wi = frame.rotate_back(wi, self.rotation)
         sides = wo.z * wi.z
         right_side = where(reflects, sides > 0.0, sides < 0.0)
@@ -207,7 +207,7 @@ class Dielectric(microfacet._Microfacet):
         """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        m = where(delta, frame.upright(wo), m)  # equal indices send light straight on, at no normal of their own
+        m = where(delta, frame.normal_like(wo), m)  # equal indices send light straight on, at no normal of their own
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)

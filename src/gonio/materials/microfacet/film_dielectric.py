@@ -46,8 +46,8 @@ class FilmDielectric(Dielectric):
         white = ones_like(self.albedo)
         if self.fresnel == "one":
             return white * ones_like(cos_o)
-        found = film.reflectance(where(self._inside(eta), cos_t, cos_o), self._film())
-        return where(cos_t > 0.0, found, white)
+        filmed = film.reflectance(where(self._inside(eta), cos_t, cos_o), self._film())
+        return where(cos_t > 0.0, filmed, white)
 
     def _inside(self, eta: Scalar) -> Mask:
         """Whether light comes from the glass, by the index on the far side over that on its own."""
@@ -83,11 +83,11 @@ class FilmDielectric(Dielectric):
         through = film.polarization(where(inside, cos_t, cos_o), self._film())[1]
         size = 1.0 / (sqr(through.c) + sqr(through.s) + 1e-12)
         cos2, sin2 = (sqr(through.c) - sqr(through.s)) * size, 2.0 * through.c * through.s * size
-        turned = Diattenuation(back.d, back.c * cos2 + back.s * sin2, back.c * sin2 - back.s * cos2)
+        from_inside = Diattenuation(back.d, back.c * cos2 + back.s * sin2, back.c * sin2 - back.s * cos2)
         total, white = reflected_by_glass(cos_o, eta), ones_like(self.albedo)
 
         def chosen(place: int) -> Spectrum:
-            return where(cos_t > 0.0, where(inside, turned[place], back[place]), white * total[place])
+            return where(cos_t > 0.0, where(inside, from_inside[place], back[place]), white * total[place])
 
         return Diattenuation(chosen(0), chosen(1), chosen(2)), on
 

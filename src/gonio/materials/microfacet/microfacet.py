@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...material.bsdf import BSDF, Delta, InnerAlbedo, Microsurface
 from ...material.parameters import Angle, Colour, Width, angle, choice, pair_of, spectrum, width
-from ...ops import Direction, Pair, Scalar, Spectrum, abs, backend, dot, function, safe_div, where
+from ...ops import Direction, Mask, Pair, Scalar, Spectrum, abs, backend, dot, function, ones_like, safe_div, where
 from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
-from ...optics.roughness import SMOOTH
+from ...optics.roughness import SMOOTH, widths
 
 SAMPLINGS = {
     "visible": "normals as wo sees them",
@@ -85,6 +85,22 @@ class _Microfacet(BSDF):
     @property
     def delta(self) -> Delta:
         return delta_of(self.plain.alpha)
+
+    def _roughness(self) -> tuple[Pair, Mask]:
+        """Widths of the distribution, and where the surface is smooth."""
+        return widths(self.alpha)
+
+    def _one(self) -> Scalar:
+        """1 for every ray: the cosine along the normal."""
+        return ones_like(self.alpha.x)
+
+    def _to_local(self, w: Direction) -> Direction:
+        """w along the axes of the anisotropy."""
+        return frame.rotate(w, self.rotation)
+
+    def _from_local(self, w: Direction) -> Direction:
+        """The inverse of `_to_local`."""
+        return frame.rotate_back(w, self.rotation)
 
     @property
     def microsurface(self) -> Microsurface:

@@ -41,7 +41,7 @@ class Mirror(BSDF):
         """All of it: s turns over and p does not, as at a perfect conductor."""
         zero = zeros_like(wo.z)
         value = self.albedo * where(delta & (wo.z > 0.0), 1.0 + zero, 0.0)
-        return (Polarized(value, frame.upright(wo), Diattenuation(zero, zero - 1.0, zero)),)
+        return (Polarized(value, frame.normal_like(wo), Diattenuation(zero, zero - 1.0, zero)),)
 
     @property
     def delta(self) -> Delta:

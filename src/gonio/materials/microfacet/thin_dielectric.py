@@ -107,7 +107,7 @@ class ThinDielectric(BSDF):
         matrix = Diattenuation(where(crosses, d, zero), where(crosses, c, total.c), where(crosses, zero, total.s))
         share = self.reflectance(cos)
         value = self.albedo * where(delta, where(reflects, share, 1.0 - share), 0.0)
-        return (Polarized(value, frame.upright(wo), matrix),)
+        return (Polarized(value, frame.normal_like(wo), matrix),)
 
     @property
     def transmits(self) -> bool:

@@ -119,7 +119,7 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
     """
     eta, k = np.broadcast_arrays(_real(eta, "eta"), _real(k, "k"))
     check_index(eta, k, "brewster_angle")
-    found = np.array(np.arctan(eta))
+    angles = np.array(np.arctan(eta))
     metal = k > 0.0
     if np.any(metal):
         e = (eta[metal] + 1j * k[metal]) ** 2
@@ -131,8 +131,8 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
         roots = np.linalg.eigvals(companion)
         inside = (np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real >= 1.0)
         least = 1.0 / np.max(np.where(inside, roots.real, 0.0), axis=-1, initial=np.finfo(float).tiny)
-        found[metal] = np.arcsin(np.sqrt(np.where(least <= 1.0, least, np.nan)))
-    return found
+        angles[metal] = np.arcsin(np.sqrt(np.where(least <= 1.0, least, np.nan)))
+    return angles
 
 
 def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
