@@ -115,20 +115,10 @@ def derive(model: _OpenPBR) -> Between:
     if model.has("base_metalness"):
         places = FEW_PLACES if filmed else PLACES
         f_metal = averaged([model.metal(x + zeros_like(rough), eta, medium) for x in places])
-    sheet = None
-    if model.geometry_thin_walled:
-        f = [white * one for one in bare]
-        if filmed:
-            f = [one + more for one, more in zip(f, filmed, strict=True)]
-        both_ways = [model.sheet(x + zeros_like(rough), one, eta) for x, one in zip(PLACES, f, strict=True)]
-        sheet = averaged([back for back, _ in both_ways]), averaged([on for _, on in both_ways])
+    sheet = colors_of_sheet(model, bare, filmed, rough, eta) if model.geometry_thin_walled else None
     glass, other = None, None
     if model.refracts:
-        kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=model.masking)
-        clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
-        lost = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": zeros_like(eta)}))
-        assert isinstance(lost, Glass), "a dielectric's"
-        glass = lost
+        glass = missed_by_glass(model, eta, alpha)
         if filmed or model.has("coat_weight"):
             other = misses_otherwise(model, glass, bare, filmed, rough, eta)
     return Between(
@@ -151,6 +141,27 @@ def derive(model: _OpenPBR) -> Between:
         glass=glass,
         other=other,
     )
+
+
+def colors_of_sheet(
+    model: _OpenPBR, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
+) -> tuple[Spectrum, Spectrum]:
+    """Mean colors of what a thin sheet reflects and transmits."""
+    f = [ones_like(model.base_color) * one for one in bare]
+    if filmed:
+        f = [one + more for one, more in zip(f, filmed, strict=True)]
+    both_ways = [model.sheet(x + zeros_like(rough), one, eta) for x, one in zip(PLACES, f, strict=True)]
+    return averaged([back for back, _ in both_ways]), averaged([on for _, on in both_ways])
+
+
+def missed_by_glass(model: _OpenPBR, eta: Scalar, alpha: Pair) -> Glass:
+    """What single scattering at bare glass of that index misses."""
+    kind = Dielectric(alpha=(0.1, 0.2) if model.anisotropic else 0.1, masking=model.masking)
+    zero, white = zeros_like(model.base_color), ones_like(model.base_color)
+    values = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
+    lost = missing_energy(binding.bound_copy(kind, {**values, "priority": zeros_like(eta)}))
+    assert isinstance(lost, Glass), "a dielectric's"
+    return lost
 
 
 def at_places(

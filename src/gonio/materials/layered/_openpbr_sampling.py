@@ -6,7 +6,22 @@ from typing import NamedTuple
 
 from ... import ops
 from ...material import Sample
-from ...ops import Direction, Mode, Scalar, abs, clamp, inv_pi, maximum, mean, minimum, safe_div, vec2, vec3, where
+from ...ops import (
+    Direction,
+    Mask,
+    Mode,
+    Scalar,
+    abs,
+    clamp,
+    inv_pi,
+    maximum,
+    mean,
+    minimum,
+    safe_div,
+    vec2,
+    vec3,
+    where,
+)
 from ...optics import frame, fresnel
 from ...optics.fresnel import exact
 from ...optics.ndf import distribution
@@ -85,6 +100,7 @@ def shares_at(model: _OpenPBR, wo: Direction) -> Shares:
 
 
 def density_of(model: _OpenPBR, shares: Shares, wo: Direction, wi: Direction) -> Scalar:
+    """The mixture of the lobes' densities, by their shares."""
     b = model.derived
     pair = lobes.sides(model, wo, wi)
     o, i = pair.wo, pair.wi
@@ -113,6 +129,7 @@ def density_of(model: _OpenPBR, shares: Shares, wo: Direction, wi: Direction) ->
 
 
 def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
+    """A direction of the lobe that u.x picks."""
     b, shares = model.derived, shares_at(model, wo)
     pick = u.x
     if model.has_holes():
@@ -150,15 +167,7 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
         valid = wi.z > 0.0
     if model.two_faced:
         far = ~on_fuzz & ~on_coat & ~on_facets & ~on_near
-        if model.geometry_thin_walled:
-            bent, passes = mirrored, mirrored.z > 0.0
-            bent = vec3(bent.x, bent.y, -bent.z)
-        else:
-            eta = where(wo.z >= 0.0, b.eta, 1.0 / b.eta)
-            cos_m = ops.dot(o, m)
-            cos_t = fresnel.cos_transmitted(cos_m, eta)
-            bent = frame.refract(o, m, cos_t, eta)
-            passes = (cos_t > 0.0) & (bent.z < 0.0)
+        bent, passes = _transmitted(model, wo, o, m, mirrored)
         below = vec3(wi.x, wi.y, -wi.z)
         wi = where(on_refracted, bent, where(far, below, wi))
         valid = where(on_refracted, passes, where(far, wi.z < 0.0, valid))
@@ -173,9 +182,30 @@ def drawn(model: _OpenPBR, wo: Direction, u: Direction, mode: Mode) -> Sample:
     if model.refracts:
         eta = where(wo.z * wi.z > 0.0, one, where(wo.z >= 0.0, b.eta, 1.0 / b.eta))
     delta = density != density if ideal is None else ideal & valid
-    if model.has_holes():
-        through = 1.0 - model.geometry_opacity
-        wi, weight = where(covered, wi, -wo), where(covered, weight, one)
-        density = where(covered, density * model.geometry_opacity, through)
-        eta, delta = where(covered, eta, one), ~covered | delta
-    return Sample(wi, weight, density, delta, eta)
+    sample = Sample(wi, weight, density, delta, eta)
+    return _with_holes(model, wo, sample, covered) if model.has_holes() else sample
+
+
+def _transmitted(
+    model: _OpenPBR, wo: Direction, o: Direction, m: Direction, mirrored: Direction
+) -> tuple[Direction, Mask]:
+    """The direction on the far side by a facet of normal m, and whether there is one."""
+    if model.geometry_thin_walled:
+        return vec3(mirrored.x, mirrored.y, -mirrored.z), mirrored.z > 0.0
+    b = model.derived
+    eta = where(wo.z >= 0.0, b.eta, 1.0 / b.eta)
+    cos_t = fresnel.cos_transmitted(ops.dot(o, m), eta)
+    bent = frame.refract(o, m, cos_t, eta)
+    return bent, (cos_t > 0.0) & (bent.z < 0.0)
+
+
+def _with_holes(model: _OpenPBR, wo: Direction, sample: Sample, covered: Mask) -> Sample:
+    """The sample where the surface is there (`covered`); elsewhere light goes straight on."""
+    one = ops.ones_like(sample.pdf)
+    return Sample(
+        where(covered, sample.wi, -wo),
+        where(covered, sample.weight, one),
+        where(covered, sample.pdf * model.geometry_opacity, 1.0 - model.geometry_opacity),
+        ~covered | sample.delta,
+        where(covered, sample.eta, one),
+    )

@@ -26,6 +26,7 @@ from ...material import width as width_parameter
 from ...material.bsdf import Delta
 from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
 from ...optics import frame, fresnel
+from ...optics.fresnel import exact
 from ...optics.roughness import widths
 from ...optics.warp import square_to_cosine_hemisphere
 from ..microfacet import microfacet  # fmt: skip
@@ -129,8 +130,7 @@ class Coat(BSDF):
         """T of a smooth top, by Fresnel's equations: not 1 - R, which at grazing angles has no digits left."""
         cos = ops.abs(w.z)
         cos_t = fresnel.cos_transmitted(cos, self.index)
-        across, along = cos + self.index * cos_t, self.index * cos + cos_t
-        return 2.0 * self.index * cos * cos_t * (1.0 / sqr(across) + 1.0 / sqr(along))
+        return exact.transmittance(cos, cos_t, self.index)
 
     def _at(self, w: Direction) -> tuple[Scalar, ...]:
         """The coat's table at a direction outside."""

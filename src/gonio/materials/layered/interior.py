@@ -40,6 +40,7 @@ from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, Table, backend
 from ...ops.backend import Array
 from ...optics import frame
+from ...optics.fresnel import exact
 from ...optics.lattice import r_sequence
 from ...optics.roughness import SMOOTH
 from ..compensated.kulla_conty import KullaConty
@@ -196,12 +197,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
     if max(x_width, y_width) < SMOOTH or index < 1.0 + 1e-5:
 
         def fresnel(cos: Floats) -> Floats:
-            cos = np.maximum(cos, EPSILON)
-            cos_t = np.sqrt(1.0 - (1.0 - cos**2) / index**2)
-            r_s = (cos - index * cos_t) / (cos + index * cos_t)
-            r_p = (index * cos - cos_t) / (index * cos + cos_t)
-            reflectance: Floats = 0.5 * (r_s**2 + r_p**2)
-            return reflectance
+            return exact.dielectric_array(np.maximum(cos, EPSILON), index)
 
         return _Interface(
             fresnel, lambda p: np.where(p > 0.0, 1.0 - fresnel(p * p), 0.0), lambda x: 0.0 * x, None, None

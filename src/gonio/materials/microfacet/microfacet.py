@@ -94,13 +94,10 @@ class _Microfacet(BSDF):
         """1 for every ray: the cosine along the normal."""
         return ones_like(self.alpha.x)
 
-    def _to_local(self, w: Direction) -> Direction:
-        """w along the axes of the anisotropy."""
-        return frame.rotate(w, self.rotation)
-
-    def _from_local(self, w: Direction) -> Direction:
-        """The inverse of `_to_local`."""
-        return frame.rotate_back(w, self.rotation)
+    @property
+    def _turn(self) -> Pair | None:
+        """The rotation of the anisotropy's axes, as `frame.rotate` takes it."""
+        return self.rotation
 
     @property
     def microsurface(self) -> Microsurface:

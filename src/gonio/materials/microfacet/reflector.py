@@ -23,7 +23,7 @@ class _Reflector(microfacet._Microfacet):
         along the axes of the anisotropy; turned last, as wo + wi would cancel with the rounding of the turn."""
         m = frame.half_vector(wo, wi)
         alpha, smooth = self._roughness()
-        wo, wi, m = (self._to_local(w) for w in (wo, wi, m))
+        wo, wi, m = (frame.rotate(w, self._turn) for w in (wo, wi, m))
         return wo, wi, m, alpha, _above(wo, wi) & ~smooth
 
     @method
@@ -42,9 +42,9 @@ class _Reflector(microfacet._Microfacet):
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
         alpha, smooth = self._roughness()
-        wo_local = self._to_local(wo)
+        wo_local = frame.rotate(wo, self._turn)
         m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
-        wi = self._from_local(frame.reflect(wo_local, m))
+        wi = frame.rotate_back(frame.reflect(wo_local, m), self._turn)
         # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         wo_local, wi_local, m, alpha, lit = self._facet(wo, wi)
         density = 0.25 * microfacet.pdf_per_cosine(self, wo_local, m, alpha)
