@@ -254,8 +254,8 @@ def spelled(cls: type[BSDF]) -> str:
 def taken_apart(text: str, where: str = "MODEL") -> tuple[type[BSDF], dict[str, object]]:
     """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); of a document's material
     what JSON has for them."""
-    if text.count("(") + text.count("{") > tree.MOST:
-        raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
+    if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
+        raise InputError(f"more than {tree.MAX_MATERIALS} materials inside each other", where, "mix fewer materials")
     head = text.strip()
     while True:  # a file's name may have brackets in it
         reader = outside.reader_of(head)

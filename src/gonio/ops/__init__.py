@@ -192,12 +192,12 @@ def rsqrt(x: T) -> T:
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
 
 
-def zeros_like(x: V) -> V:
+def zeros_like(x: T) -> T:
     """0 in the type and for every lane of x; recorded as 0 x."""
     return 0.0 * x
 
 
-def ones_like(x: V) -> V:
+def ones_like(x: T) -> T:
     """1 in the type and for every lane of x; recorded as 1 + 0 x."""
     return 1.0 + 0.0 * x
 

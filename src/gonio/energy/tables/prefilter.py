@@ -52,7 +52,7 @@ def roughness_of(level: int, levels: int) -> float:
 
 
 def prefilter(
-    environment: Environment, ndf: str = "ggx", levels: int = LEVELS, where: str = "environment"
+    environment: Environment, ndf: str = "ggx", levels: int = LEVELS, location: str = "environment"
 ) -> list[Array]:
     """The levels of an environment, each half as large as the one before; the first is the map itself.
 
@@ -62,7 +62,7 @@ def prefilter(
     Raises InputError for a map of another shape, with values that are negative or not finite, or too small for so many
     levels, and for an unknown distribution.
     """
-    source = _checked(environment, levels, where)
+    source = _checked(environment, levels, location)
     lobe = distribution(ndf)
     return [source, *(_blurred(source, lobe, level, levels) for level in range(1, levels))]
 
@@ -109,22 +109,24 @@ def bake(
     return Baked(arrays, manifest)
 
 
-def _checked(environment: Environment, levels: int, where: str) -> Array:
+def _checked(environment: Environment, levels: int, location: str) -> Array:
     source = np.asarray(environment, dtype=np.float64)
     if source.ndim != 3 or source.shape[1] != 2 * source.shape[0] or source.size == 0:
         what = f"a picture of shape {source.shape}, expected latitude-longitude: (H, 2 H, channels)"
-        raise InputError(what, where, "give a panorama twice as wide as high, the zenith on top")
+        raise InputError(what, location, "give a panorama twice as wide as high, the zenith on top")
     bad = np.count_nonzero(~np.isfinite(source) | (source < 0.0))
     if bad:
-        raise InputError(f"{bad} values are negative or not finite", where, "radiance is 0 or more: mend the picture")
+        raise InputError(
+            f"{bad} values are negative or not finite", location, "radiance is 0 or more: mend the picture"
+        )
     height = source.shape[0]
     if not MIN_ROWS <= height <= MAX_ROWS:
-        raise InputError(f"a map of {height} rows, expected {MIN_ROWS} to {MAX_ROWS}", where, "scale the picture")
+        raise InputError(f"a map of {height} rows, expected {MIN_ROWS} to {MAX_ROWS}", location, "scale the picture")
     if not 2 <= levels <= MOST_LEVELS:
         raise InputError(f"{levels} levels asked for", "--levels", f"give 2 to {MOST_LEVELS}")
     if height >> (levels - 1) < 2:
         what = f"{levels} levels of a map of {height} rows, each half as large as the one before"
-        raise InputError(what, where, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")
+        raise InputError(what, location, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")
     return source
 
 

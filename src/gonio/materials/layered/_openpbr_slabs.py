@@ -31,6 +31,7 @@ from ...ops import (
     vec2,
     where,
 )
+from ...ops.backend import Array
 from ...optics import fresnel
 from ...optics.fresnel import exact, film
 from ...optics.fresnel.f82 import GRAZING, f82
@@ -178,6 +179,10 @@ class _OpenPBR(BSDF):
         if isinstance(self.geometry_opacity, Node) or backend.is_drjit(value):
             return True
         return bool(np.any(np.asarray(value, float) != 1.0))
+
+    def times_opacity(self, value: Array) -> Array:
+        """A value times the share of the surface that is there."""
+        return value * self.geometry_opacity if self.has_holes() else value
 
     def may_be_smooth(self, name: str) -> bool:
         """Whether a roughness may be so small that its lobe is a mirror's."""

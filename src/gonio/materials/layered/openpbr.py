@@ -56,15 +56,13 @@ class OpenPBR(_OpenPBR):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The sum of all lobes times |cos theta_i|; mirrors and the light that goes straight on are delta lobes."""
-        value = lobes.surface(self._settled(), wo, wi, mode)
-        return value * self.geometry_opacity if self.has_holes() else value
+        return self.times_opacity(lobes.surface(self._settled(), wo, wi, mode))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The mixture of the lobes' densities."""
         model = self._settled()
-        density = sampling.density_of(model, sampling.shares_at(model, wo), wo, wi)
-        return density * self.geometry_opacity if self.has_holes() else density
+        return self.times_opacity(sampling.density_of(model, sampling.shares_at(model, wo), wo, wi))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:

@@ -33,7 +33,7 @@ class Metal(_Reflector):
     r0: Colour = spectrum(default=0.9, doc="reflectance from above", low=0.0, high=1.0, soft_high=True)
     edge: Colour = spectrum(default=1.0, doc="factor on Schlick's curve at 82 degrees", low=0.0, high=1.0)
     alpha: Width = microfacet.alpha_width()
-    rotation: Angle = microfacet.rotation_angle()
+    rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
     ndf: str = microfacet.ndf_choice()
     masking: str = microfacet.masking_choice()
     fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")

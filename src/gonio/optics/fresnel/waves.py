@@ -148,13 +148,13 @@ def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def check_index(eta: Reals, k: Reals, where: str) -> None:
+def check_index(eta: Reals, k: Reals, location: str) -> None:
     """Raise InputError for an index that no medium has."""
     if np.any(eta <= 0.0):
-        raise InputError(f"eta = {np.min(eta):g}, a positive index expected", f"{where}: eta", "that of air is 1")
+        raise InputError(f"eta = {np.min(eta):g}, a positive index expected", f"{location}: eta", "that of air is 1")
     if np.any(k < 0.0):
         what = f"k = {np.min(k):g}, which would give light"
-        raise InputError(what, f"{where}: k", "an index that absorbs is eta + i k with k >= 0")
+        raise InputError(what, f"{location}: k", "an index that absorbs is eta + i k with k >= 0")
 
 
 def _real(value: ArrayLike, name: str) -> Reals:
