@@ -111,7 +111,7 @@ class Lobe(NamedTuple):
 
     @property
     def span(self) -> float:
-        """Of the azimuth."""
+        """Length of the axis of the azimuth."""
         return 2.0 * ops.pi if self.full else ops.pi
 
     def at(self, index: Scalar, s: Scalar, phi: Scalar) -> Scalar:

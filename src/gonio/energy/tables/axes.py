@@ -56,7 +56,7 @@ class Axes:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Nodes along each."""
+        """Number of nodes along each axis."""
         return (self.azimuths, self.size, self.size) if self.azimuths else (self.size, self.size)
 
     def at(self, *index: Any) -> Points:

@@ -94,7 +94,7 @@ class NormalMap(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's, likewise."""
+        """The base's density, and that of the mirrored samples, as in `eval`."""
         frame, valid = self._bent(wo)
         o, i = frame.local(wo), frame.local(wi)
         density = self.base.pdf(o, i)
@@ -160,7 +160,7 @@ class NormalMap(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The base's."""
+        """The base's factor of ambient light."""
         return self.base.ambient
 
 

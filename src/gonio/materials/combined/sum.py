@@ -36,15 +36,15 @@ class Sum(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """a + b."""
+        """The sum of both values."""
         return self.a.eval(wo, wi, mode) + self.b.eval(wo, wi, mode)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The parts of both."""
+        """The polarized parts of both materials."""
         return (*self.a.polarized(wo, wi, delta, mode), *self.b.polarized(wo, wi, delta, mode))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """That of both."""
+        """The sum of both tints."""
         return self.a.tint(wo) + self.b.tint(wo)
 
     @property

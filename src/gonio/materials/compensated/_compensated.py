@@ -73,7 +73,7 @@ class _OnBase(BSDF):
         return self.base.polarized(wo, wi, delta, mode)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's."""
+        """The base's tint."""
         return self.base.tint(wo)
 
 

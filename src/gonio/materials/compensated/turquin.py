@@ -76,7 +76,7 @@ class Turquin(_OnBase):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's."""
+        """The base's density: the factor leaves the shape of the lobe."""
         return self.base.pdf(wo, wi)
 
     @method

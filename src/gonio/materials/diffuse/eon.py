@@ -67,12 +67,12 @@ class Eon(BSDF):
 
     @function
     def _single(self) -> Scalar:
-        """A."""
+        """A, the normalization of the single-scattering lobe."""
         return 1.0 / (1.0 + GRAZING * self.roughness)
 
     @function
     def _again(self) -> Spectrum:
-        """rho_ms."""
+        """rho_ms, the color of multiple scattering."""
         E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
         return sqr(self.albedo) * E_avg / (1.0 - self.albedo * (1.0 - E_avg))
 

@@ -33,7 +33,7 @@ class Lambert(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """By the cosine."""
+        """A cosine-weighted direction."""
         return self.sample_cosine(wo, u, mode)
 
     def known_albedo(

@@ -62,7 +62,7 @@ class OrenNayar(BSDF):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """By the cosine."""
+        """A cosine-weighted direction."""
         return self.sample_cosine(wo, u, mode)
 
 

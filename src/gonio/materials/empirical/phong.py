@@ -112,7 +112,7 @@ class _Empirical(BSDF):
 
     @property
     def ambient(self) -> Spectrum:
-        """ka."""
+        """The ambient reflectance ka."""
         return self.ka
 
 

@@ -85,7 +85,7 @@ class ShiftedGamma(_Glossy):
 
     @function
     def _density(self, h: Direction) -> Spectrum:
-        """D."""
+        """D, the density of facet normals, 1/sr."""
         cos2 = sqr(maximum(h.z, 1e-4))
         x = self.alpha + frame.sin2(h) / (cos2 * self.alpha)
         return self.normalization * exp(-x - self.p * log(x)) * (inv_pi / sqr(cos2))

@@ -105,7 +105,7 @@ class Disney(BSDF):
 
     @function
     def _coat_width(self) -> Scalar:
-        """.1 to .001."""
+        """alpha of the clearcoat: 0.1 for satin to 0.001 for gloss."""
         return 0.1 + self.clearcoat_gloss * (0.001 - 0.1)
 
     @function
@@ -117,7 +117,7 @@ class Disney(BSDF):
 
     @function
     def _normal_reflectance(self) -> Spectrum:
-        """F0."""
+        """F0, the reflectance at normal incidence."""
         tinted = 1.0 + (self._tint() - 1.0) * self.specular_tint
         dielectric = tinted * (0.08 * self.specular)
         return dielectric + (self.base_color - dielectric) * self.metallic

@@ -193,12 +193,12 @@ class DisneyBSDF(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """That of the slabs."""
+        """The density of the slabs, along the axes of the anisotropy."""
         return self._slabs().pdf(self._turned(wo), self._turned(wi))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """That of the slabs."""
+        """A sample of the slabs, turned back to the surface."""
         drawn = self._slabs().sample(self._turned(wo), u, mode)
         return drawn._replace(wi=frame.rotate_back(drawn.wi, self.rotation))
 
@@ -227,7 +227,7 @@ class DisneyBSDF(BSDF):
         return Interior(self._slabs().indices()[1], ops.zeros_like(self.base_color), ops.zeros_like(self.eta))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The slabs' colours."""
+        """The tint of the slabs."""
         return self._slabs().tint(wo)
 
 

@@ -74,13 +74,13 @@ class Sheen(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """albedo R D."""
+        """albedo R D, the lobe times its albedo."""
         lobe = self._lobe(wo)
         return self.albedo * (lobe.R * self._density(lobe, wo, wi))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """D."""
+        """D, the density of the transformed cosine."""
         return self._density(self._lobe(wo), wo, wi)
 
     @method

@@ -61,14 +61,14 @@ class SheenCharlie(BSDF):
 
     @function
     def _exponent(self, x: Scalar) -> Scalar:
-        """L."""
+        """L, the exponent of the fit to Lambda."""
         share = sqr(1.0 - self.alpha)
         a, b, c, d, e = (share * narrow + (1.0 - share) * wide for narrow, wide in zip(NARROW, WIDE, strict=True))
         return a / (1.0 + b * ops.pow(x, c)) + d * x + e
 
     @function
     def _visible(self, wo: Direction, wi: Direction) -> Scalar:
-        """G."""
+        """G, the masking of both directions."""
         return 1.0 / (1.0 + self._lambda(wo.z) + self._lambda(wi.z))
 
     @method
