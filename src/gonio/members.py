@@ -7,7 +7,7 @@ A member is found in one of three places, and nowhere has it to be listed:
     `go.register(Ward)`, in a program or as decorator
 
 Names are unique in a family: a member that takes the name of another is an error, unless that one says that it gives
-way (`gives_way`: Gonio's historic models, whose names are what people write first), or it is the same class again,
+way (`overridable`: Gonio's historic models, whose names are what people write first), or it is the same class again,
 from a file that was loaded anew.
 """
 
@@ -95,8 +95,8 @@ class Family(Generic[Member]):
         check = getattr(member, "check_formulas", None)
         if callable(check) and not isinstance(member, type):
             check(where)
-        gives_way = getattr(standing, "gives_way", False)
-        if standing is not None and standing is not member and not gives_way and _source(standing) != _source(member):
+        overridable = getattr(standing, "overridable", False)
+        if standing is not None and standing is not member and not overridable and _source(standing) != _source(member):
             what = f"the {self.kind} '{name}' is there already, in {_source(standing)[0]}"
             raise InputError(what, where, "give yours another name")
         self._added[name] = member

@@ -105,7 +105,7 @@ class FresnelAtTheNormal(RightFacets):
     caught_by = "reciprocity"
 
     def _F(self, wo: Any, m: Any) -> Any:
-        return RightFacets._F(self, wo, frame.upright(wo))
+        return RightFacets._F(self, wo, frame.normal_like(wo))
 
 
 class AlphaSquaredAgain(RightFacets):

@@ -12,7 +12,7 @@ from gonio.optics import frame, warp
 
 
 class RightDiffuse(BSDF):
-    """The sound one: albedo / pi, with the fall-back's cosine sampling."""
+    """The sound one: albedo / pi, sampled by the cosine."""
 
     caught_by: ClassVar[str] = ""
 
@@ -27,6 +27,9 @@ class RightDiffuse(BSDF):
 
     def pdf(self, wo: Any, wi: Any) -> Any:
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+    def sample(self, wo: Any, u: Any, mode: Any = "radiance") -> Any:
+        return self.sample_cosine(wo, u, mode)
 
 
 class NoCosine(RightDiffuse):
@@ -205,7 +208,7 @@ class RightCompensation(BSDF):
     """The sound one: a base that loses light, f = mu_o mu_i / pi with E = 2/3 mu, and Kulla and Conty's term on top."""
 
     caught_by: ClassVar[str] = ""
-    lossless: ClassVar[float | None] = 1e-3
+    lossless_tolerance: ClassVar[float | None] = 1e-3
     average: ClassVar[float] = 4.0 / 9.0  # 2 int 2/3 mu mu dmu
 
     albedo: Value = spectrum(1.0, "albedo", low=0.0, high=1.0)

@@ -32,7 +32,7 @@ def test_axes_are_texel_centres_and_rows_are_roughness():
     centres = (np.arange(16) + 0.5) / 16
     np.testing.assert_allclose(baked.arrays["mu"], centres)
     assert baked.arrays["E"][12, 3] == pytest.approx(
-        float(quadrature.moments("ggx", "smith-correlated", centres[3], centres[12] ** 2).whole), abs=1e-12
+        float(quadrature.moments("ggx", "smith-correlated", centres[3], centres[12] ** 2).white), abs=1e-12
     )
     np.testing.assert_allclose(baked.arrays["dfg"].sum(-1), baked.arrays["E"], rtol=1e-12)
     assert baked.arrays["E_avg"].shape == (16,)
@@ -41,7 +41,7 @@ def test_axes_are_texel_centres_and_rows_are_roughness():
 def test_the_manifests_error_is_within_a_factor_3_of_the_truth():
     baked = baking.bake("ggx", ["E"], size=64)
     mu, roughness = baked.arrays["mu"], baked.arrays["roughness"]
-    truth = quadrature.moments("ggx", "smith-correlated", mu, roughness[:, None] ** 2, nodes=(110, 90)).whole
+    truth = quadrature.moments("ggx", "smith-correlated", mu, roughness[:, None] ** 2, nodes=(110, 90)).white
     actual = np.abs(baked.arrays["E"] - truth).max()
     assert actual / 3 < baked.manifest["error"]["E"]["max"] < actual * 3
 
@@ -119,7 +119,7 @@ def test_e_avg_of_two_widths_is_the_mean_over_all_directions():
     x, w = quadrature.gauss(48)
     phi = (np.arange(180) + 0.5) / 180 * 0.5 * np.pi
     for r, found in zip(baked.arrays["roughness"], baked.arrays["E_avg"], strict=True):
-        e = quadrature.moments("ggx", "smith-correlated", x, r**2, 0.2 * r**2, phi[:, None]).whole
+        e = quadrature.moments("ggx", "smith-correlated", x, r**2, 0.2 * r**2, phi[:, None]).white
         assert found == pytest.approx(float((e @ (2 * w * x)).mean()), abs=1e-5)
 
 
@@ -146,7 +146,7 @@ def test_the_error_between_nodes_is_what_a_reader_of_the_table_meets():
     e = baked.arrays["E"]
     between = (e[r0, c0] * (1 - fc) + e[r0, c0 + 1] * fc) * (1 - fr)
     between += (e[r0 + 1, c0] * (1 - fc) + e[r0 + 1, c0 + 1] * fc) * fr
-    exact = quadrature.moments("ggx", "smith-correlated", *axes.at(row, column)[:2]).whole
+    exact = quadrature.moments("ggx", "smith-correlated", *axes.at(row, column)[:2]).white
     met = np.abs(between - exact).max()
     assert met / 2 < baked.manifest["error"]["E"]["interpolation"] < met * 2
 
@@ -296,7 +296,7 @@ def test_a_public_solutions_pictures_agree_with_the_exact_table(shared):
     reference = shared / "reference" / "kulla-conty"
     centres = (np.arange(128) + 0.5) / 128
     mu, roughness = np.meshgrid(centres, centres)
-    exact = quadrature.moments("ggx", "schlick-ibl", mu, roughness**2).whole[::-1]
+    exact = quadrature.moments("ggx", "schlick-ibl", mu, roughness**2).white[::-1]
     picture = read_png(reference / "homework_E_importance_sampled.png")[..., 0] / 255.0
     rough = roughness[::-1] >= 0.3
     assert np.sqrt(np.mean((picture - exact)[rough] ** 2)) < 0.004

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import gonio as go
 import numpy as np
 import pytest
@@ -114,8 +116,10 @@ def test_the_hash_of_formulas_hears_code_and_not_comments():
     assert cache._meaning(plain) != cache._meaning(plain.replace("2.0", "3.0"))
 
 
-def test_every_room_that_a_table_depends_on_is_hashed():
-    assert {"ops", "optics", "models", "energy"} <= set(cache.ROOMS)
+def test_every_package_that_a_table_depends_on_is_hashed():
+    package = Path(cache.__file__).parents[1]
+    assert {"ops", "optics", "material", "materials", "energy"} == set(cache.PACKAGES)
+    assert all(list((package / name).rglob("*.py")) for name in cache.PACKAGES)
 
 
 def test_the_hash_of_formulas_is_kept_until_a_file_changes(folder, monkeypatch):

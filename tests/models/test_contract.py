@@ -238,7 +238,7 @@ class Velvet(go.BSDF):
 
 @pytest.mark.parametrize("material", {**ALL, **COMPOSED}.values(), ids={**ALL, **COMPOSED})
 def test_every_declared_breach_has_a_size_and_a_reason(material: go.BSDF) -> None:
-    for law, breach in material.breaches().items():
+    for law, breach in material.violations().items():
         assert breach.reason and breach.size > 0.0, law  # infinite where there is no bound
 
 
@@ -297,3 +297,28 @@ def test_a_part_of_a_model_does_not_take_its_bases_name() -> None:
         pass
 
     assert _Facets.name == "" and go.model("conductor") is go.Conductor
+
+
+@pytest.mark.parametrize(("written", "missing"), [("pdf", "sample"), ("sample", "pdf")])
+def test_one_of_pdf_and_sample_alone_is_an_error_that_names_the_other(written: str, missing: str) -> None:
+    methods = {"eval": go.Lambert.eval, written: getattr(go.Lambert, written)}
+    with pytest.raises(InputError, match=f"Half has `{written}` and no `{missing}`") as error:
+        type("Half", (go.BSDF,), methods)
+    assert "lambert.py, line " in str(error.value) and f"write `{missing}` too, or neither" in str(error.value)
+    type("_Half", (go.BSDF,), methods)  # a part of materials, which may write the rest
+
+
+def test_names_of_the_last_release_go_on_working_with_a_warning_that_names_the_new_one() -> None:
+    members = {"breaks": {"energy": go.KnownViolation("by nature", 1.0)}, "lossless": 1e-3, "gives_way": True}
+    with pytest.warns(DeprecationWarning) as warned:
+        cls = type("Former", (go.Lambert,), {**members, "leans": property(lambda self: True), "white": lambda self: 7})
+    said = {str(one.message) for one in warned}
+    assert {"Former.breaks is now known_violations", "Former.lossless is now lossless_tolerance"} <= said
+    assert (cls.lossless_tolerance, cls.overridable, cls().perturbs_normal, cls().lossless()) == (1e-3, True, True, 7)
+    assert cls().violations()["energy"].size == 1.0
+    with pytest.warns(DeprecationWarning, match="Lambert.white is now lossless"):
+        assert go.Lambert(0.5).white() == go.Lambert(1.0)
+    with pytest.warns(DeprecationWarning, match="Lambert.breaks is now known_violations"):
+        assert go.Lambert.breaks == {}
+    with pytest.warns(DeprecationWarning, match="Breach is now KnownViolation"):
+        assert go.Breach is go.KnownViolation

@@ -75,4 +75,4 @@ def test_its_parts_add_up_to_its_value() -> None:
 def test_all_dials_up_gain_no_more_than_is_declared() -> None:
     model = DISNEY(1.0, specular=1.0, roughness=1.0, sheen=1.0, clearcoat=1.0)
     gain = go.albedo(model, mu=[0.02, 0.1, 0.3, 1.0]).value.max() - 1.0
-    assert 0.1 < gain < model.breaches()["energy"].size
+    assert 0.1 < gain < model.violations()["energy"].size

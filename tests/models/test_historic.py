@@ -136,7 +136,7 @@ NEGATIVE = go.ShiftedGamma(0.0, 1.0, 0.3, 0.5, 0.0, 0.5)
 
 def test_negative_light_is_kept() -> None:
     assert value(NEGATIVE, UP, at(20.0)[None]) < 0.0
-    assert "positivity" in NEGATIVE.breaches()
+    assert "positivity" in NEGATIVE.violations()
 
 
 @pytest.mark.slow

@@ -36,5 +36,5 @@ def test_lafortune_s_lobe_about_the_mirror_is_the_same() -> None:
 
 
 def test_two_albedos_over_one_are_a_declared_breach() -> None:
-    assert PHONG(0.5, 0.5).breaches() == {}
-    assert PHONG(0.8, 0.5).breaches()["energy"].size == pytest.approx(0.3)
+    assert PHONG(0.5, 0.5).violations() == {}
+    assert PHONG(0.8, 0.5).violations()["energy"].size == pytest.approx(0.3)

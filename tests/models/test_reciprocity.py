@@ -22,7 +22,7 @@ def _index(material: go.BSDF, w: np.ndarray) -> np.ndarray:
     return np.where(w[:, 2] < 0, material.eta if material.transmits else 1.0, 1.0)
 
 
-LAWFUL = {name: m for name, m in FINITE.items() if "reciprocity" not in m.breaches()}
+LAWFUL = {name: m for name, m in FINITE.items() if "reciprocity" not in m.violations()}
 
 
 @pytest.mark.parametrize("name", each(LAWFUL))
@@ -48,7 +48,7 @@ def test_importance_scatters_as_radiance_does_the_other_way(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", [name for name, m in FINITE.items() if "reciprocity" in m.breaches()])
+@pytest.mark.parametrize("name", [name for name, m in FINITE.items() if "reciprocity" in m.violations()])
 def test_models_that_declare_to_break_reciprocity_do_break_it(name: str) -> None:
     wo, wi = (np.where([False, False, True], np.abs(w), w) for w in (WO, WI))
     forth, back = FINITE[name].f(wo, wi, precision="float64"), FINITE[name].f(wi, wo, precision="float64")

@@ -59,5 +59,5 @@ def test_charlie_s_gain_near_the_horizon_is_declared() -> None:
     mu = np.geomspace(2e-3, 0.02, 4)
     for alpha in (0.01, 0.05):
         gain = go.albedo(CHARLIE(1.0, alpha), mu=mu).value.max() - 1.0
-        assert 0.0 < gain < CHARLIE(1.0, alpha).breaches()["energy"].size
-    assert CHARLIE(1.0, 0.1).breaches() == {}
+        assert 0.0 < gain < CHARLIE(1.0, alpha).violations()["energy"].size
+    assert CHARLIE(1.0, 0.1).violations() == {}

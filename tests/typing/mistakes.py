@@ -65,3 +65,7 @@ class Flat(go.BSDF):
     @go.method
     def pdf(self, wo: go.Direction, wi: go.Direction) -> go.Scalar:
         return self.albedo  # reportReturnType
+
+    @go.method
+    def sample(self, wo: go.Direction, u: go.Direction, mode: go.Mode = "radiance") -> go.Sample:
+        return self.sample_cosine(wo, u, mode)

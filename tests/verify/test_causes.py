@@ -107,7 +107,7 @@ class NearlyACosine(Weighed):
 
 class FresnelAtTheNormalInSample(Weighed):
     def _factor(self, wo: Any, wi: Any, m: Any) -> Any:
-        return self._F(wo, frame.upright(wo)) / self._F(wo, m)
+        return self._F(wo, frame.normal_like(wo)) / self._F(wo, m)
 
 
 class OtherPdf(RightFacets):

@@ -10,7 +10,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio import ops
-from gonio.material import Breach
+from gonio.material import KnownViolation
 from gonio.verify import report, verify
 from gonio.verify.laws import Law
 from gonio.verify.run import decide
@@ -28,11 +28,11 @@ def finding(figure: float = 0.0, **more: Any) -> Finding:
     return Finding(figure=figure, tolerance=0.1, reason="because", **more)
 
 
-def verdict(found: Finding, breaks: dict[str, Breach] | None = None, threshold: float = 1e-3) -> Verdict:
+def verdict(found: Finding, breaks: dict[str, KnownViolation] | None = None, threshold: float = 1e-3) -> Verdict:
     class Declares(go.Lambert):
         """Lambert with declared breaches."""
 
-    Declares.breaks = breaks or {}
+    Declares.known_violations = breaks or {}
     return decide(Idle(), of(Declares(0.5)), found, threshold, 1)
 
 
@@ -57,13 +57,13 @@ def test_a_p_value_over_the_corrected_threshold_is_not_asked_again() -> None:
 
 
 def test_a_declared_breach_is_no_failure_unless_it_is_larger_or_absent() -> None:
-    declared = {"energy": Breach("by nature", 0.5)}
+    declared = {"energy": KnownViolation("by nature", 0.5)}
     assert verdict(finding(0.4), declared).status == "breaks as declared"
     larger = verdict(finding(0.8), declared)
     assert larger.status == "fail" and "more than the declared" in larger.why[0]
     absent = verdict(finding(0.0), declared)
     assert absent.status == "fail" and "is not" in absent.why[0]
-    assert verdict(finding(0.0), {"energy": Breach("maybe", 0.5, certain=False)}).status == "pass"
+    assert verdict(finding(0.0), {"energy": KnownViolation("maybe", 0.5, certain=False)}).status == "pass"
     # a statistical rejection is never what was declared
     both = finding(0.4, trials=[Trial(1e-6, "here", lambda: 1e-6)])
     assert verdict(both, declared).status == "fail"

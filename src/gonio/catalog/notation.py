@@ -182,7 +182,7 @@ def typed(parameter: Parameter, value: Value) -> object:
             raise InputError(f"'{value}' given, true or false expected", where)
         return str(value).lower() == "true"
     if isinstance(parameter, IndexParameter) and isinstance(value, str) and value.strip(' "')[:1].isalpha():
-        return parameter.taken(value.strip(' "'), where)
+        return parameter.coerce(value.strip(' "'), where)
     try:
         parts = value.strip(" []()").split(",") if isinstance(value, str) else value
         numbers = [float(part) for part in (parts if isinstance(parts, list | tuple) else [parts])]

@@ -91,7 +91,7 @@ def is_material(word: str) -> bool:
     found = readings(word)
     if found[0] is Kind.CODE:
         cls = outside.thing(texts.split(word)[0], where="MODEL")
-        return issubclass(cls, BSDF) or callable(getattr(cls, "eval", None))
+        return (isinstance(cls, type) and issubclass(cls, BSDF)) or callable(getattr(cls, "eval", None))
     return found[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in found)
 
 

@@ -64,7 +64,7 @@ def _material(cls: object) -> type[BSDF]:
     if cls.eval is BSDF.eval:
         raise InputError(f"{cls.__name__} has no eval", place, "write eval(self, wo, wi, mode): f |cos theta_i|")
     known = BSDF.family.all().get(cls.name)
-    if known is not None and known.__module__.startswith("gonio.") and not known.gives_way:
+    if known is not None and known.__module__.startswith("gonio.") and not known.overridable:
         what = f"{cls.__name__} shadows Gonio's material '{cls.name}'"
         raise InputError(what, place, f"give the class another name, such as My{cls.__name__}")
     return cls
@@ -82,7 +82,7 @@ def adopt(cls: type, where: str = "") -> type[BSDF]:
     for name in ("eval", "pdf", "sample"):
         if callable(getattr(cls, name, None)):
             kept[name] = _forward(inner, name)
-    for name in ("transmits", "isotropic", "delta", "stochastic", "breaks", "lossless"):
+    for name in ("transmits", "isotropic", "delta", "stochastic", "known_violations", "lossless_tolerance"):
         if hasattr(cls, name):
             kept[name] = getattr(inner, name)
     namespace = {**kept, "__doc__": cls.__doc__, "__module__": cls.__module__, "__annotations__": {}}

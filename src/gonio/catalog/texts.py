@@ -33,8 +33,8 @@ def taken_apart(text: str, where: str = "MODEL", allow_code: bool = False) -> tu
     """The class and the text of each parameter of NAME, FILE or NAME(parameter=value,...); of a document's material,
     and of JSON, what JSON has for them. InputError where it is no material, and for a document that names code which
     is not allowed."""
-    if text.count("(") + text.count("{") > tree.MOST:
-        raise InputError(f"more than {tree.MOST} materials inside each other", where, "mix fewer materials")
+    if text.count("(") + text.count("{") > tree.MAX_MATERIALS:
+        raise InputError(f"more than {tree.MAX_MATERIALS} materials inside each other", where, "mix fewer materials")
     head, inside = split(text)
     given: dict[str, object] = {**assignments(inside, where)}
     if head.startswith("{"):

@@ -39,17 +39,17 @@ def content_hash(values: np.ndarray) -> str:
     return hashlib.sha256(repr(array.shape).encode() + array.tobytes()).hexdigest()
 
 
-ROOMS = ("energy", "models", "ops", "optics")  # whose formulas a table depends on
+PACKAGES = ("energy", "material", "materials", "ops", "optics")  # whose formulas a table depends on
 
 
 @lru_cache
 def formulas() -> str:
-    """Hash of what the code of these rooms says, comments and docstrings left out: changed optics make new tables.
+    """Hash of the code of `PACKAGES` without comments and docstrings: a changed formula makes new tables.
 
     Parsing takes a tenth of a second, so the hash is kept for as long as no file changes.
     """
     package = Path(__file__).parent.parent
-    files = sorted(p for room in ROOMS for p in (package / room).rglob("*.py"))
+    files = sorted(p for name in PACKAGES for p in (package / name).rglob("*.py"))
     states = [(str(p.relative_to(package)), p.stat().st_mtime_ns, p.stat().st_size) for p in files]
     state = hashlib.sha256(repr((sys.version_info[:2], package, states)).encode()).hexdigest()
     note = folder() / "formulas.txt"
@@ -90,13 +90,13 @@ def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
     made: dict[tuple[object, ...], Kept] = {}
 
     @functools.wraps(build)
-    def kept(*names: str) -> Kept:
+    def remembered(*names: str) -> Kept:
         key = tuple(family.get(name) for family, name in zip(FAMILIES, names, strict=False))
         if key not in made:
             made[key] = build(*names)
         return made[key]
 
-    return kept
+    return remembered
 
 
 def origin(*names: str) -> tuple[str, ...]:

@@ -5,8 +5,10 @@ The materials themselves are in `gonio.materials`, one file each.
 
 from __future__ import annotations
 
+import warnings
+
 from ..errors import InputError, did_you_mean
-from .bsdf import BSDF, Breach, Microsurface, Preset, never
+from .bsdf import BSDF, KnownViolation, Microsurface, Preset
 from .calling import method
 from .parameters import (
     Angle,
@@ -25,13 +27,41 @@ from .parameters import (
     spectrum,
     width,
 )
-from .sample import Sample
+from .sample import Sample, never
 
 __all__ = [
-    "BSDF", "Angle", "Breach", "Colour", "Index", "Microsurface", "Number", "Parameter", "Preset", "Sample", "Width",
-    "angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number", "spectrum",
+    "BSDF",
+    "Angle",
+    "Colour",
+    "Index",
+    "KnownViolation",
+    "Microsurface",
+    "Number",
+    "Parameter",
+    "Preset",
+    "Sample",
+    "Width",
+    "angle",
+    "bsdf",
+    "choice",
+    "file",
+    "flag",
+    "index",
+    "method",
+    "model",
+    "models",
+    "never",
+    "number",
+    "spectrum",
     "width",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> object:
+    if name == "Breach":  # its name in Gonio 0.1; delete after one release
+        warnings.warn("Breach is now KnownViolation", DeprecationWarning, stacklevel=2)
+        return KnownViolation
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
 
 
 def models() -> dict[str, type[BSDF]]:

@@ -1,6 +1,6 @@
 """The bound copy of a material: every number a Dr.Jit value (or a symbol), ready for `eval`, `pdf` and `sample`.
 
-Binding makes each value an evaluated array of one entry, never a literal, so that a changed value compiles nothing.
+Binding makes each value an evaluated array of one entry a literal, so that a changed value compiles nothing.
 What follows from the parameters alone (`BSDF.derive`) is computed once on the bound copy and kept there.
 
 Copies are made in this file and nowhere else.
@@ -47,13 +47,13 @@ def bind_to(material: M, types: backend.Types) -> M:
     copy = bind(material, lambda parameter, value: parameter.bind(value, types))
     if not material.derives:
         return copy
-    kept = vars(material).setdefault("_kept", None) or {}
-    if types.float not in kept:
-        derived = settled(copy)
+    cached = vars(material).setdefault("_kept", None) or {}
+    if types.float not in cached:
+        derived = evaluate_derived(copy)
         if derived is None or not _plain(material):
             return with_derived(copy, derived)
-        vars(material)["_kept"] = kept = {**kept, types.float: derived}
-    return with_derived(copy, kept[types.float])
+        vars(material)["_kept"] = cached = {**cached, types.float: derived}
+    return with_derived(copy, cached[types.float])
 
 
 def with_derived(material: M, derived: object) -> M:
@@ -61,7 +61,7 @@ def with_derived(material: M, derived: object) -> M:
     return bound_copy(material, {}, derived)
 
 
-def settled(material: Material, rays: int = 1) -> object:
+def evaluate_derived(material: Material, rays: int = 1) -> object:
     """What a bound copy derives, evaluated now: where no parameter is being differentiated, or varies over more than
     `rays` rays, and never while Dr.Jit records a loop, in which nothing can be computed; else None."""
     if not material.derives:

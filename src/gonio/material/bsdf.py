@@ -18,8 +18,10 @@ values, or symbols while recording. Callers hand over NumPy arrays, lists or Dr.
 from __future__ import annotations
 
 import html
+import inspect
+import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, dataclass_transform, overload
 
@@ -44,8 +46,8 @@ Delta: TypeAlias = Literal["never", "maybe", "always"]
 InnerAlbedo: TypeAlias = "Callable[[BSDF, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64] | None]"
 
 
-class Breach(NamedTuple):
-    """A law that a model breaks by nature.
+class KnownViolation(NamedTuple):
+    """A law that a model violates by nature.
 
     reason   why, as a sentence part: the manual and the verifier print it
     size     how far at most, in the unit of the law's figure: a number, or a function of the model; 0 says that with
@@ -109,26 +111,26 @@ class BSDF(Material):
     """Base of every material. Subclasses become frozen dataclasses; `name` is made from the class name, where a class
     does not give its own.
 
-    breaks      law -> Breach, for laws that the model breaks by nature (Phong: reciprocity, energy)
+    known_violations    law -> KnownViolation, for laws that the model violates by nature (Phong: reciprocity, energy)
     only_rgb    whether eval gives red, green and blue, whatever channels the renderer has
     stochastic  whether eval, pdf and weight are random numbers that only in the mean are what they are called
     reads_wavelengths  whether it wants to know the rays' wavelengths, as `wavelengths` of its bound copy
     reads_surface  whether it wants to know dp/du.x, dp/dv.x and dp/dv.y at a hit, as `surface` of its bound copy
-    lossless    the greatest loss that a white furnace may find (where F = 1 and every albedo 1); None claims nothing
+    lossless_tolerance  the greatest loss that a white furnace may find (F = 1, every albedo 1); None claims nothing
     """
 
     family: ClassVar[Family[type[BSDF]]]
     name: ClassVar[str] = ""
-    breaks: ClassVar[Mapping[str, Breach]] = {}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {}
     stochastic: ClassVar[bool] = False
     only_rgb: ClassVar[bool] = False
     reads_wavelengths: ClassVar[bool] = False
     wavelengths: ClassVar[Spectrum | None] = None  # nm, one for each channel, on copies bound in spectral variants
     reads_surface: ClassVar[bool] = False
     surface: ClassVar[tuple[Scalar, Scalar, Scalar] | None] = None  # on copies bound in scenes
-    lossless: ClassVar[float | None] = None
+    lossless_tolerance: ClassVar[float | None] = None
     has_terms: ClassVar[bool] = False  # whether `terms` is written
-    gives_way: ClassVar[bool] = False  # whether a user's own class may take its name: of Gonio's, those of papers do
+    overridable: ClassVar[bool] = False  # whether a user's own class may take its name: of Gonio's, those of papers do
     preset_kind: ClassVar[str] = "preset"  # what its presets are called in errors
     _declared: ClassVar[Mapping[str, Parameter]] = {}
 
@@ -139,12 +141,14 @@ class BSDF(Material):
             cls.name = "".join(letters).lstrip("-").replace("_", "-")
         elif cls.__name__.startswith("_") and "name" not in vars(cls):
             cls.name = ""  # a part of some model: it must not stand in its base's place
+        _move_former_names(cls)
         own = vars(cls)
         for formula in ("eval", "pdf", "sample", "terms"):
             if formula in own:
                 setattr(cls, formula, method(own[formula]))
         cls.derives = cls.derive is not Material.derive
         cls.has_terms = cls.terms is not BSDF.terms
+        _check_pair(cls)
         cls.guided = cls.pdf is BSDF.pdf and cls.sample is BSDF.sample and cls.eval is not BSDF.eval
         dataclass(frozen=True, eq=False, repr=False)(cls)
         cls._declared = declared(cls)  # on the class, and gone with it when a user's file is loaded anew
@@ -152,9 +156,9 @@ class BSDF(Material):
     def __post_init__(self) -> None:
         for parameter in self.parameters().values():
             given = getattr(self, parameter.name)
-            taken = parameter.taken(given, f"{type(self).__name__}.{parameter.name}")
-            if taken is not given:
-                object.__setattr__(self, parameter.name, taken)
+            coerced = parameter.coerce(given, f"{type(self).__name__}.{parameter.name}")
+            if coerced is not given:
+                object.__setattr__(self, parameter.name, coerced)
         object.__setattr__(self, "_count", tree.count(self))
 
     @classmethod
@@ -180,27 +184,29 @@ class BSDF(Material):
 
         Here, where `sample` is not written either: that of a guide found from `eval` (`gonio.material.guide`).
         """
-        if self.guided:
-            return guide_search.guide_of(self.plain).pdf(self, wo, wi)
-        same_side = wo.z * wi.z > 0.0
-        return ops.where(same_side, ops.abs(wi.z) * ops.inv_pi, 0.0)
+        return guide_search.guide_of(self.plain).pdf(self, wo, wi)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """Choose wi for wo.
 
-        u  three numbers in [0, 1) a ray, (N, 3): the first picks the lobe, the others the direction
-        Here: by a guide found from `eval`; where `pdf` is written, cosine sampling on wo's side.
+        u  three numbers in [0, 1) per ray, (N, 3): the first picks the lobe, the others the direction
+        Here by a guide found from `eval`.
         """
-        if self.guided:
-            wi = guide_search.guide_of(self.plain).draw(self, wo, u)
-        else:
-            local = warp.square_to_cosine_hemisphere(u.y, u.z)
-            wi = ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z))
+        wi = guide_search.guide_of(self.plain).draw(self, wo, u)
+        return self._weighted(wo, wi, mode)
+
+    def sample_cosine(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """A `sample` for classes whose `pdf` is |cos theta_i| / pi on wo's side: the cosine-weighted hemisphere."""
+        local = warp.square_to_cosine_hemisphere(u.y, u.z)
+        return self._weighted(wo, ops.vec3(local.x, local.y, ops.copysign(local.z, wo.z)), mode)
+
+    def _weighted(self, wo: Direction, wi: Direction, mode: Mode) -> Sample:
+        """The sample of a direction chosen by `pdf`."""
         pdf = self.pdf(wo, wi)
         valid = pdf > 0.0
         weight = self.eval(wo, wi, mode) * ops.where(valid, 1.0 / ops.where(valid, pdf, 1.0), 0.0)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> tuple[Value, ...]:
@@ -241,16 +247,15 @@ class BSDF(Material):
     @property
     def angular_range(self) -> AngularRange:
         """The angles at which its values, and those of inner materials, are known; elsewhere they are made up."""
-        found = EVERYWHERE
+        known = EVERYWHERE
         for inner in tree.children(self).values():
-            found = found.within(inner.angular_range)
-        return found
+            known = known.within(inner.angular_range)
+        return known
 
     @property
-    def leans(self) -> bool:
-        """Whether its normal, or that of an inner material, may be another than the surface's own: it has no mirror of
-        the surface's then."""
-        return any(inner.leans for inner in tree.children(self).values())
+    def perturbs_normal(self) -> bool:
+        """Whether its normal, or that of an inner material, may differ from the surface's."""
+        return any(inner.perturbs_normal for inner in tree.children(self).values())
 
     @property
     def two_sided(self) -> bool:
@@ -270,8 +275,8 @@ class BSDF(Material):
     @property
     def interior(self) -> Interior | None:
         """What lies behind the surface, of a material that light enters, or of the first inside it; None: nothing."""
-        found = (inner.interior for inner in tree.children(self).values())
-        return next((interior for interior in found if interior is not None), None)
+        interiors = (inner.interior for inner in tree.children(self).values())
+        return next((interior for interior in interiors if interior is not None), None)
 
     @property
     def needs_uniform(self) -> bool:
@@ -281,8 +286,8 @@ class BSDF(Material):
     @property
     def fixed(self) -> frozenset[str]:
         """Paths of the parameters that must not vary from ray to ray: tables are found from them once."""
-        found = {f"{name}.{path}" for name, inner in tree.children(self).items() for path in inner.fixed}
-        return frozenset(found)
+        paths = {f"{name}.{path}" for name, inner in tree.children(self).items() for path in inner.fixed}
+        return frozenset(paths)
 
     def normal_reflectance(self) -> Spectrum | None:
         """F0, the reflectance at normal incidence, its albedo included; None where there is no such thing."""
@@ -333,31 +338,30 @@ class BSDF(Material):
         """What a renderer asks of it beside eval, pdf and sample, and what comes, for the verifier; here nothing."""
         return ()
 
-    def breaches(self) -> dict[str, Breach]:
-        """The laws that it breaks with these parameters, sizes as numbers; those of inner materials may show or not."""
-        broken: dict[str, Breach] = {}
+    def violations(self) -> dict[str, KnownViolation]:
+        """The laws that it violates with these parameters, sizes as numbers; those of inner materials may not show."""
+        violated: dict[str, KnownViolation] = {}
         for name, inner in tree.children(self).items():
-            for law, breach in inner.breaches().items():
-                size = max(breach.size, broken[law].size if law in broken else 0.0)
-                broken[law] = Breach(f"{name}: {breach.reason}", size, certain=False)
-        for law, breach in self.breaks.items():
-            size = float(breach.size(self) if callable(breach.size) else breach.size)
+            for law, one in inner.violations().items():
+                size = max(one.size, violated[law].size if law in violated else 0.0)
+                violated[law] = KnownViolation(f"{name}: {one.reason}", size, certain=False)
+        for law, one in self.known_violations.items():
+            size = float(one.size(self) if callable(one.size) else one.size)
             if size > 0.0:
-                broken[law] = breach._replace(size=size)
-        return broken
+                violated[law] = one._replace(size=size)
+        return violated
 
-    def white(self) -> Self:
-        """The white twin: every share of light 1 and F = 1, here and in inner materials; itself where nothing changes.
-
-        What a furnace finds missing from it is lost by its shape alone. Bound copies give bound copies.
+    def lossless(self) -> Self:
+        """The lossless variant: every share of light 1 and F = 1, here and in inner materials; itself where nothing
+        changes. What a furnace finds missing is lost by the lobe's shape. Bound copies give bound ones.
         """
         values: dict[str, object] = {}
         for name, parameter in self.parameters().items():
             value = getattr(self, name)
             if parameter.inner:
-                twin = value.white()
-                if twin is not value:
-                    values[name] = twin
+                variant = value.lossless()
+                if variant is not value:
+                    values[name] = variant
             elif parameter.white is not None:
                 values[name] = value * 0.0 + parameter.white if self.is_bound and parameter.numeric else parameter.white
         if not values:
@@ -436,6 +440,49 @@ class BSDF(Material):
         return tree.rebuild_from, (type(self), values)
 
 
+class _FormerName:
+    """A member's name in Gonio 0.1: it gives what has the new name, with a warning."""
+
+    def __init__(self, new: str) -> None:
+        self.new = new
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, material: BSDF | None, cls: type[BSDF]) -> Value:
+        _warn_of_former(cls, self.name, self.new)
+        return getattr(cls if material is None else material, self.new)
+
+
+# Delete after one release, with `_move_former_names`. `lossless`, a number in 0.1, is the method that `white` was.
+FORMER_NAMES = {
+    "breaks": "known_violations",
+    "breaches": "violations",
+    "gives_way": "overridable",
+    "leans": "perturbs_normal",
+    "white": "lossless",
+}
+for _old, _new in FORMER_NAMES.items():
+    setattr(BSDF, _old, _FormerName(_new))
+    vars(BSDF)[_old].__set_name__(BSDF, _old)
+
+
+def _warn_of_former(cls: type, old: str, new: str) -> None:
+    warnings.warn(f"{cls.__name__}.{old} is now {new}", DeprecationWarning, stacklevel=3)
+
+
+def _move_former_names(cls: type[BSDF]) -> None:
+    """Give what a class defines under a name of Gonio 0.1 its new name."""
+    own = vars(cls)
+    former = [(old, new) for old, new in FORMER_NAMES.items() if old in own and not isinstance(own[old], Field)]
+    if "lossless" in own and not callable(own["lossless"]):
+        former.insert(0, ("lossless", "lossless_tolerance"))
+    for old, new in former:
+        _warn_of_former(cls, old, new)
+        setattr(cls, new, own[old])
+        delattr(cls, old)
+
+
 def _folders() -> list[str]:
     """The folders of `gonio.materials`."""
     folders = (Path(__file__).parents[1] / "materials").glob("*/__init__.py")
@@ -445,9 +492,19 @@ def _folders() -> list[str]:
 BSDF.family = Family("material", "gonio.models", _folders, subclasses_of(BSDF), where="model")
 
 
-def never(like: Scalar) -> Mask:
-    """False for every ray."""
-    return like != like
+def _check_pair(cls: type[BSDF]) -> None:
+    """Raise InputError for a class with `pdf` or `sample` alone: the other would be that of another density. A class
+    whose name starts with an underscore is a part of materials, which may leave the other to them."""
+    written = {"pdf": cls.pdf is not BSDF.pdf, "sample": cls.sample is not BSDF.sample}
+    if cls.__name__.startswith("_") or len(set(written.values())) == 1:
+        return
+    here, missing = sorted(written, key=lambda name: not written[name])
+    code = inspect.unwrap(getattr(cls, here)).__code__
+    hint = f"write `{missing}` too, or neither: a guide is then found from `eval`"
+    if missing == "sample":
+        hint += "; where pdf is |cos theta_i| / pi, `sample` is `return self.sample_cosine(wo, u, mode)`"
+    what = f"{cls.__name__} has `{here}` and no `{missing}`, which must be of the same density"
+    raise InputError(what, f"{code.co_filename}, line {code.co_firstlineno}", hint)
 
 
 def _alike(x: object, y: object) -> bool:

@@ -196,14 +196,14 @@ def _rows(wo: Given, other: Given, name: str) -> tuple[np.ndarray, np.ndarray, i
     return arrays[0], arrays[1], sizes[0]
 
 
-def _check_unit(array: np.ndarray, where: str) -> None:
+def _check_unit(array: np.ndarray, location: str) -> None:
     length = np.sqrt(np.einsum("...i,...i->...", array, array))
     off = ~(np.abs(length - 1.0) <= UNIT)  # NaN compares false
     if np.any(off):
         row = int(np.argmax(off)) if array.ndim == 2 else 0
         what = f"row {row} has length {np.atleast_1d(length)[row]:.4g}, unit vectors expected"
         raise InputError(
-            what, where, "divide directions by their length: w / np.linalg.norm(w, axis=-1, keepdims=True)"
+            what, location, "divide directions by their length: w / np.linalg.norm(w, axis=-1, keepdims=True)"
         )
 
 

@@ -12,7 +12,7 @@ each of a few angles of wo (and, where `eval` turns with the surface, azimuths; 
 the surface), bilinear between nodes; between two angles it is the mixture of both. What the nodes do not show is not
 lost: a share of samples follows the cosine.
 
-`pdf` is the density of `sample` whatever the tables hold: a guide that fits badly makes noise, never bias.
+`pdf` is the density of `sample` whatever the tables hold: a guide that fits badly makes noise bias.
 `guide_search` finds the tables.
 """
 
@@ -72,7 +72,7 @@ class Lobe(NamedTuple):
     def axis(self, place: Place) -> tuple[Scalar, Scalar]:
         """Sine and cosine of the angle between the chart's axis and the normal, in the plane of wo."""
         if self.chart != "centre":
-            return 0.0 * place.weights[0], 1.0 + 0.0 * place.weights[0]
+            return ops.zeros_like(place.weights[0]), ops.ones_like(place.weights[0])
         x: Array = 0.0
         z: Array = 0.0
         for index, weight in zip(place.slices, place.weights, strict=True):
@@ -88,7 +88,7 @@ class Lobe(NamedTuple):
         x, z = cosine * v.x - sine * v.z, sine * v.x + cosine * v.z
         # 2 (1 - z), which would cancel near the axis
         q = where(z > 0.5, 2.0 * (x * x + v.y * v.y) / (1.0 + z), 2.0 * (1.0 - z))
-        q0, scale = fetch(self.scales, 0.0 * z)
+        q0, scale = fetch(self.scales, ops.zeros_like(z))
         jacobian = 0.5 * (q + q0) / scale
         if self.chart == "half":
             jacobian = jacobian * (4.0 * maximum(dot(wo, v), 0.0))
@@ -101,7 +101,7 @@ class Lobe(NamedTuple):
 
     def direction(self, place: Place, wo: Direction, s: Scalar, phi: Scalar) -> Direction:
         """The direction at (s, phi), wo in the plane of x; it may lie under the surface."""
-        q0, scale = fetch(self.scales, 0.0 * s)
+        q0, scale = fetch(self.scales, ops.zeros_like(s))
         q = minimum(q0 * (ops.exp(s / scale) - 1.0), self.q_max)
         radius, (sin_phi, cos_phi) = safe_sqrt(q * (1.0 - 0.25 * q)), sincos(phi)
         x, y, z = radius * cos_phi, radius * sin_phi, 1.0 - 0.5 * q
@@ -111,7 +111,7 @@ class Lobe(NamedTuple):
 
     @property
     def span(self) -> float:
-        """Of the azimuth."""
+        """Length of the axis of the azimuth."""
         return 2.0 * ops.pi if self.full else ops.pi
 
     def at(self, index: Scalar, s: Scalar, phi: Scalar) -> Scalar:
@@ -133,7 +133,7 @@ class Lobe(NamedTuple):
             return fetch(self.rows, index, row)[0]
 
         def total(row: Scalar) -> Scalar:
-            return fetch(self.below, index, row, 0.0 * row + (columns - 1.0))[0]
+            return fetch(self.below, index, row, ops.zeros_like(row) + (columns - 1.0))[0]
 
         row = _search(row_below, u1, rows)
         along = _in_cell((u1 - row_below(row)) * (rows - 1.0), total(row), total(row + 1.0))
@@ -146,7 +146,7 @@ class Lobe(NamedTuple):
             (low,), (high,) = fetch(self.density, index, row, column), fetch(self.density, index, row + 1.0, column)
             return _between(low, high, along)
 
-        u2 = u2 * column_below(0.0 * row + (columns - 1.0))
+        u2 = u2 * column_below(ops.zeros_like(row) + (columns - 1.0))
         column = _search(column_below, u2, columns)
         width = self.span / (columns - 1.0)
         across = _in_cell((u2 - column_below(column)) / width, height(column), height(column + 1.0))
@@ -197,15 +197,15 @@ class Guide(NamedTuple):
 
     def pdf(self, material: object, wo: Direction, wi: Direction) -> Scalar:
         """Density of `sample`, 1/sr."""
-        seen = self._seen(wo)
+        visible = self._seen(wo)
         crosses = wo.z * wi.z < 0.0
         if not self.lobes:
-            return where(seen & ~crosses & (wi.z != 0.0), ops.abs(wi.z) * inv_pi, 0.0)
+            return where(visible & ~crosses & (wi.z != 0.0), ops.abs(wi.z) * inv_pi, 0.0)
         place = self._place(material, wo)
         turn, above = self._turn(wo), _above(wo)
-        (cosine,) = fetch(self.cosine, 0.0 * wo.z)
+        (cosine,) = fetch(self.cosine, ops.zeros_like(wo.z))
         both = len({lobe.across for lobe in self.lobes}) == 2
-        density: Array = 0.0 * wo.z
+        density: Array = ops.zeros_like(wo.z)
         for lobe in self.lobes:
             on_side = crosses if lobe.across else ~crosses
             local = _turned(_above(wi), turn)
@@ -215,9 +215,9 @@ class Guide(NamedTuple):
                 here = here + self._share(lobe, index) * weight * lobe.at(index, s, phi)
             here = here * (1.0 if lobe.full else 0.5)
             smooth = (0.5 if both else 1.0) * ops.abs(wi.z) * inv_pi
-            found = (1.0 - cosine) * ops.safe_div(here, jacobian) + cosine * smooth
-            density = where(on_side, found, density)
-        return where(seen & (wi.z != 0.0), density, 0.0)
+            mixed = (1.0 - cosine) * ops.safe_div(here, jacobian) + cosine * smooth
+            density = where(on_side, mixed, density)
+        return where(visible & (wi.z != 0.0), density, 0.0)
 
     def draw(self, material: object, wo: Direction, u: Direction) -> Direction:
         """A direction; u1 picks the slice and the side. It may lie on a side where nothing is: its pdf is 0 then."""
@@ -227,7 +227,7 @@ class Guide(NamedTuple):
             return vec3(broad.x, broad.y, broad.z * facing)
         place = self._place(material, wo)
         turn, above = self._turn(wo), _above(wo)
-        (cosine,) = fetch(self.cosine, 0.0 * wo.z)
+        (cosine,) = fetch(self.cosine, ops.zeros_like(wo.z))
         by_cosine = u.x < cosine
         rest = where(by_cosine, u.x / cosine, (u.x - cosine) / (1.0 - cosine))
         index, left = _pick(place, minimum(rest, ALMOST_ONE))
@@ -242,7 +242,7 @@ class Guide(NamedTuple):
             w = lobe.direction(place, _turned(above, turn), s, phi)
             # a direction under the surface, which the other side's lobe may hold too, becomes a failed sample: z = 0
             flattened = ops.rsqrt(maximum(w.x * w.x + w.y * w.y, 1e-20))
-            w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, 0.0 * w.z))
+            w = where(w.z > 0.0, w, vec3(w.x * flattened, w.y * flattened, ops.zeros_like(w.z)))
             w = _turned(w, vec3(turn.x, -turn.y, turn.z))
             w = where(by_cosine, broad, w)
             w = vec3(w.x, w.y, w.z * (-facing if lobe.across else facing))
@@ -262,13 +262,13 @@ class Guide(NamedTuple):
 
     def _turn(self, wo: Direction) -> Direction:
         """(cos, sin, 0) of the azimuth that charts count from: wo's, or the tangent's where `eval` turns with it."""
-        zero = 0.0 * wo.z
+        zero = ops.zeros_like(wo.z)
         if self.azimuths > 1:
             return vec3(1.0 + zero, zero, zero)
         squared = wo.x * wo.x + wo.y * wo.y
         scale = ops.rsqrt(maximum(squared, 1e-20))
-        upright = squared < 1e-20
-        return vec3(where(upright, 1.0, wo.x * scale), where(upright, 0.0, wo.y * scale), zero)
+        at_pole = squared < 1e-20
+        return vec3(where(at_pole, 1.0, wo.x * scale), where(at_pole, 0.0, wo.y * scale), zero)
 
     def _place(self, material: object, wo: Direction) -> Place:
         """The slices on both sides of wo's angle, and of every other axis."""
@@ -280,7 +280,7 @@ class Guide(NamedTuple):
             ways.append(_cell(axis.read(material) * (axis.slices - 1.0), axis.slices))
             strides.append(count)
             count *= axis.slices
-        slices, weights = [0.0 * cos], [1.0 + 0.0 * cos]
+        slices, weights = [ops.zeros_like(cos)], [ops.ones_like(cos)]
         for (cell, along), stride in zip(ways, strides, strict=True):
             slices, weights = (
                 [index + (cell + step) * float(stride) for step in (0.0, 1.0) for index in slices],
@@ -324,14 +324,14 @@ def _between(low: Scalar, high: Scalar, share: Scalar) -> Scalar:
 
 def _search(below: Callable[[Scalar], Scalar], u: Scalar, count: int) -> Scalar:
     """The last but one node at most, up to which there is no more than u."""
-    found: Array = 0.0 * u
+    node: Array = ops.zeros_like(u)
     step = 1 << ((count - 2).bit_length() - 1) if count > 2 else 0
     while step:
-        ahead = found + float(step)
+        ahead = node + float(step)
         inside = minimum(ahead, count - 2.0)
-        found = where((ahead < count - 1.5) & (below(inside) <= u), ahead, found)
+        node = where((ahead < count - 1.5) & (below(inside) <= u), ahead, node)
         step >>= 1
-    return found
+    return node
 
 
 @function
@@ -343,7 +343,7 @@ def _in_cell(area: Scalar, low: Scalar, high: Scalar) -> Scalar:
 
 def _pick(place: Place, u: Scalar) -> tuple[Scalar, Scalar]:
     """A slice by its weight, and what is left of u, in [0, 1)."""
-    index, start, width = place.slices[0], 0.0 * u, place.weights[0]
+    index, start, width = place.slices[0], ops.zeros_like(u), place.weights[0]
     below: Array = place.weights[0]
     for other, weight in zip(place.slices[1:], place.weights[1:], strict=True):
         passed = (u >= below) & (weight > 0.0)

@@ -47,7 +47,7 @@ SMALLEST = 1.0 / 64.0  # where the range of a width that varies starts at 0
 SAME = 0.02  # relative difference under which two sides, or two azimuths, are alike
 PROBES = 768
 LEAST_LEFT = 0.25  # of the mean about a node that the refinement leaves: `eval` may be more between the points
-LEAST = 1e-20  # light of a slice that counts as none
+MIN_LIGHT = 1e-20  # light of a slice that counts as none
 KEPT = 16  # guides in memory, of each class
 CHARTS = ("half", "normal", "centre")
 
@@ -66,12 +66,12 @@ def guide_of(material: Material) -> Guide:
     own = vars(material).get("_guide")
     if own is None:
         plain = plain_values(material)
-        kept = _kept(type(material))
-        if plain not in kept:
-            kept[plain] = find(plain)
-            while len(kept) > KEPT:
-                kept.popitem(last=False)
-        vars(material)["_guide"] = own = kept[plain]
+        guides = _kept(type(material))
+        if plain not in guides:
+            guides[plain] = find(plain)
+            while len(guides) > KEPT:
+                guides.popitem(last=False)
+        vars(material)["_guide"] = own = guides[plain]
     return own
 
 
@@ -79,8 +79,8 @@ def _kept(cls: type) -> OrderedDict[Material, Guide]:
     """The guides of a class's materials, by content; on the class, and gone with it when a user's file is run anew."""
     if "_guides" not in vars(cls):
         cls._guides = OrderedDict()  # type: ignore[attr-defined]
-    found: OrderedDict[Material, Guide] = vars(cls)["_guides"]
-    return found
+    guides: OrderedDict[Material, Guide] = vars(cls)["_guides"]
+    return guides
 
 
 def prepare(material: Material) -> None:
@@ -125,15 +125,15 @@ def _found(versions: list[Any], axes: tuple[Axis, ...]) -> Guide:
     behind = len(lit) == 2 and not _alike(above, below)
     slices = _Slices(versions, AZIMUTHS if turns else 1, [1.0, -1.0] if behind else lit[:1])
     sides = (False, True) if probed.transmits else (False,)
-    found = [best for across in sides if (best := slices.best(across)) is not None]
-    if not found:
+    candidates = [best for across in sides if (best := slices.best(across)) is not None]
+    if not candidates:
         return _nothing()
-    total = np.sum([best.light for best in found], axis=0)
-    shares = sum(best.light for best in found if best.across) / np.maximum(total, LEAST)
+    total = np.sum([best.light for best in candidates], axis=0)
+    shares = sum(best.light for best in candidates if best.across) / np.maximum(total, MIN_LIGHT)
     light = float(np.sum(total))
-    cosine = sum(best.cosine * float(np.sum(best.light)) for best in found) / light
+    cosine = sum(best.cosine * float(np.sum(best.light)) for best in candidates) / light
     return Guide(
-        lobes=tuple(best.lobe() for best in found),
+        lobes=tuple(best.lobe() for best in candidates),
         angles=len(slices.angles),
         azimuths=slices.azimuths,
         behind=behind,
@@ -213,10 +213,10 @@ def _turns(material: Guided, side: float) -> bool:
     turn = np.random.default_rng(8).uniform(0.0, 2.0 * np.pi, PROBES)
     cos, sin = np.cos(turn), np.sin(turn)
 
-    def turned(w: Grid) -> tuple[Grid, ...]:
+    def rotated(w: Grid) -> tuple[Grid, ...]:
         return cos * w[:, 0] - sin * w[:, 1], sin * w[:, 0] + cos * w[:, 1], w[:, 2]
 
-    return _differ(_light(material, tuple(wo.T), tuple(wi.T)), _light(material, turned(wo), turned(wi)))
+    return _differ(_light(material, tuple(wo.T), tuple(wi.T)), _light(material, rotated(wo), rotated(wi)))
 
 
 # --------------------------------------------------------------------------- parameters that vary over the surface
@@ -254,14 +254,14 @@ class _Varying:
 
 def plain_values(material: Any) -> Any:
     """The material with NumPy's arrays for Dr.Jit's."""
-    found: dict[str, Value] = {}
+    values: dict[str, Value] = {}
     for leaf in tree.leaves(material):
         parts = pair_of(leaf.value) if leaf.parameter.kind == "alpha" else (leaf.value,)
         if leaf.parameter.numeric and any(map(backend.is_drjit, parts)):
             columns = [np.asarray(backend.to_numpy(backend.drjit().detach(p), 1)) for p in parts]
             one = [float(c[0]) if c.shape == (1,) else c[0] if c.shape == (1, 3) else c for c in columns]
-            found[leaf.path] = one[0] if len(one) == 1 else tuple(one)
-    return tree.replace(material, found) if found else material
+            values[leaf.path] = one[0] if len(one) == 1 else tuple(one)
+    return tree.replace(material, values) if values else material
 
 
 def _ends(parameter: Parameter, value: Value) -> tuple[float, float] | None:
@@ -310,12 +310,12 @@ def _varying(material: Any) -> list[_Varying]:
 
 def _moved(one: Guided, other: Guided) -> float:
     """The share of the light that goes elsewhere."""
-    found = []
+    weights = []
     chart = _Chart("half", False, MIDDLING)
     for material in (one, other):
         light = _Slices([material], 1, [1.0]).fine(chart, material, np.array([0.7]), 0.0, 1.0).light
-        found.append(light / max(float(light.sum()), LEAST))
-    return 0.5 * float(np.abs(found[0] - found[1]).sum())
+        weights.append(light / max(float(light.sum()), MIN_LIGHT))
+    return 0.5 * float(np.abs(weights[0] - weights[1]).sum())
 
 
 # --------------------------------------------------------------------------- charts
@@ -488,7 +488,7 @@ class _Slices:
         light = np.array([fine.light.sum((1, 2)) * self.cell for fine in nodes])
         density = np.array([self._fitted(fine.light) for fine in nodes])
         sums = (_trapezoid(density.shape[-2], 1.0), _trapezoid(density.shape[-1], self.span))
-        density /= np.maximum(np.einsum("gakj,k,j->ga", density, *sums), LEAST)[..., None, None]
+        density /= np.maximum(np.einsum("gakj,k,j->ga", density, *sums), MIN_LIGHT)[..., None, None]
         along = density.reshape(len(self.sides), self.azimuths, len(self.versions), *density.shape[1:])
         mixed = 0.5 * (along[..., 1:, :, :] + along[..., :-1, :, :])
         mixed = 0.5 * (mixed + np.roll(mixed, -1, axis=1)) if self.full else mixed
@@ -497,12 +497,12 @@ class _Slices:
         wanted = np.array([fine.light for fine in middles])
         flat = np.array([fine.cosine for fine in middles])
         total = wanted.sum((2, 3)) * self.cell
-        seen = total > LEAST
+        lit = total > MIN_LIGHT
         best = (np.inf, COSINES[-1])
         for cosine in COSINES:
             got = (1.0 - cosine) * expected + cosine * flat
             second = np.divide(wanted * wanted, got, out=np.zeros_like(got), where=wanted > 0.0).sum((2, 3)) * self.cell
-            variance = float(np.mean(second[seen] / total[seen] ** 2) - 1.0) if np.any(seen) else 0.0
+            variance = float(np.mean(second[lit] / total[lit] ** 2) - 1.0) if np.any(lit) else 0.0
             best = min(best, (variance, cosine))
         shape = (self.count, *density.shape[2:])
         return _Best(chart, self.full, density.reshape(shape), light.ravel(), centres, *best)
@@ -527,14 +527,14 @@ class _Slices:
         q = np.geomspace(NARROWEST, chart.q_max, 320)
         s = np.log1p(q / chart.q0) / chart.span
         phi = (np.arange(12) + 0.5) * (2.0 * np.pi / 12)
-        found = []
+        places = []
         for place in (round(share * (len(self.angles) - 1)) for share in WIDTH_ANGLES):
             wo = _direction(self.angles[place], azimuth, 1.0)
             wi, jacobian = chart.direction(wo, s[:, None], phi[None], (centres[place, 0], centres[place, 1]))
             below = np.cumsum(np.where(wi[2] > 0.0, self._seen(material, across, side, wo, wi) * jacobian, 0.0).sum(1))
             if below[-1] > 0.0:
-                found.append(q[np.searchsorted(below, WIDTH_SHARE * below[-1])])
-        return float(np.exp(np.mean(np.log(found)))) if found else None
+                places.append(q[np.searchsorted(below, WIDTH_SHARE * below[-1])])
+        return float(np.exp(np.mean(np.log(places)))) if places else None
 
     def _centres(self, name: str, material: Any, across: bool, side: float) -> Grid:
         """Sine and cosine of the angle at which a lobe has its peak, in the plane of wo, for each angle of wo."""
@@ -545,8 +545,8 @@ class _Slices:
         for _ in range(ZOOMS):
             angle = np.clip(middle + reach * np.linspace(-1.0, 1.0, PEAKS), -HORIZON, HORIZON)
             light = self._seen(material, across, side, wo, (np.sin(angle), 0.0 * angle, np.cos(angle)))
-            weight = (light / np.maximum(light.max(1, keepdims=True), LEAST)) ** 4
-            middle = ((weight * angle).sum(1) / np.maximum(weight.sum(1), LEAST))[:, None]
+            weight = (light / np.maximum(light.max(1, keepdims=True), MIN_LIGHT)) ** 4
+            middle = ((weight * angle).sum(1) / np.maximum(weight.sum(1), MIN_LIGHT))[:, None]
             reach *= 8.0 / PEAKS
         return np.concatenate([np.sin(middle), np.cos(middle)], axis=1)
 

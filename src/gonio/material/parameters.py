@@ -140,12 +140,12 @@ class Parameter:
         """name -> what it means, of a choice."""
         return {}
 
-    def check(self, value: object, where: str) -> None:
+    def check(self, value: object, location: str) -> None:
         """Raise InputError, or warn, where `value` cannot stand for this parameter."""
 
-    def taken(self, value: object, where: str) -> Value:
+    def coerce(self, value: object, location: str) -> Value:
         """What a material holds where the user gave `value`: here that itself, once it is checked."""
-        self.check(value, where)
+        self.check(value, location)
         return value
 
     def portable(self, value: object) -> object:
@@ -185,33 +185,33 @@ class _Numeric(Parameter):
         high = "" if self.high == math.inf else f"<= {self.high:g}"
         return " and ".join(x for x in (low, high) if x) or "any number"
 
-    def check(self, value: object, where: str) -> None:
+    def check(self, value: object, location: str) -> None:
         if backend.is_drjit(value) or isinstance(value, graph.Node) or value is None:
             return
         try:
             array = np.asarray(value)
             if np.iscomplexobj(array):
-                raise InputError(f"{value!r} is complex, a real number expected", where, "give eta and k apart")
+                raise InputError(f"{value!r} is complex, a real number expected", location, "give eta and k apart")
             array = array.astype(np.float64)
         except InputError:
             raise
         except (TypeError, ValueError):
-            raise InputError(f"{value!r} given, a number or an array expected", where) from None
+            raise InputError(f"{value!r} given, a number or an array expected", location) from None
         if isinstance(value, str | bytes) or array.ndim > 1 + self.dimensions:
-            raise InputError(f"{value!r} given, a number or an array expected", where)
+            raise InputError(f"{value!r} given, a number or an array expected", location)
         if self.dimensions and array.ndim and array.shape[-1] != CHANNELS:
             what = f"a colour of shape {array.shape}, a number, {CHANNELS} values or (N, {CHANNELS}) expected"
-            raise InputError(what, where)
+            raise InputError(what, location)
         if array.size == 0:
-            raise InputError("an empty array given, a number or an array expected", where)
+            raise InputError("an empty array given, a number or an array expected", location)
         if not np.all(np.isfinite(array)):
-            raise InputError(f"{value!r} is not finite", where)
+            raise InputError(f"{value!r} is not finite", location)
         if array.min() < self.low or (array.max() > self.high and not self.soft_high):
             outside = array.min() if array.min() < self.low else array.max()
-            raise InputError(f"{outside:g} given, {self.range} expected", where)
+            raise InputError(f"{outside:g} given, {self.range} expected", location)
         if array.max() > self.high:
             text = f"{array.max():g} is over {self.high:g}: the material gives back more light than it receives"
-            warnings.warn(f"{where}: {text}", GonioWarning, stacklevel=5)
+            warnings.warn(f"{location}: {text}", GonioWarning, stacklevel=5)
 
     def bind(self, value: object, types: backend.Types) -> Value:
         return backend.float_of(value, types)
@@ -236,8 +236,8 @@ class IndexParameter(NumberParameter):
     A name becomes a `DispersiveIndex`, which is a number to all but spectral renders.
     """
 
-    def taken(self, value: object, where: str) -> Value:
-        return super().taken(indices.dispersive(value, where) if isinstance(value, str) else value, where)
+    def coerce(self, value: object, location: str) -> Value:
+        return super().coerce(indices.dispersive(value, location) if isinstance(value, str) else value, location)
 
 
 class ColourParameter(_Numeric):
@@ -265,9 +265,9 @@ class WidthParameter(_Numeric):
     kind = "alpha"
     symbol_type = "vec2"
 
-    def check(self, value: object, where: str) -> None:
-        for one in pair_of(value, where):
-            super().check(one, where)
+    def check(self, value: object, location: str) -> None:
+        for one in pair_of(value, location):
+            super().check(one, location)
 
     def bind(self, value: object, types: backend.Types) -> Value:
         if backend.is_drjit(value) and backend.drjit().is_vector_v(value):
@@ -320,8 +320,8 @@ class ChoiceParameter(Parameter):
     def range(self) -> str:
         return " | ".join(self.choices)
 
-    def taken(self, value: object, where: str) -> Value:
-        return super().taken(user_code.member_name(value, where, self.family), where)
+    def coerce(self, value: object, location: str) -> Value:
+        return super().coerce(user_code.member_name(value, location, self.family), location)
 
     @property
     def family(self) -> Family[Any] | None:
@@ -335,10 +335,10 @@ class ChoiceParameter(Parameter):
     def portable(self, value: object) -> object:
         return value if self.family is None or not isinstance(value, str) else self.family.portable(value)
 
-    def check(self, value: object, where: str) -> None:
+    def check(self, value: object, location: str) -> None:
         known = self.choices
         if not isinstance(value, str) or value not in known:
-            raise InputError(f"unknown {self.name} '{value}'", where, did_you_mean(str(value), list(known)))
+            raise InputError(f"unknown {self.name} '{value}'", location, did_you_mean(str(value), list(known)))
 
 
 class FlagParameter(Parameter):
@@ -346,9 +346,9 @@ class FlagParameter(Parameter):
 
     kind = "flag"
 
-    def check(self, value: object, where: str) -> None:
+    def check(self, value: object, location: str) -> None:
         if not isinstance(value, bool | np.bool_):
-            raise InputError(f"{value!r} given, True or False expected", where)
+            raise InputError(f"{value!r} given, True or False expected", location)
 
 
 class FileParameter(Parameter):
@@ -356,9 +356,9 @@ class FileParameter(Parameter):
 
     kind = "file"
 
-    def check(self, value: object, where: str) -> None:
+    def check(self, value: object, location: str) -> None:
         if isinstance(value, bool | int | float | list | tuple) or value is None or value == "":
-            raise InputError(f"{value!r} given, the path of a file expected", where)
+            raise InputError(f"{value!r} given, the path of a file expected", location)
 
 
 class MaterialParameter(Parameter):
@@ -367,17 +367,17 @@ class MaterialParameter(Parameter):
     kind = "bsdf"
     inner = True
 
-    def check(self, value: object, where: str) -> None:
+    def check(self, value: object, location: str) -> None:
         if not isinstance(value, Material):
-            raise InputError(f"{type(value).__name__} given, a material expected", where)
+            raise InputError(f"{type(value).__name__} given, a material expected", location)
 
 
-def pair_of(value: object, where: str = "") -> tuple[Value, Value]:
+def pair_of(value: object, location: str = "") -> tuple[Value, Value]:
     """The two widths of a width as a user gives it: itself twice, or the tuple's."""
     if not isinstance(value, tuple | list):
         return value, value
     if len(value) != 2:
-        raise InputError(f"{len(value)} widths given, one or two expected", where)
+        raise InputError(f"{len(value)} widths given, one or two expected", location)
     return value[0], value[1]
 
 
@@ -484,9 +484,9 @@ def bsdf(doc: str, default: Material | None = None) -> Value:
 
 def declared(cls: type) -> dict[str, Parameter]:
     """The parameters that a class declares, by name, in order."""
-    found = {}
+    parameters = {}
     for field in dataclasses.fields(cls):
         if field.metadata:
             more = dict(field.metadata)
-            found[field.name] = more.pop("kind")(name=field.name, default=field.default, **more)
-    return found
+            parameters[field.name] = more.pop("kind")(name=field.name, default=field.default, **more)
+    return parameters

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import ops
 from ..ops import Direction, Mask, Scalar, Spectrum
 
 if TYPE_CHECKING:  # Python's own has defaults since 3.13
@@ -39,6 +40,16 @@ class Sample(NamedTuple, Generic[D, C, N, B]):
     pdf: N
     delta: B
     eta: N
+
+    @staticmethod
+    def of_density(wi: Direction, weight: Spectrum, pdf: Scalar) -> Sample:
+        """A reflection drawn from a finite density: no lane is a delta lobe, eta is 1."""
+        return Sample(wi, weight, pdf, never(pdf), ops.ones_like(pdf))
+
+
+def never(like: Scalar) -> Mask:
+    """False for every ray."""
+    return like != like
 
 
 Floats: TypeAlias = "NDArray[np.floating]"

@@ -32,16 +32,16 @@ class Leaf(NamedTuple, Generic[M]):
     owner: M
 
 
-MOST = 64  # materials in a tree: its formula then takes about a second to compile
+MAX_MATERIALS = 64  # materials in a tree: its formula then takes about a second to compile
 
 
 def count(material: Material) -> int:
     """How many materials a tree holds, itself among them. InputError where these are more than MOST."""
-    found = 1 + sum(inner._count for inner in children(material).values())
-    if found > MOST:
-        what = f"{found} materials inside each other, {MOST} at most are expected"
+    total = 1 + sum(inner._count for inner in children(material).values())
+    if total > MAX_MATERIALS:
+        what = f"{total} materials inside each other, {MAX_MATERIALS} at most are expected"
         raise InputError(what, type(material).__name__, "mix fewer materials")
-    return found
+    return total
 
 
 def children(material: M) -> dict[str, M]:
@@ -84,19 +84,19 @@ def value_at(material: Material, path: str) -> Value:
     return value
 
 
-def replace(material: M, values: Mapping[str, object], where: str = "replace") -> M:
+def replace(material: M, values: Mapping[str, object], location: str = "replace") -> M:
     """The material with other values, or other inner materials, at some paths; InputError for what cannot be."""
     own: dict[str, Value] = {}
     below: dict[str, dict[str, object]] = {}
     for path, value in values.items():
         name, _, rest = path.partition(".")
-        _known(material, name, where)
+        _known(material, name, location)
         if rest:
             below.setdefault(name, {})[rest] = value
         else:
             own[name] = value
     for name, inner in below.items():
-        own[name] = replace(own.get(name, getattr(material, name)), inner, join(where, name))
+        own[name] = replace(own.get(name, getattr(material, name)), inner, join(location, name))
     return rebuild(material, own)
 
 
@@ -114,11 +114,11 @@ def map_leaves(material: M, change: Callable[[Parameter, object], object]) -> M:
     return rebuild(material, values)
 
 
-def _known(material: Material, name: str, where: str) -> str:
+def _known(material: Material, name: str, location: str) -> str:
     known = material.parameters() if isinstance(material, Material) else {}
     if name not in known:
         what = f"{type(material).__name__} has no parameter '{name}'"
-        raise InputError(what, where, did_you_mean(name, list(known)) if known else "")
+        raise InputError(what, location, did_you_mean(name, list(known)) if known else "")
     return name
 
 

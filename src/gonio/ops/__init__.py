@@ -28,9 +28,9 @@ __all__ = [
     "Spectrum", "Table", "Vector", "Vector3", "abs", "atan2", "channels", "clamp", "copysign", "cos", "dot", "erf",
     "exp",
     "fetch", "floor", "fma", "function", "get_precision", "inset", "inv_pi", "is_short", "is_single", "isfinite", "log",
-    "lookup", "max_component", "maximum", "mean", "minimum", "norm", "normalize", "of_channels", "pi", "pow",
-    "record", "rsqrt", "safe_div", "safe_sqrt", "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3",
-    "where",
+    "lookup", "max_component", "maximum", "mean", "minimum", "norm", "normalize", "of_channels", "ones_like", "pi",
+    "pow", "record", "rsqrt", "safe_div", "safe_sqrt", "set_precision", "sin", "sincos", "sqr", "sqrt", "vec2", "vec3",
+    "where", "zeros_like",
 ]  # fmt: skip
 
 pi = math.pi
@@ -191,6 +191,16 @@ def clamp(x: T, low: T | float, high: T | float) -> T:
 def rsqrt(x: T) -> T:
     """1 / sqrt(x); in float32 by the processor's estimate and a step of Newton's method, within 2 units."""
     return drjit().rsqrt(x) if is_single(x) else 1.0 / sqrt(x)
+
+
+def zeros_like(x: T) -> T:
+    """0 in the type and for every lane of x; recorded as 0 x."""
+    return 0.0 * x
+
+
+def ones_like(x: T) -> T:
+    """1 in the type and for every lane of x; recorded as 1 + 0 x."""
+    return 1.0 + 0.0 * x
 
 
 def _guarded(mask: Value, x: Value) -> Value:

@@ -118,7 +118,7 @@ def in_formula(number: float) -> Array:
 def float_of(value: object, kind: Types) -> Array:
     """A number or an array of shape (N,) as a Dr.Jit float.
 
-    A number becomes an evaluated array of one entry, never a literal: a literal would be baked into the kernel,
+    A number becomes an evaluated array of one entry a literal: a literal would be baked into the kernel,
     and every new value would compile it again.
     """
     dr = drjit()

@@ -58,13 +58,13 @@ def _name_locals(function: Function) -> None:
     Called whenever a value is made: what an earlier line bound is then still there. A name in the function's own
     frame is preferred to one in a plain function that it calls, the first name to a later one.
     """
-    found = []
+    frames = []
     frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_code is not _define.__code__:
         if not frame.f_code.co_filename.startswith(_HERE):
-            found.append(frame)
+            frames.append(frame)
         frame = frame.f_back
-    for depth, own in enumerate(reversed(found)):
+    for depth, own in enumerate(reversed(frames)):
         for name, value in own.f_locals.items():
             if isinstance(value, Node):
                 if value.function is function and value.depth > depth:
@@ -399,10 +399,10 @@ def class_name(value: object) -> str:
     return type(value).__name__.lstrip("_")
 
 
-def first_free(name: str, taken: Container[str]) -> str:
+def first_free(name: str, used: Container[str]) -> str:
     """The name, or name_2, name_3 and so on: the first that is not taken."""
     names = itertools.chain([name], (f"{name}_{count}" for count in itertools.count(2)))
-    return next(found for found in names if found not in taken)
+    return next(free for free in names if free not in used)
 
 
 def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
@@ -416,14 +416,14 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
     key = (python_function, *(_static_key(value) for value in bound.arguments.values()))
     function = graph._known.get(key)
     if function is None:
-        taken = {f.name for f in graph.functions} | {f.name for _, f in _stack}
+        used = {f.name for f in graph.functions} | {f.name for _, f in _stack}
         stem = python_function.__name__.strip("_")
         owner = bound.arguments.get("self")
         if owner is not None:
             stem = f"{class_name(owner)}_{stem}"
         elif python_function.__qualname__.count(".") == 1:  # a static method
             stem = f"{python_function.__qualname__.split('.')[0]}_{stem}"
-        name = first_free(stem, taken)
+        name = first_free(stem, used)
         function = graph._known[key] = _define(graph, python_function, dict(bound.arguments), name)
     nodes = [node for argument, value in bound.arguments.items() for _, node in _flatten(value, argument)]
     called = emit("call", "tuple", *nodes, static=function)

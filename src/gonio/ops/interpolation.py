@@ -77,8 +77,8 @@ def fetch(table: Table, *places: Scalar | float) -> tuple[Scalar, ...]:
     array = table.array(kind)
     width = 4 if table.channels % 4 == 0 else 1
     fetched = kind.vec4 if width == 4 else kind.float
-    found: list[Array] = []
+    channels: list[Array] = []
     for first in range(0, table.channels, width):
         texel = dr.gather(fetched, array, index * (table.channels // width) + first // width)
-        found += list(texel) if width == 4 else [texel]
-    return tuple(found)
+        channels += list(texel) if width == 4 else [texel]
+    return tuple(channels)

@@ -20,7 +20,7 @@ from .backend import Array, Types, drjit
 
 
 class Table:
-    """Numbers on a grid of one to three axes, with channels last; compared by identity, never changed.
+    """Numbers on a grid of one to three axes, with channels last; compared by identity changed.
 
     name    what it holds, as shader code and manifests call it: other letters than those of an identifier become _
     values  shape (axis, ..., channels), float64

@@ -39,5 +39,5 @@ def weights(nm: Floats) -> Floats:
     """What each of equally spaced wavelengths adds to linear sRGB under D65, (N, 3); a flat reflectance is grey."""
     light = np.interp(nm, WAVELENGTHS, D65, left=0.0, right=0.0)
     rgb = (observer(nm) * light).T @ XYZ_TO_RGB.T
-    found: Floats = rgb / rgb.sum(axis=0)
-    return found
+    chromaticity: Floats = rgb / rgb.sum(axis=0)
+    return chromaticity

@@ -169,12 +169,12 @@ class OpticalConstants:
             what = f"{wrong.flat[0]:g} nm is outside of {self.name}, which is known from {low:g} to {high:g} nm"
             raise InputError(what, "wavelength", hint)
         with np.errstate(all="ignore"):
-            found = self.curve.at(np.clip(given, low, high))
-        missing = given[~np.isfinite(found.eta)]
+            constants = self.curve.at(np.clip(given, low, high))
+        missing = given[~np.isfinite(constants.eta)]
         if missing.size:
             what = f"{self.name} has no index at {missing.flat[0]:g} nm: a resonance, or the square of none"
             raise InputError(what, "wavelength", "formulas have lambda in micrometres")
-        return found
+        return constants
 
     @property
     def sodium(self) -> float:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from .. import ops
-from ..ops import Direction, Pair, Scalar, dot, function, sqr, vec3
+from ..ops import Direction, Pair, Scalar, dot, function, sincos, sqr, vec3
 
 
 @function
@@ -27,9 +30,23 @@ def refract(w: Direction, m: Direction, cos_t: Scalar, eta: Scalar) -> Direction
     return m * (dot(w, m) / eta - cos_t) - w * (1.0 / eta)
 
 
-def upright(like: Direction) -> Direction:
+def spherical_direction(sin_theta: Scalar, cos_theta: Scalar, phi: Scalar) -> Direction:
+    """The direction of polar angle theta, by its sine and cosine, and azimuth phi; `spherical_array` in NumPy.
+
+    For computations only: the recorder would name its variables, so shaders write these two lines out."""
+    s, c = sincos(phi)
+    return vec3(sin_theta * c, sin_theta * s, cos_theta)
+
+
+def spherical_array(sin_theta: ArrayLike, cos_theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+    """The directions, (..., 3), of NumPy arrays that go together."""
+    parts = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+
+
+def normal_like(like: Direction) -> Direction:
     """The surface normal, one for every ray of `like`."""
-    zero = 0.0 * like.z
+    zero = ops.zeros_like(like.z)
     return vec3(zero, zero, 1.0 + zero)
 
 

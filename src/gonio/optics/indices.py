@@ -133,8 +133,8 @@ def _constants() -> dict[str, OpticalConstants]:
         ),
         "diamond": ("diamond", _glass(226.0, 760.0, (0.3306, 0.175**2), (4.3356, 0.106**2)), "Peter1923"),
     }  # fmt: skip
-    found = {name: OpticalConstants(name, *facts) for name, facts in media.items()}
-    return found | {s: OpticalConstants(s, m.name, tables[s], m.source) for s, m in METALS.items()}
+    substances = {name: OpticalConstants(name, *facts) for name, facts in media.items()}
+    return substances | {s: OpticalConstants(s, m.name, tables[s], m.source) for s, m in METALS.items()}
 
 
 _CONSTANTS = _constants()
@@ -166,56 +166,56 @@ def refractive_index(
 
 
 @functools.lru_cache(maxsize=256)
-def constants(name: str, where: str = "name") -> OpticalConstants:
+def constants(name: str, location: str = "name") -> OpticalConstants:
     """What is known of a substance, by any of the ways in which `refractive_index` names one."""
     if not isinstance(name, str):
-        raise InputError(f"{name!r} given, the name of a substance expected", where, "see go.indices()")
+        raise InputError(f"{name!r} given, the name of a substance expected", location, "see go.indices()")
     text = name.strip()
     known = {key.lower(): key for key in _CONSTANTS} | {metal.name: key for key, metal in METALS.items()}
     if text.lower() in known:
         return _CONSTANTS[known[text.lower()]]
     if text.startswith(index_database.PREFIX):
-        return index_database.read(text, where)
+        return index_database.read(text, location)
     formula = re.fullmatch(r"(\w+)\s*\((.*)\)", text, re.DOTALL)
     if formula and formula[1] in ("cauchy", "sellmeier"):
-        return _formula(text, formula[1], formula[2], where)
+        return _formula(text, formula[1], formula[2], location)
     spelled = [*_CONSTANTS, *(metal.name for metal in METALS.values()), "cauchy(a, b)", "sellmeier(b1, c1)"]
-    raise InputError(f"unknown refractive index '{name}'", where, did_you_mean(text, spelled))
+    raise InputError(f"unknown refractive index '{name}'", location, did_you_mean(text, spelled))
 
 
-def dispersive(name: str, where: str) -> DispersiveIndex:
+def dispersive(name: str, location: str) -> DispersiveIndex:
     """The index of a transparent medium by name, as a dielectric's `eta` takes it. InputError for a metal, for an index
     that is not positive, and where the visible is not covered."""
-    found = constants(name, where)
-    low, high = found.range
+    optical = constants(name, location)
+    low, high = optical.range
     if low > VISIBLE[0] or high < VISIBLE[1]:
         what = f"{name} is known from {low:g} to {high:g} nm, not where light is visible"
-        raise InputError(what, where, "take another source")
+        raise InputError(what, location, "take another source")
     try:
-        seen = found.at(np.linspace(*VISIBLE, 31))
+        visible = optical.at(np.linspace(*VISIBLE, 31))
     except InputError as error:
-        raise InputError(error.what, where, error.hint) from None
-    if seen.k.max() > 0.01:
+        raise InputError(error.what, location, error.hint) from None
+    if visible.k.max() > 0.01:
         hint = "a dielectric is transparent; see Conductor.preset"
-        raise InputError(f"{name} absorbs light within a wavelength: k is {seen.k.max():.3g}", where, hint)
-    if seen.eta.min() < 0.2 or seen.eta.max() > 5.0:
-        worst = seen.eta[(seen.eta < 0.2) | (seen.eta > 5.0)][0]
-        raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", where, "lambda in micrometres")
-    return DispersiveIndex(found)
+        raise InputError(f"{name} absorbs light within a wavelength: k is {visible.k.max():.3g}", location, hint)
+    if visible.eta.min() < 0.2 or visible.eta.max() > 5.0:
+        worst = visible.eta[(visible.eta < 0.2) | (visible.eta > 5.0)][0]
+        raise InputError(f"{name} is {worst:g} in the visible, 0.2 to 5 expected", location, "lambda in micrometres")
+    return DispersiveIndex(optical)
 
 
-def _formula(text: str, kind: str, given: str, where: str) -> OpticalConstants:
+def _formula(text: str, kind: str, given: str, location: str) -> OpticalConstants:
     try:
         numbers = [float(part) for part in given.split(",")]
     except ValueError:
-        raise InputError(f"'{text}' holds what is no number", where, f"such as {kind}(1.5, 0.004)") from None
+        raise InputError(f"'{text}' holds what is no number", location, f"such as {kind}(1.5, 0.004)") from None
     if not np.all(np.isfinite(numbers)):
-        raise InputError(f"'{text}' holds a number that is not finite", where)
+        raise InputError(f"'{text}' holds a number that is not finite", location)
     if kind == "cauchy":
         terms = tuple((value, -2.0 * power) for power, value in enumerate(numbers))
         curve: Dispersion = Powers(*ALL, terms)
     elif len(numbers) % 2:
-        raise InputError(f"{len(numbers)} numbers in '{text}', pairs expected", where, "b1, c1, b2, c2, ...")
+        raise InputError(f"{len(numbers)} numbers in '{text}', pairs expected", location, "b1, c1, b2, c2, ...")
     else:
         curve = Sellmeier(*ALL, tuple(zip(numbers[::2], numbers[1::2], strict=True)))
     return OpticalConstants(text, f"by {kind.capitalize()}'s formula", curve, "coefficients given")

@@ -50,9 +50,9 @@ def power_about(axis: Direction, w: Direction, p: Scalar) -> Scalar:
 
 
 @function
-def around(axis: Direction, w: Direction) -> Direction:
+def to_frame(axis: Direction, w: Direction) -> Direction:
     """w, given about +z, about a unit axis instead; the basis has no branch cut but at axis = -z (Duff2017)."""
-    side = ops.copysign(1.0 + 0.0 * axis.z, axis.z)
+    side = ops.copysign(ops.ones_like(axis.z), axis.z)
     a = -1.0 / (side + axis.z)
     b = axis.x * axis.y * a
     s = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x)

@@ -275,7 +275,7 @@ def _in_range(parameter: Parameter, key: str) -> Callable[[T], T]:
     def check(value: T) -> T:
         if isinstance(value, str):
             try:
-                parameter.taken(value, key)
+                parameter.coerce(value, key)
             except GonioError as error:
                 raise invalid(error.what, error.hint) from None
         for number in numbers_in(value):

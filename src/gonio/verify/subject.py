@@ -22,7 +22,7 @@ import numpy as np
 
 from ..catalog import notation, outside
 from ..errors import GonioError, InputError
-from ..material import BSDF, Breach, Parameter, Sample, models, tree
+from ..material import BSDF, KnownViolation, Parameter, Sample, models, tree
 from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
 from . import directions
@@ -71,7 +71,7 @@ class Subject:
     @property
     def perturbs_normal(self) -> bool:
         """Whether its normal differs from that of the surface."""
-        return bool(self.model.leans)
+        return bool(self.model.perturbs_normal)
 
     @property
     def stochastic(self) -> bool:
@@ -97,9 +97,9 @@ class Subject:
         return self.model.parameters()
 
     @property
-    def breaches(self) -> dict[str, Breach]:
+    def breaches(self) -> dict[str, KnownViolation]:
         """Laws that it declares to violate."""
-        return self.model.breaches()
+        return self.model.violations()
 
     @property
     def by_nature(self) -> Mapping[str, str]:

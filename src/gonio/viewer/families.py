@@ -129,7 +129,7 @@ def _hint(name: str, names: list[str]) -> str:
 def _of_code(name: str) -> MemberPage:
     """Of a class in a file that is a member of a family, or could be."""
     cls = outside.thing(name, where="MODEL")
-    home = next((home for home in HOMES[1:] if issubclass(cls, _base(home))), None)
+    home = next((home for home in HOMES[1:] if isinstance(cls, type) and issubclass(cls, _base(home))), None)
     if home is None:
         raise InputError(f"{name} is no member of a family", "MODEL", "gonio explain alone lists the families")
     return _page(cls, home)

@@ -92,7 +92,7 @@ def page(model: type[BSDF]) -> Page:
         title=model.__name__,
         doc=inspect.getdoc(model) or "",
         parameters=rows,
-        breaks={law: breach.reason for law, breach in model.breaks.items()},
+        breaks={law: breach.reason for law, breach in model.known_violations.items()},
         plugin="gonio_" + model.name.replace("-", "_"),
         source="src/" + model.__module__.replace(".", "/") + ".py" if own else inspect.getfile(model),
     )

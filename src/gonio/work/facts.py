@@ -10,7 +10,10 @@ from pathlib import Path
 
 from .._version import __version__
 
-ROOMS = ("models", "ops", "optics", "energy", "render", "work")  # whose code results depend on
+PACKAGES = (  # whose code results depend on
+    "bridge", "catalog", "energy", "material", "materials", "measure", "ops", "optics", "pictures", "render", "scene",
+    "transport", "work",
+)  # fmt: skip
 
 
 def versions() -> str:
@@ -30,7 +33,7 @@ def code() -> str:
     """Hash of Gonio's code that results depend on: a checkout changes between two versions, too."""
     package = Path(__file__).parent.parent
     found = hashlib.sha256()
-    for path in sorted(p for room in ROOMS for p in (package / room).rglob("*.py")):
+    for path in sorted(p for name in PACKAGES for p in (package / name).rglob("*.py")):
         found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes() + b"\0")
     return found.hexdigest()
 

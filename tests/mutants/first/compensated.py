@@ -26,8 +26,8 @@ class KullaContyTimesPi(go.KullaConty):
     kind: ClassVar[str] = "compensated"
     base: go.BSDF = go.bsdf("the material to be compensated", go.Conductor(alpha=0.5))
 
-    def added(self, wo, wi, mode):
-        return super().added(wo, wi, mode) * ops.pi
+    def compensation(self, wo, wi, mode):
+        return super().compensation(wo, wi, mode) * ops.pi
 
 
 class KullaContyViewerOnly(go.KullaConty):
@@ -40,9 +40,9 @@ class KullaContyViewerOnly(go.KullaConty):
     kind: ClassVar[str] = "compensated"
     base: go.BSDF = go.bsdf("the material to be compensated", go.Conductor(alpha=0.8))
 
-    def added(self, wo, wi, mode):
+    def compensation(self, wo, wi, mode):
         value = self.M(wo) * ops.where(lit(wo, wi), wi.z * ops.inv_pi, 0.0)
-        return self.derived.added * value
+        return self.derived.f_add * value
 
 
 class KullaContyPdfOfBase(go.KullaConty):
@@ -68,7 +68,7 @@ class KullaContyOtherWidth(go.KullaConty):
     def derive(self):
         wider = bound_copy(self.base, {"alpha": ops.sqrt(self.base.alpha)})
         lost = missing.missing_energy(wider, self.average)
-        f_add = kulla_conty.returned(lost, self.color)
+        f_add = kulla_conty.f_add(lost, self.color)
         return kulla_conty.Derived(lost, f_add, lobe_ratio(f_add, lost))
 
 
@@ -80,8 +80,8 @@ class KullaContyCutGradient(go.KullaConty):
     kind: ClassVar[str] = "compensated"
     base: go.BSDF = go.bsdf("the material to be compensated", go.Conductor(alpha=0.6))
 
-    def added(self, wo, wi, mode):
-        value = super().added(wo, wi, mode)
+    def compensation(self, wo, wi, mode):
+        value = super().compensation(wo, wi, mode)
         return dr.detach(value) if backend.is_drjit(value) else value
 
 
@@ -96,7 +96,7 @@ class KullaContyColourTwice(go.KullaConty):
     def derive(self):
         d = super().derive()
         twice = 1.0 / (1.0 - d.missing.F_avg * d.missing.average)
-        return d._replace(added=d.added * twice)
+        return d._replace(f_add=d.f_add * twice)
 
 
 class TurquinUndeclared(go.Turquin):
@@ -105,7 +105,7 @@ class TurquinUndeclared(go.Turquin):
     fault: ClassVar[str] = "the factor sees the viewer alone, and the breach of reciprocity is not declared"
     cause: ClassVar[str] = ""
     kind: ClassVar[str] = "compensated"
-    breaks: ClassVar = {}
+    known_violations: ClassVar = {}
     base: go.BSDF = go.bsdf("the material to be compensated", go.Conductor(alpha=0.8))
 
 
@@ -145,8 +145,8 @@ class FdezAgueraWholeDiffuse(go.FdezAguera):
     kind: ClassVar[str] = "compensated"
     base: go.BSDF = go.bsdf("the material to be compensated", go.Conductor(alpha=0.4))
 
-    def added(self, wo, wi, mode):
-        value = super().added(wo, wi, mode)
+    def compensation(self, wo, wi, mode):
+        value = super().compensation(wo, wi, mode)
         return value * ops.safe_div(1.0, ops.maximum(self.M(wo), 1e-3))
 
 
@@ -158,7 +158,7 @@ class HomeMadeCompensation(go.BSDF):
     )
     cause: ClassVar[str] = ""
     kind: ClassVar[str] = "compensated"
-    lossless: ClassVar[float | None] = 5e-3
+    lossless_tolerance: ClassVar[float | None] = 5e-3
     alpha: go.Number = go.number(0.6, "width of the facets", low=0.05, high=1.0)
     r0: go.Colour = go.spectrum((1.0, 0.8, 0.4), "reflectance at the normal", low=0.0, high=1.0)
 

@@ -475,7 +475,7 @@ class FacetsLossless(_Facets):
     )
     cause: ClassVar[str] = ""
     kind: ClassVar[str] = "smooth"
-    lossless: ClassVar[float | None] = 1e-3
+    lossless_tolerance: ClassVar[float | None] = 1e-3
     alpha: go.Number = go.number(0.7, "width of the facets' distribution", low=0.02, high=1.0)
 
 
@@ -640,7 +640,7 @@ class MatteBreachAbsent(go.BSDF):
     fault: ClassVar[str] = "it declares a breach of reciprocity that is not there: the formula is Lambert's"
     cause: ClassVar[str] = ""
     kind: ClassVar[str] = "smooth"
-    breaks: ClassVar = {"reciprocity": go.Breach("the highlight has no cosine", 1.0)}
+    known_violations: ClassVar = {"reciprocity": go.KnownViolation("the highlight has no cosine", 1.0)}
     kd: go.Colour = go.spectrum(0.5, "share of light that is reflected", low=0.0, high=1.0)
 
     def eval(self, wo, wi):

@@ -33,7 +33,7 @@ class AverageHalved(KullaConty):
     cause: ClassVar[str] = "E_avg without the cosine weight: added lobe mis-scaled, energy"
     base: go.BSDF = go.bsdf("the metal", default=go.Conductor(eta=0.0, k=1.0, alpha=0.7))
 
-    def added(self, wo, wi, mode):
+    def compensation(self, wo, wi, mode):
         from gonio.optics.special import gauss
 
         nodes = [(float(x), float(w)) for x, w in zip(*gauss(8), strict=True)]
@@ -41,7 +41,7 @@ class AverageHalved(KullaConty):
         for x, w in nodes:
             sin = (1.0 - x * x) ** 0.5
             mean = mean + w * self.M(ops.vec3(sin + 0.0 * wo.z, 0.0 * wo.z, x + 0.0 * wo.z))
-        return super().added(wo, wi, mode) * ops.safe_div(self.derived.missing.average, mean)
+        return super().compensation(wo, wi, mode) * ops.safe_div(self.derived.missing.average, mean)
 
 
 class AddedFromViewer(KullaConty):
@@ -51,8 +51,8 @@ class AddedFromViewer(KullaConty):
     cause: ClassVar[str] = "added lobe depends on wo alone: reciprocity, not declared"
     base: go.BSDF = go.bsdf("the metal", default=go.Conductor.preset("Cu", alpha=0.6))
 
-    def added(self, wo, wi, mode):
-        return self.derived.added * ops.where(above(wo, wi), self.M(wo) * wi.z * ops.inv_pi, 0.0)
+    def compensation(self, wo, wi, mode):
+        return self.derived.f_add * ops.where(above(wo, wi), self.M(wo) * wi.z * ops.inv_pi, 0.0)
 
 
 class BroadLobeUnknownToPdf(KullaConty):
@@ -181,7 +181,7 @@ class _White(go.BSDF):
     """White GGX of width 1, compensated by a table of its own."""
 
     albedo: go.Colour = go.spectrum(1.0, "share of each bounce", low=0.0, high=1.0)
-    lossless: ClassVar[float] = 1e-2
+    lossless_tolerance: ClassVar[float] = 1e-2
 
     def E(self, mu):
         """By linear interpolation; a chain of `where`, as shaders without textures have it."""

@@ -122,6 +122,9 @@ class Lottery(go.BSDF):
     def pdf(self, wo, wi):
         return ops.where(above(wo, wi), wi.z * ops.inv_pi, 0.0)
 
+    def sample(self, wo, u, mode="radiance"):
+        return self.sample_cosine(wo, u, mode)
+
 
 class BouncingLacquer(go.BSDF):
     """A smooth lacquer over a matte base, with all the light that is thrown back and forth between them."""
@@ -132,7 +135,7 @@ class BouncingLacquer(go.BSDF):
     cause: ClassVar[str] = ""
     kd: go.Colour = go.spectrum((0.8, 0.3, 0.1), "share that the base reflects", low=0.0, high=1.0)
     eta: go.Number = go.number(1.5, "index of the lacquer", low=1.1, high=2.5)
-    lossless: ClassVar[float] = 1e-3
+    lossless_tolerance: ClassVar[float] = 1e-3
 
     @property
     def delta(self):
@@ -179,7 +182,7 @@ class WholeVelvet(go.BSDF):
     )
     cause: ClassVar[str] = ""
     r: go.Colour = go.spectrum((0.9, 0.5, 0.2), "share of each bounce", low=0.0, high=1.0)
-    lossless: ClassVar[float] = 1e-3
+    lossless_tolerance: ClassVar[float] = 1e-3
 
     def eval(self, wo, wi, mode="radiance"):
         single = 1.5 * wo.z * wi.z

@@ -17,8 +17,8 @@ class KullaNotReciprocal(go.KullaConty):
     cause: ClassVar[str] = "mu_o in place of mu_i in 1 - E"
     kind: ClassVar[str] = "compensated"
 
-    def added(self, wo, wi, mode):
-        return super().added(wo, wi, mode) * ops.safe_div(self.M(wo), self.M(wi))
+    def compensation(self, wo, wi, mode):
+        return super().compensation(wo, wi, mode) * ops.safe_div(self.M(wo), self.M(wi))
 
 
 class KullaNoPi(go.KullaConty):
@@ -29,8 +29,8 @@ class KullaNoPi(go.KullaConty):
     cause: ClassVar[str] = "pi missing in the lobe"
     kind: ClassVar[str] = "compensated"
 
-    def added(self, wo, wi, mode):
-        return super().added(wo, wi, mode) * ops.pi
+    def compensation(self, wo, wi, mode):
+        return super().compensation(wo, wi, mode) * ops.pi
 
 
 class KullaSharesSwapped(go.KullaConty):
@@ -54,8 +54,8 @@ class KullaGlassMode(go.KullaConty):
     cause: ClassVar[str] = "mode ignored in the second lobe"
     kind: ClassVar[str] = "compensated"
 
-    def added(self, wo, wi, mode):
-        return super().added(wo, wi, "importance")
+    def compensation(self, wo, wi, mode):
+        return super().compensation(wo, wi, "importance")
 
 
 class KullaGlassBothSides(go.KullaConty):
@@ -66,8 +66,8 @@ class KullaGlassBothSides(go.KullaConty):
     cause: ClassVar[str] = "share of the side missing"
     kind: ClassVar[str] = "compensated"
 
-    def added(self, wo, wi, mode):
-        return super().added(wo, wi, mode) * ops.safe_div(1.0, self.derived.missing.share(wo, wi))
+    def compensation(self, wo, wi, mode):
+        return super().compensation(wo, wi, mode) * ops.safe_div(1.0, self.derived.missing.share(wo, wi))
 
 
 class TurquinOtherSide(go.Turquin):

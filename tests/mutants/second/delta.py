@@ -396,7 +396,7 @@ class ThinSheetGain(_Slab):
 class ThinSheetLossy(_Slab):
     """A thin sheet that claims to lose nothing."""
 
-    lossless: ClassVar[float] = 1e-3
+    lossless_tolerance: ClassVar[float] = 1e-3
     fault: ClassVar[str] = "T = (1 - r)^2 leaves out light reflected inside, though the sheet claims to be lossless"
     cause: ClassVar[str] = ""
 

@@ -109,7 +109,7 @@ class Nothing(_Delta):
     fault: ClassVar[str] = ""
     why: ClassVar[str] = "all light passes straight on with weight 1; it has no parameter"
     transmits = True
-    lossless: ClassVar[float] = 1e-6
+    lossless_tolerance: ClassVar[float] = 1e-6
 
     def sample(self, wo, u, mode="radiance"):
         one = 1.0 + 0.0 * wo.z
@@ -123,7 +123,7 @@ class ThinSlab(_Delta):
     fault: ClassVar[str] = ""
     why: ClassVar[str] = "R = 2r/(1+r), T = 1 - R, in air on both sides: no radiance factor and eta 1"
     transmits = True
-    lossless: ClassVar[float] = 1e-5
+    lossless_tolerance: ClassVar[float] = 1e-5
 
     def sample(self, wo, u, mode="radiance"):
         cos = ops.abs(wo.z)
@@ -324,7 +324,7 @@ class FrostedBoundary(go.BSDF):
     fault: ClassVar[str] = ""
     why: ClassVar[str] = "of what would leave only 1 / eta^2 of the share that enters does: what reciprocity asks for"
     transmits = True
-    lossless: ClassVar[float] = 1e-5
+    lossless_tolerance: ClassVar[float] = 1e-5
 
     def _eta(self, wo):
         return ops.where(wo.z > 0.0, self.eta, 1.0 / self.eta)

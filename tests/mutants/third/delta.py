@@ -16,7 +16,7 @@ class _Glass(go.BSDF):
 
     fault: ClassVar[str] = ""
     cause: ClassVar[str] = ""
-    lossless: ClassVar[float | None] = 1e-3
+    lossless_tolerance: ClassVar[float | None] = 1e-3
 
     tint_: go.Colour = go.spectrum(1.0, "share that is kept of all that leaves", low=0.0, high=1.0)
     eta: go.Number = go.number(1.5, "index inside over outside", low=1.1, high=2.5)
@@ -36,7 +36,7 @@ class _Glass(go.BSDF):
     def choose(self, wo, u):
         """(reflects, F, wi, eta of the sample)"""
         eta = self.ratio(wo)
-        up = frame.upright(wo)
+        up = frame.normal_like(wo)
         m = ops.where(wo.z < 0.0, -up, up)
         cos_o = ops.abs(wo.z)
         cos_t = fresnel.cos_transmitted(cos_o, eta)
@@ -95,7 +95,7 @@ class OneIndexBothWays(_Glass):
     cause = "Snell's law with eta instead of 1 / eta from inside: the path is not the reverse of the one that entered"
 
     def choose(self, wo, u):
-        up = frame.upright(wo)
+        up = frame.normal_like(wo)
         m = ops.where(wo.z < 0.0, -up, up)
         cos_o = ops.abs(wo.z)
         cos_t = fresnel.cos_transmitted(cos_o, self.eta)

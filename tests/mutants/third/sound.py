@@ -306,13 +306,13 @@ class Toon(_Odd):
 
     kd: go.Colour = go.spectrum((0.8, 0.4, 0.3), "tone", low=0.0, high=1.0)
 
-    breaks = {
-        "reciprocity": go.Breach(
+    known_violations = {
+        "reciprocity": go.KnownViolation(
             "tones are laid on without a cosine, so f divides by cos theta_i alone",
             lambda toon: 1.0 if np.any(np.asarray(toon.kd) > 0) else 0.0,
         ),
         # 2 pi (0.2 * 0.5 + 0.5 * 0.5) - 1 = 1.2 for kd = 1
-        "energy": go.Breach("tones are not normalized", 2.0 * np.pi * 0.35 - 1.0 + 0.001, certain=False),
+        "energy": go.KnownViolation("tones are not normalized", 2.0 * np.pi * 0.35 - 1.0 + 0.001, certain=False),
     }
 
     def eval(self, wo, wi, mode="radiance"):

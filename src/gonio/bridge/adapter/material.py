@@ -82,7 +82,9 @@ class PlacedMaterial:
             raise InputError(what, f"{self.name}.base")
         guide_search.prepare(self.model)  # integrators ask inside loops
         if self.model.derives and not self.varies:
-            self.derived = binding.settled(self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True))
+            self.derived = binding.evaluate_derived(
+                self.at(dr.zeros(self.variant.mi.SurfaceInteraction3f), True, inner=True)
+            )
 
     @property
     def varies(self) -> bool:

@@ -64,7 +64,7 @@ class Slot:
         if name in props:
             given = props.type(name)
             if given == kinds.String and isinstance(parameter, IndexParameter):
-                return self._constant(name, parameter.taken(str(props[name]), self.where))
+                return self._constant(name, parameter.coerce(str(props[name]), self.where))
             if given == kinds.String:
                 raise InputError(f"'{props[name]}' given, a number or a texture expected", self.where)
             if given in (kinds.Float, kinds.Integer):

@@ -42,7 +42,7 @@ def rim(inset: float) -> Nodes:
     return Nodes(near[:, 0], near[:, 1], np.full(len(near), 1.0 / len(near)))
 
 
-def step_aside(inside: Seen, around: Seen, times: float = 4.0) -> np.ndarray:
+def step_aside(inside: Seen, rim: Seen, times: float = 4.0) -> np.ndarray:
     """What is lost, or taken for lit, between the nodes and the rim where the rim is quite another, (cells,): a step
     that runs there, such as the horizon's or total reflection's, is seen by no rule.
 
@@ -51,6 +51,6 @@ def step_aside(inside: Seen, around: Seen, times: float = 4.0) -> np.ndarray:
     times  by how much another: what a cell's own slope does not make of it
     """
     with np.errstate(invalid="ignore"):  # values that are no numbers are for others to find
-        more = np.where(around.most > times * inside.most, around.most - inside.most, 0.0)
-        less = np.where(times * around.least < inside.least, inside.least - around.least, 0.0)
+        more = np.where(rim.most > times * inside.most, rim.most - inside.most, 0.0)
+        less = np.where(times * rim.least < inside.least, inside.least - rim.least, 0.0)
     return OUTSIDE * np.maximum(more, less)

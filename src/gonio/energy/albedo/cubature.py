@@ -25,7 +25,7 @@ SAMPLES = 1024  # of each wo
 CROWD = 32  # of them in a cell that is divided before anything is known of the integrand
 AROUND = 3 * (CROWD + 4)  # points that stand for the mirror direction, wo and -wo
 UNSEEN = 0.01  # of the share of an integral that samples tell of: what is less was not seen at all
-LARGEST = 600_000  # cells evaluated in one round, some 10 M directions
+MAX_CELLS = 600_000  # cells evaluated in one round, some 10 M directions
 
 
 _GAUSS, _FEWER, _RIM = product(ORDER), product(ORDER - 1), rim(1e-3)
@@ -89,18 +89,18 @@ def integrate(
     allowed = tolerance / 400.0  # some hundreds of cells carry an integral's error
     for depth in range(DEPTH):
         fine_cells = cells.quarters()
-        seen, other, around = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
-        fine = seen.integral.reshape(-1, 4, channels)
+        inner, other, rim = (_values(integrand, wo, fine_cells, nodes) for nodes in (_GAUSS, _FEWER, _RIM))
+        fine = inner.integral.reshape(-1, 4, channels)
         difference = np.abs(coarse - fine.sum(1))
         # a step that many cells share, such as the rim of a cone about the normal, may fool one rule by chance in all
         difference = np.maximum(difference, np.abs(other.integral.reshape(-1, 4, channels).sum(1) - fine.sum(1)))
-        difference += 0.02 * step_aside(seen, around).reshape(-1, 4, 1).sum(1)  # steps err both ways, and cancel
+        difference += 0.02 * step_aside(inner, rim).reshape(-1, 4, 1).sum(1)  # steps err both ways, and cancel
         divide = difference.max(1) > allowed
         # the foot of a narrow lobe in a cell that is wider than the lobe: samples lie there, and no node sees anything
-        whole = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
+        level = np.bincount(cells.row, fine.sum(1).max(1), len(wo)) + value.max(1)
         share = np.bincount(points.cell, minlength=len(divide)) / SAMPLES
-        divide |= fine.sum(1).max(1) < UNSEEN * share * whole[cells.row]
-        if depth == DEPTH - 1 or 16 * divide.sum() > LARGEST:
+        divide |= fine.sum(1).max(1) < UNSEEN * share * level[cells.row]
+        if depth == DEPTH - 1 or 16 * divide.sum() > MAX_CELLS:
             divide[:] = False
         done = ~divide
         np.add.at(value, cells.row[done], fine[done].sum(1))
@@ -121,8 +121,8 @@ class _Points(NamedTuple):
 
     def within(self, cells: _Cells, divided: np.ndarray) -> _Points:
         """Those in divided cells, by the numbers of these cells' quarters."""
-        kept = divided[self.cell]
-        cell, at = self.cell[kept], self.at[kept]
+        inside = divided[self.cell]
+        cell, at = self.cell[inside], self.at[inside]
         far = at >= cells.low[cell] + 0.5 * cells.size[cell]
         return _Points(4 * (np.cumsum(divided) - 1)[cell] + far[:, 0] + 2 * far[:, 1], at)
 
@@ -148,9 +148,9 @@ def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points
     below = (likely[:, 2] < 0.0).astype(int)
     angles = np.stack([theta, phi], -1)
     own = len(angles) - AROUND * len(wo)  # the rest are directions that no sample may have
-    homes, found = np.full(own, -1), 0
+    homes, first = np.full(own, -1), 0
     # one integer says in which cell a point lies, at each level: row, side, and the cell's two coordinates
-    settled: list[_Cells] = []
+    accepted: list[_Cells] = []
     for level in range(SEEDED):
         scale = 2**level
         point = _key(owner, below, theta / step[0] * scale, phi / step[1] * scale, n_theta * scale, n_phi * scale)
@@ -162,16 +162,16 @@ def _seeded(sample: Sampler, wo: np.ndarray, seed: int) -> tuple[_Cells, _Points
         order = np.argsort(mine)
         cell = order[np.searchsorted(mine[order], point[:own]).clip(max=len(mine) - 1)]
         here = (mine[cell] == point[:own]) & ~crowded[cell]
-        homes[here] = found + (np.cumsum(~crowded) - 1)[cell[here]]
-        settled.append(cells.take(~crowded))
-        found += len(settled[-1].row)
+        homes[here] = first + (np.cumsum(~crowded) - 1)[cell[here]]
+        accepted.append(cells.take(~crowded))
+        first += len(accepted[-1].row)
         cells = cells.take(crowded).quarters()
         if not len(cells.row):
             break
-    settled.append(cells)
+    accepted.append(cells)
     there = homes >= 0
     points = _Points(homes[there], angles[:own][there])
-    return _Cells(*[np.concatenate(parts) for parts in zip(*settled, strict=True)]), points
+    return _Cells(*[np.concatenate(parts) for parts in zip(*accepted, strict=True)]), points
 
 
 def _key(row: np.ndarray, below: np.ndarray, a: np.ndarray, b: np.ndarray, n_a: int, n_b: int) -> np.ndarray:
@@ -205,8 +205,8 @@ def _values(integrand: Integrand, wo: np.ndarray, cells: _Cells, at: Nodes) -> S
         value = list(integrand(types.vec3(*[of_cell(column) for column in wo[part.row].T]), wi))
         area = sin * width * height
         sums = [dr.block_sum(channel * (area * weight), many) for channel in value]
-        whole = sum(value[1:], start=value[0]) * area
-        ends = [dr.block_reduce(op, whole, many) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
+        summed = sum(value[1:], start=value[0]) * area
+        ends = [dr.block_reduce(op, summed, many) for op in (dr.ReduceOp.Min, dr.ReduceOp.Max)]
         dr.eval(sums, ends)
         parts.append(Seen(np.stack([one.numpy() for one in sums], -1), *[end.numpy() for end in ends]))
     return Seen(*[np.concatenate(column) for column in zip(*parts, strict=True)])

@@ -23,6 +23,8 @@ from ...errors import InputError, did_you_mean
 from ...material import BSDF, tree
 from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, backend
+from ...optics import frame
+from ...optics.lattice import r_sequence
 from ...optics.roughness import SMOOTH
 from ...owner import public
 from . import cubature, quadrature
@@ -95,7 +97,7 @@ def albedo(
 def direction(mu: np.ndarray, phi: np.ndarray) -> np.ndarray:
     """Unit vectors (N, 3) of cosine mu and azimuth phi."""
     sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
-    return np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
+    return frame.spherical_array(sin, mu, phi)
 
 
 def check_uniform(model: BSDF) -> None:
@@ -176,22 +178,20 @@ def _by_cubature(model: BSDF, mu: np.ndarray, phi: np.ndarray, seed: int) -> Alb
     def power(wo: Direction, wi: Direction) -> Spectrum:
         return bound.eval(wo, wi, "importance")
 
-    found = cubature.integrate(model.sample, power, direction(mu, phi), TOLERANCE, seed)
-    return Albedo(found.value, found.error, "quadrature")
+    integral = cubature.integrate(model.sample, power, direction(mu, phi), TOLERANCE, seed)
+    return Albedo(integral.value, integral.error, "quadrature")
 
 
 SHIFTS = 16
 
 
 def _by_sampling(model: BSDF, mu: np.ndarray, phi: np.ndarray, samples: int, seed: int) -> Albedo:
-    """Mean weight over SHIFTS randomly shifted lattices (the R3 lattice, powers of x^4 = x + 1)."""
+    """Mean weight over SHIFTS randomly shifted lattices."""
     if samples < SHIFTS:
         raise InputError(f"{samples} samples asked for", "albedo: samples", f"give {SHIFTS} or more")
     count = samples // SHIFTS
     rng = np.random.default_rng(seed)
-    root = 1.2207440846057596
-    lattice = np.arange(1, count + 1)[:, None] * root ** -np.arange(1.0, 4.0) % 1.0
-    u = (lattice[None] + rng.random((SHIFTS, 1, 3))).reshape(-1, 3) % 1.0
+    u = (r_sequence(count, 3)[None] + rng.random((SHIFTS, 1, 3))).reshape(-1, 3) % 1.0
     values, errors = [], []
     for wo in direction(mu, phi):
         weight = np.asarray(model.sample(np.repeat(wo[None], len(u), 0), u, mode="importance").weight, float)

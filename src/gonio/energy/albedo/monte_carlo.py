@@ -80,8 +80,7 @@ def estimate(
     arrays = np.broadcast_arrays(*[np.asarray(a, float) for a in given])
     shape, count = arrays[0].shape, arrays[0].size
     mu_, along_x, along_y, turn = [backend.float_of(a.ravel(), kind) for a in arrays]
-    sin_o, (sin_phi, cos_phi) = dr.sqrt((1.0 - mu_) * (1.0 + mu_)), dr.sincos(turn)
-    wo = ops.vec3(sin_o * cos_phi, sin_o * sin_phi, mu_)
+    wo = frame.spherical_direction(dr.sqrt((1.0 - mu_) * (1.0 + mu_)), mu_, turn)
     widths = kind.vec2(along_x, along_y)
     chosen = distribution(ndf)
     first, second = [kind.float(c) for c in (hammersley(spp).T if points == "hammersley" else np.zeros((2, 1)))]

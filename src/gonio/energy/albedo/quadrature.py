@@ -68,9 +68,9 @@ Integrand: TypeAlias = Callable[[NDF, Direction, Direction, Scalar, Pair, Array]
 
 
 class Moments(NamedTuple):
-    """Integrals at each point: `whole` with F = 1, `schlick` with F = (1 - o.m)^5 (B of the split sum)."""
+    """Integrals at each point: `white` with F = 1, `schlick` with F = (1 - o.m)^5 (B of the split sum)."""
 
-    whole: np.ndarray
+    white: np.ndarray
     schlick: np.ndarray
 
 
@@ -88,8 +88,8 @@ def longest_slope(ndf: NDF) -> float:
     kind = backend.types("float64")
     c = 1.0 / np.hypot(1.0, t)
     m = kind.vec3(kind.float(t * c), kind.float(0.0 * t), kind.float(c))
-    found: Array = ndf.D(m, kind.vec2(1.0, 1.0))
-    density = np.asarray(found.numpy()) * c**4 * np.pi * t**2
+    D: Array = ndf.D(m, kind.vec2(1.0, 1.0))
+    density = np.asarray(D.numpy()) * c**4 * np.pi * t**2
     beyond = np.flatnonzero(density < 1e-9)
     return float(t[beyond[0]]) if len(beyond) else float(t[-1])
 
@@ -173,7 +173,7 @@ def average(
     """E_avg = 2 int_0^1 E(mu) mu dmu at each isotropic alpha, by Gauss-Legendre in sqrt(mu)."""
     x, w = gauss(count)
     alpha = np.asarray(alpha, float)
-    return moments(ndf, masking_name, x**2, alpha[..., None], nodes=nodes).whole @ (4.0 * w * x**3)
+    return moments(ndf, masking_name, x**2, alpha[..., None], nodes=nodes).white @ (4.0 * w * x**3)
 
 
 def over_normals(
@@ -236,8 +236,7 @@ def _over_slopes(
     mu = dr.maximum(mu, SMALLEST_MU)
     alpha = type(alpha)(dr.maximum(alpha.x, SMALLEST_ALPHA), dr.maximum(alpha.y, SMALLEST_ALPHA))
     sin_o = dr.sqrt((1.0 - mu) * (1.0 + mu))
-    sin_phi, cos_phi = dr.sincos(phi)
-    wo = ops.vec3(sin_o * cos_phi, sin_o * sin_phi, mu)
+    wo = frame.spherical_direction(sin_o, mu, phi)
 
     # the direction b_o of the stretched o
     stretched = ops.vec2(alpha.x * wo.x, alpha.y * wo.y)

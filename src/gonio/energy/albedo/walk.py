@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...ops import Direction, Pair, Scalar, backend, dot, maximum, sqrt, vec3, where
+from ...ops import Direction, Pair, Scalar, backend, dot, maximum, ones_like, sqrt, vec3, where, zeros_like
 from ...ops.backend import Array
 from ...ops.graph import Node, RecordingError
 from ...optics import frame, fresnel
@@ -95,7 +95,7 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
     metal = base.microsurface.eta is None
     side = dr.select(wo.z >= 0.0, Float(1.0), Float(-1.0))  # +1: the walker's own medium is outside
     w = Vector(-(vec3(wo.x, wo.y, wo.z) * side))
-    weight = dr.zeros(type(base.albedo * 1.0), 1) + 1.0 + 0.0 * wo.z
+    weight = dr.zeros(type(base.albedo * 1.0), 1) + ones_like(wo.z)
     weight = type(base.albedo)(weight)
     eta_of = (lambda s: dr.select(s > 0.0, base.eta, 1.0 / base.eta)) if not metal else (lambda s: Float(1.0))
 
@@ -159,7 +159,7 @@ def walk(base: Any, wo: Array, wi: Array, rng: Array, alpha: Pair, power: bool) 
     total = weight * 0.0
     state = (
         w,
-        Float(1.0) + 0.0 * w.z,
+        Float(1.0) + zeros_like(w.z),
         side,
         weight,
         total,

@@ -51,10 +51,10 @@ def fit(form: Form, bend: np.ndarray, missing: Callable[..., np.ndarray], nodes:
     rise = _nodes(nodes)
     mu = cosine(form, rise, bend[:, None])
     basis = bernstein(1.0 - rise, form.degree)
-    found = np.array([_nearly_minimax(basis, *row) for row in zip(missing(mu), _importance(mu), strict=True)])
+    coefficients_of = np.array([_nearly_minimax(basis, *row) for row in zip(missing(mu), _importance(mu), strict=True)])
     node, w = gauss(96)
-    average = evaluate(form, found, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
-    return np.concatenate([found, average[:, None]], axis=1)
+    average = evaluate(form, coefficients_of, bend, node[None, :] ** 2) @ (4.0 * w * node**3)
+    return np.concatenate([coefficients_of, average[:, None]], axis=1)
 
 
 def _nodes(count: int) -> np.ndarray:
@@ -73,10 +73,10 @@ def _nearly_minimax(basis: np.ndarray, target: np.ndarray, importance: np.ndarra
 
     weight, best, least = importance, np.zeros(basis.shape[1]), np.inf
     for _ in range(STEPS_OF_FIT):
-        found = nnls(basis * weight[:, None], target * weight, maxiter=10000)[0]
-        error = np.abs(basis @ found - target) * importance
+        c = nnls(basis * weight[:, None], target * weight, maxiter=10000)[0]
+        error = np.abs(basis @ c - target) * importance
         if error.max() < least:
-            best, least = found, error.max()
+            best, least = c, error.max()
         weight = weight * np.sqrt(error / max(error.max(), 1e-300) + 0.02)
     return best
 
@@ -97,7 +97,7 @@ def isotropic(ndf: str, masking: str) -> Table:
         return fit(
             form,
             numpy_knee(form, masking, alpha),
-            lambda mu: 1.0 - quadrature.moments(ndf, masking, mu, alpha[:, None]).whole,
+            lambda mu: 1.0 - quadrature.moments(ndf, masking, mu, alpha[:, None]).white,
         )
 
     key = ("curves", ndf, masking, *cache.origin(ndf, masking), ROWS, DEGREE)
@@ -141,30 +141,30 @@ def anisotropic(ndf: str, masking: str) -> Table:
         y = np.cos(np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS)
         rise, target, importance = _nodes(20), [], []
         for value in y:
-            cos2, sin2, seen = _azimuth(value, big, small)
+            cos2, sin2, width = _azimuth(value, big, small)
             phi = np.arctan2(np.sqrt(sin2), np.sqrt(cos2))[:, None]
-            mu = cosine(form, rise, numpy_knee(form, masking, seen)[:, None])
+            mu = cosine(form, rise, numpy_knee(form, masking, width)[:, None])
             at = quadrature.moments(ndf, masking, mu, big[:, None], small[:, None], phi, nodes=(28, 28))
-            target.append(1.0 - at.whole)
+            target.append(1.0 - at.white)
             importance.append(_importance(mu))
         in_z, in_y = bernstein(1.0 - rise, DEGREE), bernstein(0.5 + 0.5 * y, HARMONICS - 1)
         basis = np.einsum("nk,yj->ynkj", in_z, in_y).reshape(AZIMUTHS * len(rise), -1)
         by_cell = (np.stack(part, axis=1).reshape(len(big), -1) for part in (target, importance))
-        found = np.array([_nearly_minimax(basis, *cell) for cell in zip(*by_cell, strict=True)])
-        found = found.reshape(len(big), DEGREE + 1, HARMONICS)
+        c = np.array([_nearly_minimax(basis, *cell) for cell in zip(*by_cell, strict=True)])
+        c = c.reshape(len(big), DEGREE + 1, HARMONICS)
         # M_avg: over azimuth and cosine, of the fit itself
         turns = (np.arange(24) + 0.5) / 24 * 0.5 * np.pi
         node, weight = gauss(64)
         average = np.zeros(len(big))
         for phi in turns:
             cos2, sin2 = np.cos(phi) ** 2, np.sin(phi) ** 2
-            seen = np.sqrt(big**2 * cos2 + small**2 * sin2)
+            width = np.sqrt(big**2 * cos2 + small**2 * sin2)
             here = (big * cos2 - small * sin2) / (big * cos2 + small * sin2)
-            rows = np.einsum("rkj,rj->rk", found, bernstein(0.5 + 0.5 * here, HARMONICS - 1))
-            values = evaluate(form, rows, numpy_knee(form, masking, seen), node[None, :] ** 2)
+            rows = np.einsum("rkj,rj->rk", c, bernstein(0.5 + 0.5 * here, HARMONICS - 1))
+            values = evaluate(form, rows, numpy_knee(form, masking, width), node[None, :] ** 2)
             average += values @ (4.0 * weight * node**3) / len(turns)
         table = np.zeros((len(big), TURNED))
-        table[:, : (DEGREE + 1) * HARMONICS] = found.reshape(len(big), -1)
+        table[:, : (DEGREE + 1) * HARMONICS] = c.reshape(len(big), -1)
         table[:, -1] = average
         return table.reshape(ASPECTS, ASPECT_ROWS, TURNED)
 
@@ -227,11 +227,11 @@ def _squares(x2: Array, y2: Array, cos: Array, alpha_x2: Array, alpha_y2: Array,
     alpha^2 = S / 2 + o D sin^2 cos(2 phi) + e D^2 / S; o and e are fitted to where it gives M itself, at
     indices 1.15, 1.5 and 2.2 and four pairs of widths.
     """
-    S, D, turned, low = alpha_x2 + alpha_y2, alpha_x2 - alpha_y2, x2 - y2, 1.0 - cos
-    bent, across, low2 = D * D / S, turned / (1.0 + cos), low * low
+    S, D, difference, low = alpha_x2 + alpha_y2, alpha_x2 - alpha_y2, x2 - y2, 1.0 - cos
+    bent, across, low2 = D * D / S, difference / (1.0 + cos), low * low
     low8, near = low2 * low2 * low2 * low2, 0.04 / (0.04 + root * root)  # near an index of 1 both sides are alike
-    thin = 0.5 * S + D * turned * (0.5 - 0.7 * root + 0.06 * low8) + bent * (0.35 * root * (1.0 - 0.6 * low8))
-    dense = 0.5 * S + D * turned * (low2 * low2 - 0.1) + bent * low * (1.3 * across * across - 0.48)
+    thin = 0.5 * S + D * difference * (0.5 - 0.7 * root + 0.06 * low8) + bent * (0.35 * root * (1.0 - 0.6 * low8))
+    dense = 0.5 * S + D * difference * (low2 * low2 - 0.1) + bent * low * (1.3 * across * across - 0.48)
     return thin, dense + (thin - dense) * (near * near)
 
 
@@ -246,7 +246,7 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
         smaller = np.maximum(np.linspace(0.0, 1.0, ASPECTS) ** 2, 0.02**2)[:, None, None] * larger
         node, weight = gauss(16)
         mu = (node**2)[None, None, :]
-        found = np.zeros((GLASS_ETAS, ASPECTS, ASPECT_ROWS, len(SIDES)))
+        means = np.zeros((GLASS_ETAS, ASPECTS, ASPECT_ROWS, len(SIDES)))
         turns = (np.arange(8) + 0.5) / 8 * 0.5 * np.pi
         for phi, (e, t) in itertools.product(turns, enumerate(np.linspace(0.0, 1.0, GLASS_ETAS))):
             x2, y2 = (1.0 - mu**2) * np.cos(phi) ** 2, (1.0 - mu**2) * np.sin(phi) ** 2
@@ -258,8 +258,8 @@ def glass_of_two(ndf: str, masking: str, fresnel: str) -> Table:
                 rows, part = tables[side].values[e, :, :-1], (place - cell)[..., None]
                 fall = 1.0 - numpy_rise(form, np.broadcast_to(mu, width.shape), numpy_knee(form, masking, width))
                 values = (bernstein(fall, form.degree) * (rows[cell] * (1.0 - part) + rows[cell + 1] * part)).sum(-1)
-                found[e, ..., n] += values @ (4.0 * weight * node**3) / len(turns)
-        return found
+                means[e, ..., n] += values @ (4.0 * weight * node**3) / len(turns)
+        return means
 
     key = (
         "glass-of-two",
@@ -304,14 +304,14 @@ def coefficients(ndf: str, masking: str, alpha: Scalar) -> tuple[Scalar, ...]:
     return ops.lookup(isotropic(ndf, masking), row)
 
 
-def turn(found: tuple[Array, ...], along: Array, across: Array) -> tuple[Array, ...]:
+def turn(channels: tuple[Array, ...], along: Array, across: Array) -> tuple[Array, ...]:
     """c_0 to c_10 of a direction from the channels of `anisotropic`.
 
     along, across  (1 + y) / 2 and (1 - y) / 2
     """
     terms = _harmonics(along, across)
     count = (DEGREE + 1) * HARMONICS
-    return tuple(_weigh(found[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
+    return tuple(_weigh(channels[first : first + HARMONICS], terms) for first in range(0, count, HARMONICS))
 
 
 Harmonics = namedtuple("Harmonics", "h0 h1 h2 h3 h4 h5 h6")
@@ -338,13 +338,13 @@ def _weigh(factors: tuple[Array, ...], terms: tuple[Array, ...]) -> Array:
     return total
 
 
-def missing(form: Form, found: tuple[Array, ...], bend: Array, mu: Array) -> Array:
+def missing(form: Form, c: tuple[Array, ...], bend: Array, mu: Array) -> Array:
     """M(mu), not below 0.
 
     found  from `coefficients`, the c_k first;  bend  `knee` at this width
     """
     ratio = descent(form, mu, bend)
-    return _polynomial(found[: form.degree + 1], ratio) / _power(1.0 + ratio, form.degree)
+    return _polynomial(c[: form.degree + 1], ratio) / _power(1.0 + ratio, form.degree)
 
 
 @ops.function

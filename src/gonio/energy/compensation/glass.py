@@ -49,14 +49,14 @@ class Side(NamedTuple):
     c         coefficients of M; of two widths, at their mean
     bend      the cosine about which masking sets in
     scale     1 / (pi M_avg) of that, 0 where nothing is missing
-    whole     1 / (pi M_avg) of M itself; the same with one width
+    true_scale     1 / (pi M_avg) of M itself; the same with one width
     through   T, the share of what is missing here that goes to the other side
     """
 
     c: tuple[Scalar, ...]
     bend: Scalar
     scale: Scalar
-    whole: Scalar
+    true_scale: Scalar
     through: Scalar
 
 
@@ -103,11 +103,11 @@ class Glass(NamedTuple):
         eta = maximum(self.inside, 1.0 / self.inside)
         width = curves.widths_along(frame.rotate(w, self.two.rotation), self.two.alpha, (eta - 1.0) / (eta + 1.0))
         tables = curves.glass(*self.names)
-        found, bends = [], []
+        c, bends = [], []
         for name, one in zip(curves.SIDES, width, strict=True):
-            found.append(lookup(tables[name], self.place[0], inset(sqrt(one), curves.GLASS_ROWS))[:-1])
+            c.append(lookup(tables[name], self.place[0], inset(sqrt(one), curves.GLASS_ROWS))[:-1])
             bends.append(knee(form_of(*self.names[:2], name), self.names[1], one))
-        return self._missing(w, found, bends)
+        return self._missing(w, c, bends)
 
     def of_mean_width(self, w: Direction) -> Scalar:
         """M of the width that stands for both: what is sampled."""
@@ -121,7 +121,7 @@ class Glass(NamedTuple):
         return where(self.is_thin(w), of_sides[0], of_sides[1])
 
     def over_average(self, w: Direction) -> Scalar:
-        return where(self.is_thin(w), self.thin.whole, self.dense.whole)
+        return where(self.is_thin(w), self.thin.true_scale, self.dense.true_scale)
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
         """1 - T of wo's side in reflection, T in transmission; nothing leaves along the surface."""
@@ -187,10 +187,10 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     reflected: Array = base.mean_reflectance()  # a number, of glass
     enters = 1.0 - reflected
 
-    def side(name: str, found: tuple[Scalar, ...], of_mean: Scalar, average: Scalar, through: Scalar) -> Side:
+    def side(name: str, fit: tuple[Scalar, ...], of_mean: Scalar, average: Scalar, through: Scalar) -> Side:
         bend = knee(form_of(*names[:2], name), surface.masking, width)
-        scale, whole = (where(some, inv_pi / maximum(m, lobe.NOTHING), 0.0) for m in (of_mean, average))
-        return Side(found[:-1], bend, scale, whole, through)
+        scale, of_both_widths = (where(some, inv_pi / maximum(m, lobe.NOTHING), 0.0) for m in (of_mean, average))
+        return Side(fit[:-1], bend, scale, of_both_widths, through)
 
     return Glass(
         thin=side("thin", thin, mean_thin, m_thin, enters * m_dense / both),

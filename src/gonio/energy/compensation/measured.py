@@ -28,8 +28,8 @@ from ...ops import (
     clamp,
     max_component,
     maximum,
+    ones_like,
     safe_div,
-    sincos,
     sqrt,
     vec3,
     where,
@@ -37,6 +37,8 @@ from ...ops import (
 from ...ops import pi as PI
 from ...ops.backend import Array
 from ...ops.types import Direction, Mode, Scalar, Spectrum
+from ...optics.frame import spherical_direction
+from ...optics.lattice import r_sequence
 from ...optics.special import gauss
 from . import lobe
 
@@ -78,7 +80,7 @@ class Measured(NamedTuple):
         return self.scale
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
-        return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
+        return where(lobe.above(wo, wi), ones_like(wi.z), 0.0)
 
     def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> float:
         return 1.0
@@ -95,7 +97,7 @@ class Measured(NamedTuple):
         return lobe.from_square(_read(self.inverse, u.y), u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        return 1.0 + 0.0 * wo.z
+        return ones_like(wo.z)
 
 
 def measured(base: BSDF) -> Measured:
@@ -103,7 +105,7 @@ def measured(base: BSDF) -> Measured:
     base = _uniform(base)
     dr = backend.drjit()
     types = _types(base)
-    of_white, of_base = _albedos(base, base.white(), types)
+    of_white, of_base = _albedos(base, base.lossless(), types)
     weight = types.float(_averaging())
     lost = maximum(1.0 - max_component(of_white), 0.0)
     average = dr.sum(lost * weight)
@@ -154,19 +156,18 @@ def _types(base: BSDF) -> backend.Types:
 def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array]:
     """E of the white base and of the base itself at each node, the mean over azimuth: spectra with NODES entries.
 
-    Directions come from `sample` with the same POINTS of a lattice (R4, powers of x^5 = x + 1) at every node:
+    Directions come from `sample` with the same POINTS of a lattice at every node:
     the error is smooth in mu. They and their density are held fixed where the values are differentiated.
     """
     dr = backend.drjit()
     UInt = kind.module.UInt32
-    lattice = (np.arange(1, POINTS + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5.0) + 0.5) % 1.0
+    lattice = r_sequence(POINTS, 4, shift=0.5)
     columns = [kind.float(np.minimum(c, 1.0 - 2.0**-24)) for c in lattice.T]
     index = dr.arange(UInt, NODES * POINTS)
     u = [dr.gather(kind.float, c, index % POINTS) for c in columns]
     s = dr.sin(kind.float(index // POINTS) * (0.5 * PI / (NODES - 1.0)))
     mu = clamp(s * s, SMALLEST_MU, 1.0)
-    sin, (sin_phi, cos_phi) = dr.safe_sqrt(1.0 - mu * mu), sincos((2.0 * PI) * u[3])
-    wo = vec3(sin * cos_phi, sin * sin_phi, mu)
+    wo = spherical_direction(dr.safe_sqrt(1.0 - mu * mu), mu, (2.0 * PI) * u[3])
     drawn = base.sample(wo, vec3(*u[:3]))
     wi, pdf = dr.detach(drawn.wi), dr.detach(drawn.pdf)
     share = where(pdf > 0.0, safe_div(1.0 / POINTS, pdf), 0.0)
@@ -175,9 +176,9 @@ def _albedos(base: BSDF, white: BSDF, kind: backend.Types) -> tuple[Array, Array
         value = model.eval(wo, wi)
         return type(value)(*[dr.block_sum(channel * share, POINTS) for channel in value])
 
-    found = albedo(white), albedo(base)
-    dr.eval(found)
-    return found
+    albedos = albedo(white), albedo(base)
+    dr.eval(albedos)
+    return albedos
 
 
 def _averaging() -> np.ndarray:

@@ -18,7 +18,7 @@ def missing_energy(base: BSDF, average: str = "exact") -> MissingEnergy:
     return glass(base, surface) if surface.transmits else reflecting(base, surface, average)
 
 
-def check_base(base: BSDF, where: str, transmitting: bool, any_base: bool = False) -> None:
+def check_base(base: BSDF, location: str, transmitting: bool, any_base: bool = False) -> None:
     """Raise InputError where a base cannot be compensated.
 
     transmitting  whether a microsurface may transmit
@@ -28,19 +28,19 @@ def check_base(base: BSDF, where: str, transmitting: bool, any_base: bool = Fals
     if base.microsurface is not None:
         if base.transmits and not transmitting:
             hint = "Dielectric(transmission=False), or KullaConty, which splits the energy between both sides"
-            raise InputError(f"{name} transmits, a material that only reflects expected", where, hint)
+            raise InputError(f"{name} transmits, a material that only reflects expected", location, hint)
         return
     hint = "compensate a conductor or a dielectric first, then mix it or make it two-sided"
     if not any_base or not base.name or base.two_sided:
         expected = "a Gonio material seen from one side" if any_base else "Conductor or Dielectric"
-        raise InputError(f"{name or 'a foreign BSDF'} given, {expected} expected", where, hint)
+        raise InputError(f"{name or 'a foreign BSDF'} given, {expected} expected", location, hint)
     if base.transmits:
-        raise InputError(f"{name} transmits, a material that only reflects expected", where, hint)
+        raise InputError(f"{name} transmits, a material that only reflects expected", location, hint)
     if base.delta != "never" or base.stochastic:
         why = "has a perfectly specular part" if base.delta != "never" else "is random"
-        raise InputError(f"{name} {why}, a material with a finite lobe expected", where, hint)
+        raise InputError(f"{name} {why}, a material with a finite lobe expected", location, hint)
     if base.needs_uniform:  # each measurement would ask the one inside it at every point: seconds, then minutes
         what = f"{name} holds a base whose energy is measured; it can be measured in one material, not again around it"
-        raise InputError(what, where, hint)
+        raise InputError(what, location, hint)
     if not base.isotropic:
-        raise InputError(f"{name} has two widths inside, one expected", where, hint)
+        raise InputError(f"{name} has two widths inside, one expected", location, hint)

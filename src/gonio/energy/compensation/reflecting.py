@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ...material import BSDF, Microsurface
 from ...material.parameters import pair_of
-from ...ops import backend, function, inset, lookup, maximum, minimum, sqr, sqrt, where
+from ...ops import backend, function, inset, lookup, maximum, minimum, ones_like, sqr, sqrt, where
 from ...ops.backend import Array
 from ...ops.types import Direction, Mode, Pair, Scalar, Spectrum
 from ...optics import frame
@@ -21,7 +21,7 @@ class Reflecting(NamedTuple):
     c             its coefficients; of two widths, at the width that stands for both
     bend          the cosine about which masking sets in
     scale         1 / (pi M_avg) of that polynomial: of the lobe that is sampled
-    whole         1 / (pi M_avg) of M itself; the same with one width
+    true_scale         1 / (pi M_avg) of M itself; the same with one width
     average       M_avg
     F_avg         mean reflectance
     factor        the base's albedo
@@ -33,7 +33,7 @@ class Reflecting(NamedTuple):
     c: tuple[Scalar, ...]
     bend: Scalar
     scale: Scalar
-    whole: Scalar
+    true_scale: Scalar
     average: Scalar
     F_avg: Spectrum
     factor: Spectrum
@@ -53,10 +53,10 @@ class Reflecting(NamedTuple):
         return curves.missing(form_of(self.ndf, self.masking), self.c, self.bend, w.z)
 
     def over_average(self, w: Direction) -> Scalar:
-        return self.whole
+        return self.true_scale
 
     def share(self, wo: Direction, wi: Direction) -> Scalar:
-        return where(lobe.above(wo, wi), 1.0 + 0.0 * wi.z, 0.0)
+        return where(lobe.above(wo, wi), ones_like(wi.z), 0.0)
 
     def radiance(self, wo: Direction, wi: Direction, mode: Mode) -> float:
         return 1.0
@@ -74,27 +74,27 @@ class Reflecting(NamedTuple):
         return lobe.from_square(mu2, u.z)
 
     def eta(self, wo: Direction, wi: Direction) -> Scalar:
-        return 1.0 + 0.0 * wo.z
+        return ones_like(wo.z)
 
 
 class TwoWidths(NamedTuple):
     """M of two widths, which depends on azimuth; see `curves.anisotropic`.
 
-    turned    coefficients in azimuth of each coefficient of M
+    azimuthal  coefficients in azimuth of each coefficient of M
     alpha     the widths
     rotation  the base's
     """
 
-    turned: tuple[Scalar, ...]
+    azimuthal: tuple[Scalar, ...]
     alpha: Pair
     rotation: Pair | None
 
     def at(self, w: Direction, ndf: str, masking: str) -> Scalar:
         """M at a direction above the surface."""
-        seen = _azimuth(frame.rotate(w, self.rotation), self.alpha)
+        azimuth = _azimuth(frame.rotate(w, self.rotation), self.alpha)
         form = form_of(ndf, masking)
-        rows = curves.turn(self.turned, seen.along, seen.across)
-        return curves.missing(form, rows, knee(form, masking, seen.width), w.z)
+        rows = curves.turn(self.azimuthal, azimuth.along, azimuth.across)
+        return curves.missing(form, rows, knee(form, masking, azimuth.width), w.z)
 
 
 def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
@@ -106,22 +106,22 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     *c, mean = curves.coefficients(*names, width)
     mean = maximum(mean, 0.0)
     F_avg: Array = base.mean_reflectance(average)
-    turned, true_mean = None, mean
+    two_widths, true_mean = None, mean
     if two:
         larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
         place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
         *channels, of_both = lookup(curves.anisotropic(*names), *place)
-        turned, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
+        two_widths, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
     return Reflecting(
         c=tuple(c),
         bend=knee(form_of(*names), surface.masking, width),
         scale=(scale := lobe.over_pi(mean)),
-        whole=scale if turned is None else lobe.over_pi(true_mean),
+        true_scale=scale if two_widths is None else lobe.over_pi(true_mean),
         average=true_mean,
         F_avg=F_avg,
         factor=surface.albedo,
         row=inset(sqrt(width), curves.ROWS),
-        two=turned,
+        two=two_widths,
         ndf=surface.ndf,
         masking=surface.masking,
     )
@@ -151,8 +151,8 @@ def _azimuth(w: Direction, alpha: Pair) -> Azimuth:
     """(1 + y) / 2, (1 - y) / 2 and the width alpha_phi seen along w; at the normal itself any azimuth will do."""
     sin2 = maximum(frame.sin2(w), 1e-12)
     along_x, along_y = sqr(w.x) / sin2, sqr(w.y) / sin2
-    seen = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))
-    turned = frame.sin2(w) > 1e-12
-    x, y = where(turned, alpha.x * along_x, 1.0), where(turned, alpha.y * along_y, 1.0)
+    width = sqrt(maximum(sqr(alpha.x) * along_x + sqr(alpha.y) * along_y, SMOOTH**2))
+    has_azimuth = frame.sin2(w) > 1e-12
+    x, y = where(has_azimuth, alpha.x * along_x, 1.0), where(has_azimuth, alpha.y * along_y, 1.0)
     larger_x = alpha.x >= alpha.y
-    return Azimuth(where(larger_x, x, y) / (x + y), where(larger_x, y, x) / (x + y), seen)
+    return Azimuth(where(larger_x, x, y) / (x + y), where(larger_x, y, x) / (x + y), width)

@@ -56,7 +56,7 @@ class Axes:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Nodes along each."""
+        """Number of nodes along each axis."""
         return (self.azimuths, self.size, self.size) if self.azimuths else (self.size, self.size)
 
     def at(self, *index: Any) -> Points:
@@ -99,8 +99,8 @@ class Axes:
         index = np.ix_(*map(np.arange, self.shape))
         nodes = self.at(*index)
         mu = nodes.mu if self.layout == "stretched" else nodes.mu[(0,) * (len(self.shape) - 1)]
-        found = {"mu": np.array(mu), "roughness": self.roughness(np.arange(self.size))}
-        return {**found, "phi": self.phi(np.arange(self.azimuths))} if self.azimuths else found
+        ends = {"mu": np.array(mu), "roughness": self.roughness(np.arange(self.size))}
+        return {**ends, "phi": self.phi(np.arange(self.azimuths))} if self.azimuths else ends
 
     def texts(self) -> dict[str, str]:
         """What a person needs to find a node again."""

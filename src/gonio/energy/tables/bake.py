@@ -40,7 +40,7 @@ LUTS = {
     "glass": "power that rough glass reflects and transmits, from both sides [sqrt_f0, roughness, mu, 2]",
 }
 NAMES = {"E": ("E",), "Eavg": ("E_avg",), "dfg": ("dfg",), "glass": ("E_glass_thin", "E_glass_dense")}
-LARGEST = 4096
+MAX_SIZE = 4096
 AZIMUTHS = 24  # stretched, alpha_y = alpha_x / 4: linear between them errs by 1.2e-3
 LARGEST_ASPECT = 100.0
 GLASS_STEPS = 16
@@ -62,8 +62,8 @@ class _Target:
         shape = np.shape(points.mu)
         given = [np.broadcast_to(v, shape).ravel() if v is not None else None for v in points]
         arguments = [(self, *(v if v is None else v[at : at + BLOCK] for v in given), fine) for at in _blocks(shape)]
-        found = _together(_exact, arguments)
-        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in found.items()}
+        tables = _together(_exact, arguments)
+        return {name: values.reshape(*shape, *values.shape[1:]) for name, values in tables.items()}
 
     def at(self, points: Points, fine: bool) -> dict[str, np.ndarray]:
         """As `exact`, all at once."""
@@ -71,8 +71,8 @@ class _Target:
         judge = quadrature.JUDGE if points.alpha_y is None else quadrature.TURNED_JUDGE
         nodes = judge if fine else None
         if self.model is None:
-            found = quadrature.moments(self.ndf, self.masking, **shape, nodes=nodes)
-            return {"E": found.whole, "dfg": np.stack([found.whole - found.schlick, found.schlick], -1)}
+            moments = quadrature.moments(self.ndf, self.masking, **shape, nodes=nodes)
+            return {"E": moments.white, "dfg": np.stack([moments.white - moments.schlick, moments.schlick], -1)}
         surface = self.model.microsurface
         if surface.eta is None:
             reflectance = self.model.bind(backend.types("float64")).reflectance
@@ -128,7 +128,7 @@ def _power(
 def _together(function: crew.Function, arguments: list[tuple[Any, ...]]) -> dict[str, np.ndarray]:
     """The results of parts, one behind the other."""
     keys = [parts.key_of(function.__name__, *map(_content, given), cache.formulas()) for given in arguments]
-    done = {index: found for index, found in crew.each(function, arguments, keys) if index >= 0}
+    done = {index: values for index, values in crew.each(function, arguments, keys) if index >= 0}
     return {name: np.concatenate([done[i][name] for i in range(len(arguments))]) for name in done[0]}
 
 
@@ -181,9 +181,9 @@ def bake(
     arrays: dict[str, np.ndarray] = {}
     errors: dict[str, dict[str, float]] = {}
     if {"E", "dfg"} & set(lut) or ("Eavg" in lut and method != "quadrature"):
-        tables, found = _directional(asked, axes, method, spp, points, seed)
+        tables, figures = _directional(asked, axes, method, spp, points, seed)
         arrays.update({k: v for k, v in tables.items() if k in lut})
-        errors.update({k: v for k, v in found.items() if k in lut})
+        errors.update({k: v for k, v in figures.items() if k in lut})
         if "E" in arrays and size > 1:
             errors["E"]["interpolation"] = _between(lambda *index: asked.exact(axes.at(*index))["E"], axes)
     if "Eavg" in lut:
@@ -192,11 +192,11 @@ def bake(
     dims = {"E": list(axes.names), "dfg": list(axes.names), "E_avg": ["roughness"]}
     nodes, text = axes.arrays(), axes.texts()
     if "glass" in lut:
-        glass, found = _glass(axes, asked.model.microsurface.fresnel if asked.model else "exact")
+        glass, figures = _glass(axes, asked.model.microsurface.fresnel if asked.model else "exact")
         nodes["sqrt_f0"] = glass.pop("sqrt_f0")
         text["sqrt_f0"] = f"slice j at (eta - 1) / (eta + 1) = (j + 1/2) / {GLASS_STEPS} of 2/3; eta is dense over thin"
         arrays.update(glass)
-        errors.update(found)
+        errors.update(figures)
         dims |= {name: ["sqrt_f0", *axes.names] for name in glass}
     manifest = {
         "target": _describe(target),
@@ -230,10 +230,10 @@ def cached(target: str | BSDF, **options: Any) -> Baked:
         return Baked(made.arrays, {**made.manifest, "asked": text}).npz()
 
     def read(path: Path) -> Baked:
-        found = baked.read(path)
-        if found.manifest.pop("asked", None) != text:
+        existing = baked.read(path)
+        if existing.manifest.pop("asked", None) != text:
             raise ValueError("not what was asked for")
-        return found
+        return existing
 
     def made() -> Baked:
         with parts.job("bake", text, cache.formulas()) as job:
@@ -267,8 +267,8 @@ def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, l
             raise InputError(f"unknown table '{name}'", "--lut", did_you_mean(name, list(LUTS)))
     if layout not in LAYOUTS:
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
-    if not 1 <= size <= LARGEST:
-        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {LARGEST}")
+    if not 1 <= size <= MAX_SIZE:
+        raise InputError(f"a table of {size} x {size} asked for", "--size", f"give 1 to {MAX_SIZE}")
     if spp < 1:
         raise InputError(f"{spp} samples asked for", "--spp", "give 1 or more")
     if points not in monte_carlo.POINTS:
@@ -284,8 +284,8 @@ def _resolved(
     ndf = distribution(str(target) if surface is None else surface.ndf).name
     masking = quadrature.known_masking(masking or "smith-correlated" if surface is None else surface.masking)
     aspect = _aspect(model, 1.0 if aspect is None else aspect)
-    if aspect != 1.0 and not 1 <= azimuths <= LARGEST:
-        raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {LARGEST}")
+    if aspect != 1.0 and not 1 <= azimuths <= MAX_SIZE:
+        raise InputError(f"{azimuths} azimuths asked for", "--azimuths", f"give 1 to {MAX_SIZE}")
     return _Target(model, ndf, masking), Axes(layout, ndf, masking, size, aspect, azimuths if aspect != 1.0 else 0)
 
 
@@ -419,10 +419,10 @@ def _glass(axes: Axes, fresnel: str) -> tuple[dict[str, np.ndarray], dict[str, d
         errors[name] = _figures((arrays[name][some] - power(dense, True, *some)).sum(-1))
         if axes.size > 1:
 
-            def whole(*index: Any, dense: bool = dense) -> np.ndarray:
+            def of_grid(*index: Any, dense: bool = dense) -> np.ndarray:
                 return power(dense, False, *index).sum(-1)
 
-            errors[name]["interpolation"] = _between(whole, axes, GLASS_STEPS)
+            errors[name]["interpolation"] = _between(of_grid, axes, GLASS_STEPS)
     return arrays, errors
 
 
@@ -437,13 +437,13 @@ def _any_material(model: BSDF, lut: tuple[str, ...] | list[str], size: int, meth
     mu = (np.arange(size) + 0.5) / size
     arrays, errors, dims = {}, {}, {"E": ["mu"], "E_avg": []}
     if "E" in lut:
-        found = albedo(model, mu)
-        arrays["E"], errors["E"] = found.value, _figures(found.error)
+        value = albedo(model, mu)
+        arrays["E"], errors["E"] = value.value, _figures(value.error)
     if "Eavg" in lut:
         x, w = quadrature.gauss(24)
-        found = albedo(model, x**2)
-        arrays["E_avg"] = 4.0 * (w * x**3) @ found.value
-        errors["E_avg"] = _figures(4.0 * (w * x**3) @ found.error)
+        value = albedo(model, x**2)
+        arrays["E_avg"] = 4.0 * (w * x**3) @ value.value
+        errors["E_avg"] = _figures(4.0 * (w * x**3) @ value.error)
     manifest = {
         "target": _describe(model),
         "ndf": getattr(model, "name", kind),

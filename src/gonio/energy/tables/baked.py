@@ -62,14 +62,14 @@ def title(manifest: Mapping[str, Any]) -> str:
 
 def rows(manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Of each table its name, its shape along named axes and its errors, as `headings` calls them."""
-    found, more = [], _more(manifest)
+    tables, more = [], _more(manifest)
     for name, shape in manifest["tables"].items():
         error = manifest["error"].get(name, {})
         figures = [f"{error[key]:.1e}" if key in error else "" for key in ("max", "rms", "interpolation", *more)]
         dims = [*manifest["dims"][name], ""]
         along = " x ".join(f"{n} {axis}".strip() for n, axis in zip(shape, dims, strict=False))
-        found.append((name, along, *figures))
-    return found
+        tables.append((name, along, *figures))
+    return tables
 
 
 def _seal(text: str) -> str:

@@ -9,7 +9,7 @@ and nothing is sampled, so a small sun leaves neither noise nor blotches. Where 
 averaged in blocks first, where it is narrower than a few texels the map is read between them.
 
 **Two errors.** That of the blur (each level against a sum over every texel of the map, finely divided) is far below
-what a screen shows. That of the split sum itself is not: it takes the lobe for round, never cut by the horizon, and
+what a screen shows. That of the split sum itself is not: it takes the lobe for round cut by the horizon, and
 masked alike all over. The manifest states both, for this environment.
 """
 
@@ -25,6 +25,7 @@ from scipy.fft import dct
 
 from ...errors import InputError
 from ...ops import Direction, Scalar, backend, normalize, vec2, vec3, where
+from ...optics.frame import spherical_array
 from ...optics.masking import masking_shadowing
 from ...optics.ndf import NDF, distribution
 from ..albedo import quadrature
@@ -36,7 +37,7 @@ Environment: TypeAlias = NDArray[np.floating]
 
 LEVELS = 6
 MOST_LEVELS = 10  # narrower lobes than (1 / 9)^2 want grids of several thousand rows
-SMALLEST, LARGEST = 4, 4096  # rows
+MIN_ROWS, MAX_ROWS = 4, 4096  # rows
 STEPS = 8.0  # rows of the map across a lobe's half width, and
 LEAST_ROWS = 128  # in all: the blur then errs by about 1e-3 at most
 JUDGE_STEPS, JUDGE_ROWS = 16.0, 256
@@ -51,7 +52,7 @@ def roughness_of(level: int, levels: int) -> float:
 
 
 def prefilter(
-    environment: Environment, ndf: str = "ggx", levels: int = LEVELS, where: str = "environment"
+    environment: Environment, ndf: str = "ggx", levels: int = LEVELS, location: str = "environment"
 ) -> list[Array]:
     """The levels of an environment, each half as large as the one before; the first is the map itself.
 
@@ -61,7 +62,7 @@ def prefilter(
     Raises InputError for a map of another shape, with values that are negative or not finite, or too small for so many
     levels, and for an unknown distribution.
     """
-    source = _checked(environment, levels, where)
+    source = _checked(environment, levels, location)
     lobe = distribution(ndf)
     return [source, *(_blurred(source, lobe, level, levels) for level in range(1, levels))]
 
@@ -108,22 +109,24 @@ def bake(
     return Baked(arrays, manifest)
 
 
-def _checked(environment: Environment, levels: int, where: str) -> Array:
+def _checked(environment: Environment, levels: int, location: str) -> Array:
     source = np.asarray(environment, dtype=np.float64)
     if source.ndim != 3 or source.shape[1] != 2 * source.shape[0] or source.size == 0:
         what = f"a picture of shape {source.shape}, expected latitude-longitude: (H, 2 H, channels)"
-        raise InputError(what, where, "give a panorama twice as wide as high, the zenith on top")
+        raise InputError(what, location, "give a panorama twice as wide as high, the zenith on top")
     bad = np.count_nonzero(~np.isfinite(source) | (source < 0.0))
     if bad:
-        raise InputError(f"{bad} values are negative or not finite", where, "radiance is 0 or more: mend the picture")
+        raise InputError(
+            f"{bad} values are negative or not finite", location, "radiance is 0 or more: mend the picture"
+        )
     height = source.shape[0]
-    if not SMALLEST <= height <= LARGEST:
-        raise InputError(f"a map of {height} rows, expected {SMALLEST} to {LARGEST}", where, "scale the picture")
+    if not MIN_ROWS <= height <= MAX_ROWS:
+        raise InputError(f"a map of {height} rows, expected {MIN_ROWS} to {MAX_ROWS}", location, "scale the picture")
     if not 2 <= levels <= MOST_LEVELS:
         raise InputError(f"{levels} levels asked for", "--levels", f"give 2 to {MOST_LEVELS}")
     if height >> (levels - 1) < 2:
         what = f"{levels} levels of a map of {height} rows, each half as large as the one before"
-        raise InputError(what, where, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")
+        raise InputError(what, location, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")
     return source
 
 
@@ -174,8 +177,8 @@ def _blurred(source: Array, lobe: NDF, level: int, levels: int) -> Array:
         z = np.cos(theta) * np.cos(theta_i[:, None]) + np.sin(theta) * np.sin(theta_i[:, None]) * offsets
         kernel = dct(_kernel(lobe, alpha, z), type=1)[..., :-1]  # Fourier series of an even function
         mean = kernel[..., 0] @ _bands(rows)
-        found = np.matmul(kernel.transpose(2, 0, 1), both).transpose(1, 0, 2) / mean[:, None, None]
-        values = _at_centres(found, width) / columns
+        filtered = np.matmul(kernel.transpose(2, 0, 1), both).transpose(1, 0, 2) / mean[:, None, None]
+        values = _at_centres(filtered, width) / columns
         result[start : start + len(theta)] = values[..., :channels]
         for row, mirrored in enumerate(values[..., channels:]):
             result[height - 1 - start - row] = mirrored
@@ -205,9 +208,9 @@ def _divided(source: Array, parts: int) -> Array:
         return source
     height, width = source.shape[:2]
     across = np.concatenate([source[:, -1:], source, source[:, :1]], axis=1)
-    whole = np.concatenate([across[:1], across, across[-1:]], axis=0)
+    padded = np.concatenate([across[:1], across, across[-1:]], axis=0)
     at = (np.arange(height * parts) + 0.5) / parts + 0.5
-    rows = _between(whole, at, 0)
+    rows = _between(padded, at, 0)
     return _between(rows, (np.arange(width * parts) + 0.5) / parts + 0.5, 1)
 
 
@@ -256,7 +259,7 @@ def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, f
     """
     lobe, source = distribution(ndf), levels[0]
     spread = _spread(8)
-    found = {"level_0": {"max": 0.0, "rms": 0.0}}
+    errors = {"level_0": {"max": 0.0, "rms": 0.0}}
     for level in range(1, len(levels)):
         values, roughness = levels[level], roughness_of(level, len(levels))
         directions = _of_texels(values)
@@ -270,11 +273,11 @@ def errors(levels: list[Array], ndf: str, masking: str) -> dict[str, dict[str, f
         figures["interpolation"] = _figures(
             0.5 * (read(values, spread) + read(levels[level - 1], spread)) - right, right
         )["max"]
-        albedo = quadrature.moments(lobe.name, masking, np.array(COSINES), roughness**2).whole
+        albedo = quadrature.moments(lobe.name, masking, np.array(COSINES), roughness**2).white
         split = np.concatenate([e * read(values, chosen) for e in albedo])
         right = np.stack([sky.reflected(lobe, masking, *_mirrored(r, mu)) for mu in COSINES for r in chosen])
-        found[f"level_{level}"] = figures | {"split sum": _figures(split - right, right)["rms"]}
-    return found
+        errors[f"level_{level}"] = figures | {"split sum": _figures(split - right, right)["rms"]}
+    return errors
 
 
 def _figures(difference: Array, right: Array) -> dict[str, float]:
@@ -355,7 +358,7 @@ def _of_texels(level: Array, start: int = 0, stop: int | None = None) -> Array:
     height, width = level.shape[:2]
     theta, phi = _centres(height)[start:stop, None], (np.arange(width) + 0.5) / width * 2.0 * np.pi
     sine = np.sin(theta)
-    return np.stack(np.broadcast_arrays(sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)), -1).reshape(-1, 3)
+    return spherical_array(sine, np.cos(theta), phi).reshape(-1, 3)
 
 
 def _spread(count: int) -> Array:
@@ -363,4 +366,4 @@ def _spread(count: int) -> Array:
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     phi = np.arange(count) * np.pi * (3.0 - np.sqrt(5.0))
     sine = np.sqrt(1.0 - z * z)
-    return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], -1)
+    return spherical_array(sine, z, phi)

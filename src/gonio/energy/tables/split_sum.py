@@ -30,7 +30,7 @@ def schlick_table(ndf: str, masking: str) -> Table:
     return Table(f"schlick_{ndf}_{masking}".replace("-", "_"), cache.remember(key, build))
 
 
-def reflected(surface: Microsurface, f0: Spectrum, whole: Scalar, wo: Direction) -> Spectrum:
+def reflected(surface: Microsurface, f0: Spectrum, E: Scalar, wo: Direction) -> Spectrum:
     """F0 A + B at wo.
 
     whole  E(mu) at F = 1, A + B
@@ -38,4 +38,4 @@ def reflected(surface: Microsurface, f0: Spectrum, whole: Scalar, wo: Direction)
     alpha, _ = widths(surface.alpha)
     row, column = inset(sqrt(sqrt(alpha.x * alpha.y)), SIZE), inset(sqrt(maximum(wo.z, 1e-6)), SIZE)
     (b,) = lookup(schlick_table(surface.ndf, surface.masking), row, column)
-    return f0 * maximum(whole - b, 0.0) + b
+    return f0 * maximum(E - b, 0.0) + b

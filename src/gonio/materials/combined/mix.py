@@ -35,8 +35,8 @@ class Mix(BSDF):
         """u1 picks a material and is stretched to serve it again; a density sample is weighed against both."""
         w = self.weight
         pick_b = u.x < w
-        again = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
-        u = vec3(where(again < ALMOST_ONE, again, ALMOST_ONE), u.y, u.z)
+        u_remapped = where(pick_b, safe_div(u.x, w), safe_div(u.x - w, 1.0 - w))
+        u = vec3(where(u_remapped < ALMOST_ONE, u_remapped, ALMOST_ONE), u.y, u.z)
         sa, sb = self.a.sample(wo, u, mode), self.b.sample(wo, u, mode)
         wi = where(pick_b, sb.wi, sa.wi)
         delta = where(pick_b, sb.delta, sa.delta)
@@ -49,12 +49,12 @@ class Mix(BSDF):
         return Sample(wi, where(delta, delta_weight, density_weight), pdf, delta, where(pick_b, sb.eta, sa.eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The parts of both."""
+        """The polarized parts of both materials, each times its weight."""
         a, b = self.a.polarized(wo, wi, delta, mode), self.b.polarized(wo, wi, delta, mode)
         return (*(part.times(1.0 - self.weight) for part in a), *(part.times(self.weight) for part in b))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The average of both."""
+        """The average of both tints, by weight."""
         return self.a.tint(wo) * (1.0 - self.weight) + self.b.tint(wo) * self.weight
 
     @property
@@ -71,7 +71,7 @@ class Mix(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The average of both."""
+        """The average of both factors, by weight."""
         a, b = self.a.ambient, self.b.ambient
         if a is None:
             return None if b is None else b * self.weight
@@ -80,7 +80,7 @@ class Mix(BSDF):
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The average of both."""
+        """The average of both albedos, by weight."""
         a, b = inner(self.a, mu, phi), inner(self.b, mu, phi)
         weight = float(self.weight)  # type: ignore[arg-type]
         return None if a is None or b is None else a * (1.0 - weight) + b * weight

@@ -8,14 +8,14 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, Delta
+from ...material.bsdf import BSDF, Delta, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Number, bsdf, number
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, dot, maximum, minimum, safe_div, sqr, vec3, where
 
 STEEPEST = 20.0  # lean of a normal to which a map's are held, 87 degrees
-LEAST = 0.01  # cosine under which a leaning surface is not seen, unless the level one is
+MIN_COSINE = 0.01  # cosine under which a leaning surface is not seen, unless the level one is
 
 
 class _Frame(NamedTuple):
@@ -53,10 +53,10 @@ class NormalMap(BSDF):
     lean_x: Number = number(default=0.0, doc="tilt of the normal along x", low=-STEEPEST, high=STEEPEST)
     lean_y: Number = number(default=0.0, doc="tilt of the normal along y", low=-STEEPEST, high=STEEPEST)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "the view bends the normal, and what is sent below the surface goes up again",
-            lambda model: 2.0 if model.leans else 0.0,
+            lambda model: 2.0 if model.perturbs_normal else 0.0,
             certain=False,
         ),
     }
@@ -94,7 +94,7 @@ class NormalMap(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's, likewise."""
+        """The base's density, and that of the mirrored samples, as in `eval`."""
         frame, valid = self._bent(wo)
         o, i = frame.local(wo), frame.local(wi)
         density = self.base.pdf(o, i)
@@ -109,22 +109,22 @@ class NormalMap(BSDF):
         frame, valid = self._bent(wo)
         s = self.base.sample(frame.local(wo), u, mode)
         wi = frame.back(s.wi)
-        found = valid & (s.pdf > 0.0)
+        drawn = valid & (s.pdf > 0.0)
         if self.base.transmits:
-            found = found & (wi.z * s.wi.z > 0.0)
-            return Sample(wi, where(found, s.weight, 0.0), where(found, s.pdf, 0.0), s.delta & found, s.eta)
+            drawn = drawn & (wi.z * s.wi.z > 0.0)
+            return Sample(wi, where(drawn, s.weight, 0.0), where(drawn, s.pdf, 0.0), s.delta & drawn, s.eta)
         wi = where(wi.z < 0.0, _turned(wi), wi)
-        found = found & (wo.z > 0.0)
+        drawn = drawn & (wo.z > 0.0)
         density = self.pdf(wo, wi)
         smooth = self.eval(wo, wi, mode) * safe_div(1.0, density)
-        weight = where(found, where(s.delta, s.weight, smooth), 0.0)
-        return Sample(wi, weight, where(found, where(s.delta, s.pdf, density), 0.0), s.delta & found, s.eta)
+        weight = where(drawn, where(s.delta, s.weight, smooth), 0.0)
+        return Sample(wi, weight, where(drawn, where(s.delta, s.pdf, density), 0.0), s.delta & drawn, s.eta)
 
     def _bent(self, wo: Direction) -> tuple[_Frame, ops.Mask]:
         """The leaning frame, bent until wo lies on its own side; whether it does."""
         n = self._normal()
-        side = where(wo.z < 0.0, -1.0, 1.0 + 0.0 * wo.z)
-        lacking = maximum(minimum(wo.z * side, LEAST) - dot(wo, n) * side, 0.0)
+        side = where(wo.z < 0.0, -1.0, ops.ones_like(wo.z))
+        lacking = maximum(minimum(wo.z * side, MIN_COSINE) - dot(wo, n) * side, 0.0)
         n = n + wo * (side * lacking)
         n = n * ops.rsqrt(dot(n, n))
         return self._frame(n), dot(wo, n) * side > 0.0
@@ -137,10 +137,10 @@ class NormalMap(BSDF):
         return self.base.tint(frame.local(wo))
 
     @property
-    def leans(self) -> bool:
+    def perturbs_normal(self) -> bool:
         """Whether its normal is another than the surface's, as far as plain numbers tell."""
         values = [getattr(self.plain, name) for name in ("lean_x", "lean_y")]
-        return self.base.leans or not all(isinstance(value, int | float) and value == 0 for value in values)
+        return self.base.perturbs_normal or not all(isinstance(value, int | float) and value == 0 for value in values)
 
     @property
     def transmits(self) -> bool:
@@ -148,7 +148,7 @@ class NormalMap(BSDF):
 
     @property
     def isotropic(self) -> bool:
-        return not self.leans and self.base.isotropic
+        return not self.perturbs_normal and self.base.isotropic
 
     @property
     def delta(self) -> Delta:
@@ -160,7 +160,7 @@ class NormalMap(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The base's."""
+        """The base's factor of ambient light."""
         return self.base.ambient
 
 

@@ -9,7 +9,7 @@ from ...material.bsdf import BSDF, Delta, InnerAlbedo
 from ...material.calling import method
 from ...material.parameters import Number, bsdf, number
 from ...material.sample import Sample
-from ...ops import Direction, Mode, Scalar, Spectrum, backend, minimum, safe_div, vec3, where
+from ...ops import Direction, Mode, Scalar, Spectrum, backend, minimum, ones_like, safe_div, vec3, where
 from .mix import ALMOST_ONE
 
 
@@ -38,9 +38,9 @@ class Opacity(BSDF):
         covered = u.x < self.opacity
         s = self.base.sample(wo, vec3(minimum(safe_div(u.x, self.opacity), ALMOST_ONE), u.y, u.z), mode)
         through = 1.0 - self.opacity
-        weight = where(covered, s.weight, 1.0 + 0.0 * through)
+        weight = where(covered, s.weight, ones_like(through))
         pdf = where(covered, s.pdf * self.opacity, through)
-        eta = where(covered, s.eta, 1.0 + 0.0 * through)
+        eta = where(covered, s.eta, ones_like(through))
         return Sample(where(covered, s.wi, -wo), weight, pdf, s.delta | ~covered, eta)
 
     def tint(self, wo: Direction) -> Spectrum:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...errors import InputError
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import bsdf
 from ...material.polarization import Polarized
@@ -23,8 +23,8 @@ class Sum(BSDF):
     a: BSDF = bsdf("the one material")
     b: BSDF = bsdf("the other")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach("what two materials reflect may add up to more than arrives", 1e3, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation("what two materials reflect may add up to more than arrives", 1e3, certain=False)
     }
 
     def __post_init__(self) -> None:
@@ -36,15 +36,15 @@ class Sum(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """a + b."""
+        """The sum of both values."""
         return self.a.eval(wo, wi, mode) + self.b.eval(wo, wi, mode)
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """The parts of both."""
+        """The polarized parts of both materials."""
         return (*self.a.polarized(wo, wi, delta, mode), *self.b.polarized(wo, wi, delta, mode))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """That of both."""
+        """The sum of both tints."""
         return self.a.tint(wo) + self.b.tint(wo)
 
     @property

@@ -50,7 +50,7 @@ class TwoSided(BSDF):
         return tuple(part._replace(normal=_turned(part.normal, wo)) for part in parts)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's."""
+        """The base's tint."""
         return self.base.tint(_turned(wo, wo))
 
     @property
@@ -63,13 +63,13 @@ class TwoSided(BSDF):
 
     @property
     def ambient(self) -> Spectrum | None:
-        """The base's."""
+        """The base's factor of ambient light."""
         return self.base.ambient
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """The base's."""
+        """The base's albedo, from both sides."""
         return inner(self.base, np.abs(mu), phi)
 
 

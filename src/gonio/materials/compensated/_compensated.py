@@ -15,6 +15,7 @@ from ...material.bsdf import Delta, InnerAlbedo
 from ...material.polarization import Polarized
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, backend, function, maximum, mean, safe_div, vec3, where
 from ...ops.backend import Array
+from ...optics import frame
 from ...optics.special import gauss
 
 ALMOST_ONE = 0.99999994  # the largest float32 under 1
@@ -55,7 +56,7 @@ class _OnBase(BSDF):
     # ------------------------------------------------------------------ facts
 
     @property
-    def two_widths(self) -> bool:
+    def anisotropic(self) -> bool:
         """Whether the base has two widths."""
         return reflecting.has_two_widths(self.plain.base)
 
@@ -72,21 +73,21 @@ class _OnBase(BSDF):
         return self.base.polarized(wo, wi, delta, mode)
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The base's."""
+        """The base's tint."""
         return self.base.tint(wo)
 
 
 class _Compensated(_OnBase):
     """base + what it misses, sampled by a mixture of the base and of the lobe that is missing.
 
-    A subclass writes `derive`, which gives `missing` and `ratio` among others, `added`, and `eval` with it.
+    A subclass writes `derive`, which gives `missing` and `ratio` among others, `compensation`, and `eval` with it.
     """
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
         """The base's, plus lobes that are alike all around the normal."""
-        of_base = None if nodes is None or self.stochastic or self.two_widths else inner(self.base, mu, phi)
+        of_base = None if nodes is None or self.stochastic or self.anisotropic else inner(self.base, mu, phi)
         if nodes is None or of_base is None:
             return None
         types = backend.types("float64")
@@ -96,13 +97,13 @@ class _Compensated(_OnBase):
         for row, (cosine, azimuth) in enumerate(zip(mu, phi, strict=True)):
             wo = _direction(types, np.array([cosine]), azimuth)
             for side in (1.0, -1.0) if self.transmits else (float(np.sign(cosine)),):
-                value = backend.to_numpy(bound.added(wo, _direction(types, side * x**2), "importance"), len(x))
+                value = backend.to_numpy(bound.compensation(wo, _direction(types, side * x**2), "importance"), len(x))
                 total[row] += 2.0 * np.pi * (2.0 * x * w) @ value
         return total
 
     # ------------------------------------------------------------------ formulas
 
-    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+    def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """What is added to the base, times |cos theta_i|."""
         raise NotImplementedError
 
@@ -114,7 +115,7 @@ class _Compensated(_OnBase):
     @method
     def terms(self, wo: Direction, wi: Direction) -> Parts | AllParts:
         """`Parts`, with D, G and F of the base where it has them."""
-        return with_terms(self.base, wo, wi, self.base.eval(wo, wi), self.added(wo, wi, "radiance"))
+        return with_terms(self.base, wo, wi, self.base.eval(wo, wi), self.compensation(wo, wi, "radiance"))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -127,8 +128,8 @@ class _Compensated(_OnBase):
         """u1 picks the base or the lobe, and is stretched to serve again."""
         share = self._share(wo)
         broad = u.x < share
-        again = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
-        u = vec3(ops.minimum(again, ALMOST_ONE), u.y, u.z)
+        u_remapped = where(broad, safe_div(u.x, share), safe_div(u.x - share, 1.0 - share))
+        u = vec3(ops.minimum(u_remapped, ALMOST_ONE), u.y, u.z)
         s = self.base.sample(wo, u, mode)
         wi = where(broad, self._lobe_sample(wo, u), s.wi)
         delta = s.delta & ~broad
@@ -137,7 +138,7 @@ class _Compensated(_OnBase):
         base_value = where(broad, self.base.eval(wo, wi, mode), s.weight * s.pdf)
         density = base_pdf * (1.0 - share) + self._lobe_pdf(wo, wi) * share
         pdf = where(broad | (s.pdf > 0.0), where(delta, s.pdf * (1.0 - share), density), 0.0)
-        value = base_value + self.added(wo, wi, mode)
+        value = base_value + self.compensation(wo, wi, mode)
         value = value * where((pdf > 0.0) & ~delta, safe_div(1.0, pdf), 0.0)
         eta = where(broad, self.derived.missing.eta(wo, wi), s.eta)
         # a smooth base misses nothing: share = 0
@@ -170,11 +171,11 @@ def with_terms(base: BSDF, wo: Direction, wi: Direction, single: Spectrum, multi
 
 
 @function
-def lobe_ratio(added: Spectrum, lost: MissingEnergy) -> Scalar:
+def lobe_ratio(f_add: Spectrum, lost: MissingEnergy) -> Scalar:
     """Mean colour of what is given back over that of single scattering."""
-    return safe_div(mean(added), maximum(mean(lost.F_avg * lost.factor), 1e-6))
+    return safe_div(mean(f_add), maximum(mean(lost.F_avg * lost.factor), 1e-6))
 
 
 def _direction(types: backend.Types, mu: NDArray[np.float64], phi: float = 0.0) -> Array:
     sin = np.sqrt(np.maximum((1.0 - mu) * (1.0 + mu), 0.0))
-    return backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)
+    return backend.vector_of(frame.spherical_array(sin, mu, phi), 3, types)

@@ -96,7 +96,7 @@ def compare(
         raise InputError(f"{walks} walks, {pairs} pairs", "compensation", "give 1000 walks and 1024 pairs or more")
     roughness, mu = np.asarray(roughness, float), np.asarray(mu, float)
     methods, bases = _with(own)
-    found: dict[str, dict[str, np.ndarray]] = {name: {} for name in bases}
+    albedos_of: dict[str, dict[str, np.ndarray]] = {name: {} for name in bases}
     for name, base_of in bases.items():
         for method, under in methods.items():
             rows: list[Any] = []
@@ -108,22 +108,22 @@ def compare(
                 elif model is not None:
                     rows.append(albedo(model, mu).value)
             if rows:
-                found[name][method] = np.array(rows)
+                albedos_of[name][method] = np.array(rows)
     rms = {
         name: {
             method: float(np.sqrt(np.mean((values - by_method["random walk"]) ** 2)))
             for method, values in by_method.items()
             if method != "random walk" and "random walk" in by_method
         }
-        for name, by_method in found.items()
+        for name, by_method in albedos_of.items()
     }
-    lossless = {name: found[name] for name in ("white", "glass")}
+    lossless = {name: albedos_of[name] for name in ("white", "glass")}
     furnace = {n: {m: float(np.abs(1.0 - v).max()) for m, v in by.items()} for n, by in lossless.items()}
     return {
         "roughness": roughness.tolist(),
         "mu": mu.tolist(),
         "walks": walks,
-        "albedo": {n: {m: v.tolist() for m, v in by.items()} for n, by in found.items()},
+        "albedo": {n: {m: v.tolist() for m, v in by.items()} for n, by in albedos_of.items()},
         "rms": rms,
         "furnace": furnace,
         "reciprocity": {m: breach(under, seed) for m, under in methods.items() if m != "random walk"},

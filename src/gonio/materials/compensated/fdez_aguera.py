@@ -10,12 +10,12 @@ from ...energy.compensation import lobe
 from ...energy.compensation.missing import missing_energy
 from ...energy.compensation.reflecting import Reflecting
 from ...energy.tables import split_sum
-from ...material import Breach, method
+from ...material import KnownViolation, method
 from ...ops import Direction, Mode, Scalar, Spectrum, abs, maximum, where
 from ...optics.fresnel.schlick import schlick_average
 from ...optics.roughness import widths
 from ._compensated import _Compensated, lobe_ratio
-from .kulla_conty import returned
+from .kulla_conty import f_add
 
 
 class Derived(NamedTuple):
@@ -41,18 +41,18 @@ class FdezAguera(_Compensated):
     as a BSDF the second term is a diffuse lobe that sees wo alone: not reciprocal. Schlick's Fresnel is assumed in it.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation("the diffuse part depends on the viewer's direction alone", 4.0, certain=False)
     }
-    lossless: ClassVar[float | None] = 2e-3
+    lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """f_base + F_ms E_ms / pi, times cos theta_i."""
-        return self.base.eval(wo, wi, mode) + self.added(wo, wi, mode)
+        return self.base.eval(wo, wi, mode) + self.compensation(wo, wi, mode)
 
-    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+    def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """F_ms E_ms cos theta_i / pi."""
         _, f0, f_avg, _ = self.derived
         E_ms = self.M(wo)
@@ -68,4 +68,4 @@ class FdezAguera(_Compensated):
         lost = missing_energy(self.base)
         f0 = self.base.normal_reflectance()
         assert isinstance(lost, Reflecting) and f0 is not None, "checked when it was made"
-        return Derived(lost, f0, schlick_average(f0), lobe_ratio(returned(lost, "bounce"), lost))
+        return Derived(lost, f0, schlick_average(f0), lobe_ratio(f_add(lost, "bounce"), lost))

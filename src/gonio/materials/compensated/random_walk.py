@@ -13,7 +13,7 @@ from ...ops import Direction, Mode, Spectrum, where
 from ...optics import frame
 from ...optics.roughness import widths
 from ._compensated import _Compensated, lobe_ratio
-from .kulla_conty import Derived, returned
+from .kulla_conty import Derived, f_add
 
 
 class RandomWalk(_Compensated):
@@ -38,9 +38,9 @@ class RandomWalk(_Compensated):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The base, plus an estimate of the light of two and more bounces."""
-        return self.base.eval(wo, wi, mode) + self.added(wo, wi, mode)
+        return self.base.eval(wo, wi, mode) + self.compensation(wo, wi, mode)
 
-    def added(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
+    def compensation(self, wo: Direction, wi: Direction, mode: Mode) -> Spectrum:
         """One walk's light of two and more bounces along wi, times |cos theta_i|."""
         surface = self.base.microsurface
         assert surface is not None, "checked when it was made"
@@ -54,5 +54,5 @@ class RandomWalk(_Compensated):
     def derive(self) -> Derived:
         """Kulla-Conty's lobe, which is what is sampled."""
         lost = missing_energy(self.base)
-        f_add = returned(lost, "bounce")
-        return Derived(lost, f_add, lobe_ratio(f_add, lost))
+        color = f_add(lost, "bounce")
+        return Derived(lost, color, lobe_ratio(color, lost))

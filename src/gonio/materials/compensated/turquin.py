@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from ... import ops
 from ...energy.compensation.lobe import MissingEnergy
 from ...energy.compensation.missing import missing_energy
-from ...material import BSDF, Breach, Sample, bsdf, method
+from ...material import BSDF, KnownViolation, Sample, bsdf, method
 from ...material.bsdf import InnerAlbedo
 from ...ops import Direction, Mode, Scalar, Spectrum, backend, maximum
+from ...optics import frame
 from ._compensated import AllParts, Parts, _OnBase, with_terms
 
 
@@ -32,22 +33,22 @@ class Turquin(_OnBase):
     """
 
     base: BSDF = bsdf("the material to be compensated; it must not transmit")
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach("the factor depends on the viewer's direction alone", 4.0, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation("the factor depends on the viewer's direction alone", 4.0, certain=False)
     }
-    lossless: ClassVar[float | None] = 2e-3
+    lossless_tolerance: ClassVar[float | None] = 2e-3
     _takes_glass: ClassVar[bool] = False
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
         """The base's, times the factor."""
-        of_base = None if nodes is None or self.two_widths else inner(self.base, mu, phi)
+        of_base = None if nodes is None or self.anisotropic else inner(self.base, mu, phi)
         if of_base is None:
             return None
         types = backend.types("float64")
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
-        wo = backend.vector_of(np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1), 3, types)
+        wo = backend.vector_of(frame.spherical_array(sin, mu, phi), 3, types)
         return of_base * backend.to_numpy(self.bind(types)._factor(wo), len(mu))
 
     def derive(self) -> Derived:
@@ -75,7 +76,7 @@ class Turquin(_OnBase):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """The base's."""
+        """The base's density: the factor leaves the shape of the lobe."""
         return self.base.pdf(wo, wi)
 
     @method

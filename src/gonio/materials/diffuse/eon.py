@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ops
-from ...material.bsdf import BSDF, InnerAlbedo, never
+from ...material.bsdf import BSDF, InnerAlbedo
 from ...material.calling import method
 from ...material.parameters import Colour, Number, choice, number, spectrum
 from ...material.sample import Sample
@@ -45,7 +45,7 @@ class Eon(BSDF):
     roughness: Number = number(default=0.5, doc="r: 0 is Lambert, 1 the roughest", low=0.0, high=1.0)
     energy: str = choice("exact", "how E is found", FORMS)
 
-    lossless: ClassVar[float | None] = 1e-3  # what the fit is off; exact: nothing
+    lossless_tolerance: ClassVar[float | None] = 1e-3  # what the fit is off; exact: nothing
 
     @function
     def _lost(self, w: Direction) -> Scalar:
@@ -67,12 +67,12 @@ class Eon(BSDF):
 
     @function
     def _single(self) -> Scalar:
-        """A."""
+        """A, the normalization of the single-scattering lobe."""
         return 1.0 / (1.0 + GRAZING * self.roughness)
 
     @function
     def _again(self) -> Spectrum:
-        """rho_ms."""
+        """rho_ms, the color of multiple scattering."""
         E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
         return sqr(self.albedo) * E_avg / (1.0 - self.albedo * (1.0 - E_avg))
 
@@ -83,8 +83,8 @@ class Eon(BSDF):
         s = wo.x * wi.x + wo.y * wi.y
         t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both vanish only where this is masked
         once = self.albedo * (A * (1.0 + r * s / t))
-        again = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
-        return (once + again) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+        multiple = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
+        return (once + multiple) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
@@ -105,7 +105,7 @@ class Eon(BSDF):
         wi = where(u.x < _uniform_share(wo.z, r), vec3(across * cos, across * sin, u.y), lobe)
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """rho E_avg + rho_ms (1 - E_avg), the mean albedo."""
@@ -123,8 +123,8 @@ class Eon(BSDF):
         g = sin * (theta - sin * mu) + 2.0 / 3.0 * (sin * mu * (1.0 + sin + sin**2) / (1.0 + sin) - sin)
         A = 1.0 / (1.0 + GRAZING * r)
         E, E_avg = A * (1.0 + r * g / np.pi), A * (1.0 + AVERAGE * r)
-        again = rho**2 * E_avg / (1.0 - rho * (1.0 - E_avg))
-        value = rho * E[:, None] + again * (1.0 - E[:, None])
+        multiple = rho**2 * E_avg / (1.0 - rho * (1.0 - E_avg))
+        value = rho * E[:, None] + multiple * (1.0 - E[:, None])
         return np.where(mu > 0.0, 1.0, 0.0)[:, None] * np.broadcast_to(value, (len(mu), 3))
 
 
@@ -172,8 +172,8 @@ class _Clipped:
         radius = ops.sqrt(u1)
         sin, cos = ops.sincos((2.0 * ops.pi) * u2)
         y = radius * sin
-        kept = self._kept()
-        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - kept) + radius * cos * kept)
+        share = self._kept()
+        x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - share) + radius * cos * share)
         z = ops.safe_sqrt(1.0 - (x * x + y * y))
         return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ...material.bsdf import BSDF, InnerAlbedo
 from ...material.calling import method
 from ...material.parameters import Colour, spectrum
+from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, abs, inv_pi, where
 
 
@@ -29,6 +30,11 @@ class Lambert(BSDF):
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """cos theta_i / pi above the surface."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """A cosine-weighted direction."""
+        return self.sample_cosine(wo, u, mode)
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None

@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
+from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, function, inv_pi, maximum, sqr, where
 
 
@@ -30,8 +31,8 @@ class OrenNayar(BSDF):
     )
     sigma: Number = number(default=0.3, doc="standard deviation of the grooves' slope angle", low=0.0, unit="rad")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "the qualitative form reflects A + B / 2 at grazing, up to 1.015 (sigma = 0.2) where albedo = 1",
             lambda model: max(_grazing_albedo(float(np.max(model.sigma))) - 1.0, 0.0),
             certain=False,  # below sigma = 0.04 it is under a thousandth
@@ -58,6 +59,11 @@ class OrenNayar(BSDF):
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """cos theta_i / pi above the surface: B's part is small and as smooth."""
         return where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
+
+    @method
+    def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
+        """A cosine-weighted direction."""
+        return self.sample_cosine(wo, u, mode)
 
 
 def _grazing_albedo(sigma: float) -> float:

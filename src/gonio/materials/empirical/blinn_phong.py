@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...ops import Direction, Scalar, dot, function, inv_pi, safe_div
 from ...optics.frame import half_vector, reflect, sin2
 from ...optics.special import power_of_cosine
@@ -22,10 +22,10 @@ class BlinnPhong(_Empirical):
     highlight as wide as Phong's take about four times the exponent. Neither reciprocal nor energy conserving.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        **_Empirical.breaks,
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        **_Empirical.known_violations,
         # the bound below is not met: close under it nothing need be gained
-        "energy": _Empirical.breaks["energy"]._replace(certain=False),
+        "energy": _Empirical.known_violations["energy"]._replace(certain=False),
     }
 
     def _highlight_power(self) -> np.ndarray:

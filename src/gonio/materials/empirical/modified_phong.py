@@ -8,13 +8,13 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, never
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, clamp, function, inv_pi, mean, sqr, where
 from ...optics.frame import mirror
-from ...optics.warp import around, power_about, square_to_cosine_hemisphere, square_to_power_lobe
+from ...optics.warp import power_about, square_to_cosine_hemisphere, square_to_power_lobe, to_frame
 from ..historic.glossy import lit
 
 
@@ -32,8 +32,8 @@ class ModifiedPhong(BSDF):
     )
     p: Number = number(default=32.0, doc="falloff of the lobe", low=0.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "kd + ks is over 1",
             lambda model: max(float(np.max(np.asarray(model.kd) + np.asarray(model.ks))) - 1.0, 0.0),
             certain=False,  # met at the normal alone, which not every check looks along
@@ -47,7 +47,7 @@ class ModifiedPhong(BSDF):
         With r = (p + 1) / 2, the density of light at the peak against the cosine's, ((r - 1/2) / (r + 1/2))^2.
         """
         lobe = mean(self.ks) * sqr(self.p / (self.p + 2.0)) * clamp(wo.z, 0.1, 1.0)
-        return clamp(ops.safe_div(lobe, lobe + mean(self.kd)), 0.0, MOST)
+        return clamp(ops.safe_div(lobe, lobe + mean(self.kd)), 0.0, MAX_LOBE_SHARE)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -67,13 +67,13 @@ class ModifiedPhong(BSDF):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks a lobe; a direction below the surface is a failed sample."""
-        lobe = around(mirror(wo), square_to_power_lobe(u.y, u.z, self.p))
+        lobe = to_frame(mirror(wo), square_to_power_lobe(u.y, u.z, self.p))
         wi = where(u.x < self._share(wo), lobe, square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Itself: no two albedos whose sum is 1 return all light."""
         return self
 
@@ -82,4 +82,4 @@ class ModifiedPhong(BSDF):
         return self.kd + self.ks
 
 
-MOST = 0.95  # share of samples that follow the lobe: where the cosine alone finds light its weights stay bounded
+MAX_LOBE_SHARE = 0.95  # of samples: where the cosine alone finds light, weights stay bounded

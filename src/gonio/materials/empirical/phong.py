@@ -9,13 +9,13 @@ import numpy as np
 
 from ... import ops
 from ...errors import InputError
-from ...material.bsdf import BSDF, Breach, never
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, flag, number, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mode, Scalar, Spectrum, dot, function, inv_pi, mean, pow, where
 from ...optics.frame import mirror
-from ...optics.warp import around, square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf
+from ...optics.warp import square_to_cosine_hemisphere, square_to_power_lobe, square_to_power_lobe_pdf, to_frame
 
 
 class _Empirical(BSDF):
@@ -31,12 +31,12 @@ class _Empirical(BSDF):
     ka: Colour = spectrum(default=0.0, doc="ambient coefficient: ka times the scene's ambient light is added", low=0.0)
     check_sum: bool = flag(default=False, doc="require ka + kd + ks = 1")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "the specular term has no cosine, so f divides it by cos theta_i alone",
             lambda model: 1.0 if np.any(np.asarray(model.ks) > 0) else 0.0,
         ),
-        "energy": Breach(
+        "energy": KnownViolation(
             "neither term is normalized: kd = 1 reflects pi times what it receives",
             lambda model: np.max(np.pi * np.asarray(model.kd) + np.asarray(model.ks) * model._highlight_power()) - 1.0,
         ),
@@ -104,7 +104,7 @@ class _Empirical(BSDF):
         wi = where(u.x < self._specular_share(wo), specular, diffuse)
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The diffuse part's colour."""
@@ -112,7 +112,7 @@ class _Empirical(BSDF):
 
     @property
     def ambient(self) -> Spectrum:
-        """ka."""
+        """The ambient reflectance ka."""
         return self.ka
 
 
@@ -141,4 +141,4 @@ class Phong(_Empirical):
     @function
     def _highlight_sample(self, wo: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """A direction of a cos^p lobe about the mirrored viewer."""
-        return around(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))
+        return to_frame(mirror(wo), square_to_power_lobe(u1, u2, self._exponent))

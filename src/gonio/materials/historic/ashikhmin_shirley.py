@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, choice, flag, spectrum, width
 from ...ops import Direction, Pair, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
 from ...optics import frame, fresnel
@@ -34,7 +34,7 @@ class AshikhminShirley(_Glossy):
     fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
     coupled: bool = flag(default=False, doc="the paper's diffuse part, which gives way to the lobe")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     def _most(self) -> np.ndarray:
         """specular: F (n.i) / max((n.o), (n.i)) is the weight of a sample."""
@@ -42,15 +42,15 @@ class AshikhminShirley(_Glossy):
 
     def reflectance(self, cos_theta: Scalar | float) -> Spectrum:
         """F by name at a facet seen under cos_theta."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _diffuse(self, wo: Direction, wi: Direction) -> Spectrum:
         """diffuse / pi, or 28 diffuse / (23 pi) (1 - Rs) (1 - (1 - (n.o) / 2)^5) (1 - (1 - (n.i) / 2)^5)."""
         if not self.coupled:
             return self._lambert * (wi.z * inv_pi)
-        kept = 1.0 - self.specular * self.reflectance(1.0 + 0.0 * wo.z)
-        return self._lambert * kept * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
+        left = 1.0 - self.specular * self.reflectance(ops.ones_like(wo.z))
+        return self._lambert * left * ((28.0 / 23.0) * inv_pi * _faded(wo.z) * _faded(wi.z) * wi.z)
 
     @function
     def _focus(self) -> Scalar:
@@ -62,9 +62,9 @@ class AshikhminShirley(_Glossy):
     def _density(self, h: Direction) -> Scalar:
         """p(h), 1/sr."""
         n = self.exponent
-        turned = frame.rotate(h, self.rotation)
-        sin2 = frame.sin2(turned)
-        power = (n.x * sqr(turned.x) + n.y * sqr(turned.y)) / maximum(sin2, frame.TINY)
+        h_local = frame.rotate(h, self.rotation)
+        sin2 = frame.sin2(h_local)
+        power = (n.x * sqr(h_local.x) + n.y * sqr(h_local.y)) / maximum(sin2, frame.TINY)
         norm = sqrt((n.x + 1.0) * (n.y + 1.0)) * (0.5 * inv_pi)
         return norm * power_of_cosine(h.z, sin2, power)
 

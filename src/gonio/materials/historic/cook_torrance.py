@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, spectrum, width
-from ...ops import Direction, Scalar, Spectrum, function
+from ...ops import Direction, Scalar, Spectrum, function, zeros_like
 from ...optics import frame, fresnel
 from ...optics.masking.v_groove import v_groove
 from ...optics.ndf import distribution
@@ -33,7 +33,7 @@ class CookTorrance(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("D G / (pi cos cos) is four times what facets reflect, "),
     }
 
@@ -43,7 +43,7 @@ class CookTorrance(_Glossy):
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F by name at a facet seen under cos_theta."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, zeros_like(self.eta))
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
@@ -56,15 +56,15 @@ class CookTorrance(_Glossy):
     def _lobe_pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """Density of Beckmann's visible normals over 4 (o.h) (Walter2007, eq. 14)."""
         h, _ = facet(wo, wi)
-        turned, normal = frame.rotate(wo, self.rotation), frame.rotate(h, self.rotation)
-        return 0.25 * distribution("beckmann").visible_per_cosine(turned, normal, self.alpha)
+        wo_local, normal = frame.rotate(wo, self.rotation), frame.rotate(h, self.rotation)
+        return 0.25 * distribution("beckmann").visible_per_cosine(wo_local, normal, self.alpha)
 
     @function
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
         """wo mirrored at a visible normal."""
-        turned = frame.rotate(wo, self.rotation)
-        h = distribution("beckmann").sample_visible(turned, u.y, u.z, self.alpha)
-        return frame.rotate_back(frame.reflect(turned, h), self.rotation)
+        wo_local = frame.rotate(wo, self.rotation)
+        h = distribution("beckmann").sample_visible(wo_local, u.y, u.z, self.alpha)
+        return frame.rotate_back(frame.reflect(wo_local, h), self.rotation)
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """4 specular F: of a narrow lobe."""

@@ -10,17 +10,17 @@ import numpy as np
 
 from ... import ops
 from ...catalog import library
-from ...material.bsdf import BSDF, Breach, Preset, never
+from ...material.bsdf import BSDF, KnownViolation, Preset
 from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.sample import Sample
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, clamp, dot, function, inv_pi, maximum, mean, sqrt, where
-from ...optics.frame import TINY, upright
+from ...optics.frame import TINY, normal_like
 from ...optics.warp import square_to_cosine_hemisphere
 
 # Of all samples at most so many follow the lobe: where it comes out larger than its density says, as at grazing light,
 # the cosine keeps the weight bounded.
-MOST = 0.95
+MAX_LOBE_SHARE = 0.95
 
 
 class _Glossy(BSDF):
@@ -29,7 +29,7 @@ class _Glossy(BSDF):
     The lobe is asked of two directions above the surface only: where one is not, for the normal in its place.
     """
 
-    gives_way: ClassVar[bool] = True
+    overridable: ClassVar[bool] = True
 
     diffuse: Colour = spectrum(default=0.2, doc="albedo of Lambert's part", low=0.0, high=1.0, soft_high=True)
 
@@ -76,7 +76,7 @@ class _Glossy(BSDF):
         """Probability of the lobe: its albedo against that of the diffuse part, less where it is as wide as that."""
         lobe = maximum(mean(self._lobe_albedo(wo)), 0.0)
         both = lobe + mean(self._lambert)
-        return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MOST)
+        return clamp(self._focus() * ops.safe_div(lobe, both), 0.0, MAX_LOBE_SHARE)
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
@@ -94,27 +94,27 @@ class _Glossy(BSDF):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks a lobe; a direction below the surface is a failed sample."""
-        o = where(wo.z > 0.0, wo, upright(wo))
+        o = where(wo.z > 0.0, wo, normal_like(wo))
         share = self._share(o)
         pick = u.x < share
-        again = ops.vec3(ops.safe_div(u.x, share), u.y, u.z)
-        wi = where(pick, self._lobe_sample(o, again), square_to_cosine_hemisphere(u.y, u.z))
+        u_remapped = ops.vec3(ops.safe_div(u.x, share), u.y, u.z)
+        wi = where(pick, self._lobe_sample(o, u_remapped), square_to_cosine_hemisphere(u.y, u.z))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Itself: the two parts are simply added, so no values of theirs return all light without any loss."""
         return self
 
     def tint(self, wo: Direction) -> Spectrum:
         """The two albedos."""
-        return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, upright(wo))), 0.0)
+        return self._lambert + maximum(self._lobe_albedo(where(wo.z > 0.0, wo, normal_like(wo))), 0.0)
 
 
-def sum_breach(more: str = "") -> Breach:
+def sum_breach(more: str = "") -> KnownViolation:
     """The breach of energy that adding two lobes is, with what makes the lobe itself gain energy."""
-    return Breach(
+    return KnownViolation(
         f"{more}the two parts are added, and nothing keeps their sum below 1",
         lambda model: max(float(np.max(np.asarray(model.diffuse) + model._most())) - 1.0, 0.0),
         certain=False,  # the bound need not be met
@@ -139,4 +139,4 @@ def lit(wo: Direction, wi: Direction) -> _Lit:
     """(whether both are above the surface, both, with the normal in their place where they are not): what is masked
     anyway must not bring an infinity or a root of a negative number into a gradient."""
     above = (wo.z > 0.0) & (wi.z > 0.0)
-    return _Lit(above, where(above, wo, upright(wo)), where(above, wi, upright(wi)))
+    return _Lit(above, where(above, wo, normal_like(wo)), where(above, wi, normal_like(wi)))

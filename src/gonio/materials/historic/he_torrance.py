@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import (
     Direction,
@@ -61,7 +61,7 @@ class HeTorrance(_Glossy):
     wavelength: Colour = spectrum(default=(645.0, 526.0, 444.0), doc="wavelength of each channel", low=100.0, unit="nm")
     fresnel: str = microfacet.fresnel_choice()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("toward grazing light G D grows faster than S falls, "),
     }
 

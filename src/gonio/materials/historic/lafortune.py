@@ -8,12 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
-from ...optics.frame import upright
+from ...optics.frame import normal_like
 from ...optics.special import logrel
-from ...optics.warp import around, power_about, square_to_power_lobe
+from ...optics.warp import power_about, square_to_power_lobe, to_frame
 from .glossy import _Glossy, sum_breach
 
 SHORTEST = 1e-6  # squared length of (C o_x, C o_y, C o_z) below which there is no lobe to speak of
@@ -35,7 +35,7 @@ class Lafortune(_Glossy):
     cz: Number = number(default=1.0, doc="factor of o_z i_z", low=-1.0, high=1.0)
     exponent: Number = number(default=50.0, doc="falloff of the lobe", low=0.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach()}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}
 
     @property
     def isotropic(self) -> bool:
@@ -54,7 +54,7 @@ class Lafortune(_Glossy):
         axis = vec3(self.cx * wo.x, self.cy * wo.y, self.cz * wo.z)
         missing = _less(self.cx) * sqr(wo.x) + _less(self.cy) * sqr(wo.y) + _less(self.cz) * sqr(wo.z)  # 1 - length^2
         missing = minimum(missing, 1.0 - SHORTEST)
-        axis = where(dot(axis, axis) > SHORTEST, axis, upright(wo))
+        axis = where(dot(axis, axis) > SHORTEST, axis, normal_like(wo))
         return normalize(axis), exp(self.exponent * (-0.5 * missing * logrel(-missing)))
 
     @function
@@ -79,7 +79,7 @@ class Lafortune(_Glossy):
     def _lobe_sample(self, wo: Direction, u: Direction) -> Direction:
         """A direction of the power lobe about the axis."""
         axis, _ = self._axis(wo)
-        return around(axis, square_to_power_lobe(u.y, u.z, self.exponent))
+        return to_frame(axis, square_to_power_lobe(u.y, u.z, self.exponent))
 
     @function
     def _lobe_albedo(self, wo: Direction) -> Spectrum:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Scalar, Spectrum, exp, function, inv_pi, log, safe_sqrt, sincos, sqr, vec3
 from ...optics import frame, fresnel
@@ -31,7 +31,7 @@ class LowMicrofacet(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach("D is not normalized, ")}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
 
     def _most(self) -> np.ndarray:
         """16 specular int D d(n.h): a sample weighs 8 specular F G (o.h) / (n.o) of it, and G (o.h) <= 2 (n.o)."""
@@ -41,7 +41,7 @@ class LowMicrofacet(_Glossy):
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F by name at a facet seen under cos_theta."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _fall(self, h: Direction) -> Scalar:

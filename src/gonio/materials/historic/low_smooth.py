@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import (
     Direction,
@@ -50,7 +50,7 @@ class LowSmooth(_Glossy):
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
     fresnel: str = microfacet.fresnel_choice()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
 
     def _most(self) -> np.ndarray:
         """specular times the lobe's integral over a disk of radius 2, the farthest that |Dp| gets."""
@@ -58,7 +58,7 @@ class LowSmooth(_Glossy):
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F by name."""
-        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, 0.0 * self.eta)
+        return fresnel.kind(self.fresnel).conductor(cos_theta, self.eta, ops.zeros_like(self.eta))
 
     @function
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
@@ -81,7 +81,7 @@ class LowSmooth(_Glossy):
     @function
     def _focus(self) -> Scalar:
         """(1 - 1 / r)^2, r = 1 / (2 mass) the density at the peak against the cosine's, which is flat on the disk."""
-        mass = self._mass(1.0 + 0.0 * self.b)
+        mass = self._mass(ops.ones_like(self.b))
         return sqr(ops.clamp(1.0 - 2.0 * mass, 0.0, 1.0))
 
     @function
@@ -110,7 +110,7 @@ class LowSmooth(_Glossy):
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """specular F times the lobe's integral over a disk of radius 1, about the whole of it seen from the normal."""
-        return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(1.0 + 0.0 * wo.z))
+        return self.specular * self.reflectance(wo.z) * ((2.0 * ops.pi) * self._mass(ops.ones_like(wo.z)))
 
 
 class Rim(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ... import ops
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, spectrum
 from ...ops import (
     Direction,
@@ -33,7 +33,7 @@ from .glossy import _Glossy, facet, sum_breach
 
 # G1 ends here. Those of the paper reach -0.002 at 90 degrees, which is kept; further down, where only parameters of
 # one's own lead, two negative G1 would multiply to a positive light without bound.
-LEAST = -0.01
+MIN_COSINE = -0.01
 
 
 class ShiftedGamma(_Glossy):
@@ -60,9 +60,9 @@ class ShiftedGamma(_Glossy):
     k: Colour = spectrum(default=30.0, doc="steepness of the masking", low=1.0)
     theta0: Colour = spectrum(default=0.0, doc="angle at which masking begins", unit="rad")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("F and G are fitted factors, which no law bounds, "),
-        "positivity": Breach(
+        "positivity": KnownViolation(
             "F is negative where f1 cos is more than Schlick's curve, and G1 may be at the horizon",
             1.0,
             certain=False,
@@ -81,11 +81,11 @@ class ShiftedGamma(_Glossy):
         t = maximum(theta - self.theta0, 1e-6) / self.reach
         power = exp(ops.minimum(self.k * log(t), 3.7))  # e^40 stays in float32, and is far below the least G1
         depth = self.Lambda * power * exprel(power)
-        return maximum(1.0 - depth, LEAST)
+        return maximum(1.0 - depth, MIN_COSINE)
 
     @function
     def _density(self, h: Direction) -> Spectrum:
-        """D."""
+        """D, the density of facet normals, 1/sr."""
         cos2 = sqr(maximum(h.z, 1e-4))
         x = self.alpha + frame.sin2(h) / (cos2 * self.alpha)
         return self.normalization * exp(-x - self.p * log(x)) * (inv_pi / sqr(cos2))

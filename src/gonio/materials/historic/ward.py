@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, spectrum, width
 from ...ops import Direction, Scalar, Spectrum, function, sqr, sqrt
 from ...optics import frame
@@ -26,7 +26,7 @@ class Ward(_Glossy):
     alpha: Width = width(default=0.15, doc="width of the Gaussian; two for anisotropy", low=1e-3, high=4.0)
     rotation: Angle = microfacet.rotation_angle()
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("the lobe grows as 1 / sqrt(cos theta_o) toward grazing, and "),
     }
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ...energy.compensation.glass import Glass
 from ...energy.compensation.lobe import NOTHING, MissingEnergy
 from ...energy.compensation.missing import missing_energy
 from ...material import binding
-from ...ops import Pair, Scalar, Spectrum, maximum, mean, sqr, sqrt
+from ...ops import Pair, Scalar, Spectrum, maximum, mean, ones_like, sqr, sqrt, zeros_like
 from ...optics import fresnel
 from ...optics.fresnel import exact
 from ...optics.special import gauss
@@ -16,10 +16,8 @@ from ..microfacet.conductor import Conductor
 from ..microfacet.dielectric import Dielectric
 from . import _openpbr_tables as tables
 from ._openpbr_formulas import averaged, colour_again, covered, over_pi, seen_by, total_of
+from ._openpbr_slabs import _OpenPBR
 from ._openpbr_tables import FEW_PLACES, FROM_PLACES, HATS, NODES, PLACES
-
-if TYPE_CHECKING:
-    from .openpbr import OpenPBR
 
 STEPS = 4  # of the iteration in `_balanced`
 WEIGHTS = [2.0 * float(w) * x for x, w in zip(PLACES, gauss(len(PLACES))[1], strict=True)]  # of means with the cosine
@@ -84,25 +82,25 @@ class Between(NamedTuple):
     other: Other | None
 
 
-def derive(model: OpenPBR) -> Between:
+def derive(model: _OpenPBR) -> Between:
     """Widths and indices, means over the hemisphere, and what facets scatter twice."""
-    rough = model._roughened()
-    alpha = model._widths(rough, model.specular_roughness_anisotropy)
-    coat_alpha = model._widths(model.coat_roughness, model.coat_roughness_anisotropy)
-    ratio, eta, medium = model._indices()
-    zero, white = 0.0 * model.base_color, 1.0 + 0.0 * model.base_color
-    two = model._two_widths
-    kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=model._masking)
+    rough = model.roughened()
+    alpha = model.widths(rough, model.specular_roughness_anisotropy)
+    coat_alpha = model.widths(model.coat_roughness, model.coat_roughness_anisotropy)
+    ratio, eta, medium = model.indices()
+    zero, white = zeros_like(model.base_color), ones_like(model.base_color)
+    two = model.anisotropic
+    kind = Conductor(alpha=(0.1, 0.2) if two else 0.1, fresnel="one", masking=model.masking)
     values = {"eta": zero, "k": zero, "alpha": alpha, "rotation": None, "albedo": white}
     metal = missing_energy(binding.bound_copy(kind, values))
     bare, filmed, extra = at_places(model, ratio, eta, medium)
     weights = [4.0 * w * x**3 for x, w in zip(NODES, gauss(len(NODES))[1].tolist(), strict=True)]
     under = kept_at_nodes(model, rough, ratio, filmed)
-    over = [1.0 - E for E in tables.reflected_at_nodes(model.coat_roughness, model.coat_ior, model._masking)]
+    over = [1.0 - E for E in tables.reflected_at_nodes(model.coat_roughness, model.coat_ior, model.masking)]
     over_hats, over = over[:HATS], over[HATS:]
     facets: tuple[Scalar, ...] = ()
-    returned = 0.0 * rough
-    if model._has("coat_weight"):
+    returned = zeros_like(rough)
+    if model.has("coat_weight"):
         facets = balanced(model, rough, over_hats)
         returned = returned_less(model, rough, ratio, over_hats, facets)
     total = total_of(weights)
@@ -114,24 +112,14 @@ def derive(model: OpenPBR) -> Between:
         for parts, level in ((under, sheer), (both, joint))
     )
     f_metal = white
-    if model._has("base_metalness"):
+    if model.has("base_metalness"):
         places = FEW_PLACES if filmed else PLACES
-        f_metal = averaged([model._metal(x + 0.0 * rough, eta, medium) for x in places])
-    sheet = None
-    if model.geometry_thin_walled:
-        f = [white * one for one in bare]
-        if filmed:
-            f = [one + more for one, more in zip(f, filmed, strict=True)]
-        both_ways = [model._sheet(x + 0.0 * rough, one, eta) for x, one in zip(PLACES, f, strict=True)]
-        sheet = averaged([back for back, _ in both_ways]), averaged([on for _, on in both_ways])
+        f_metal = averaged([model.metal(x + zeros_like(rough), eta, medium) for x in places])
+    sheet = colors_of_sheet(model, bare, filmed, rough, eta) if model.geometry_thin_walled else None
     glass, other = None, None
-    if model._refracts:
-        kind_too = Dielectric(alpha=(0.1, 0.2) if two else 0.1, masking=model._masking)
-        clear = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
-        found = missing_energy(binding.bound_copy(kind_too, {**clear, "priority": 0.0 * eta}))
-        assert isinstance(found, Glass), "a dielectric's"
-        glass = found
-        if filmed or model._has("coat_weight"):
+    if model.refracts:
+        glass = missed_by_glass(model, eta, alpha)
+        if filmed or model.has("coat_weight"):
             other = misses_otherwise(model, glass, bare, filmed, rough, eta)
     return Between(
         alpha=alpha,
@@ -155,54 +143,75 @@ def derive(model: OpenPBR) -> Between:
     )
 
 
+def colors_of_sheet(
+    model: _OpenPBR, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
+) -> tuple[Spectrum, Spectrum]:
+    """Mean colors of what a thin sheet reflects and transmits."""
+    f = [ones_like(model.base_color) * one for one in bare]
+    if filmed:
+        f = [one + more for one, more in zip(f, filmed, strict=True)]
+    both_ways = [model.sheet(x + zeros_like(rough), one, eta) for x, one in zip(PLACES, f, strict=True)]
+    return averaged([back for back, _ in both_ways]), averaged([on for _, on in both_ways])
+
+
+def missed_by_glass(model: _OpenPBR, eta: Scalar, alpha: Pair) -> Glass:
+    """What single scattering at bare glass of that index misses."""
+    kind = Dielectric(alpha=(0.1, 0.2) if model.anisotropic else 0.1, masking=model.masking)
+    zero, white = zeros_like(model.base_color), ones_like(model.base_color)
+    values = {"eta": eta, "alpha": alpha, "rotation": None, "albedo": white, "absorption": zero}
+    lost = missing_energy(binding.bound_copy(kind, {**values, "priority": zeros_like(eta)}))
+    assert isinstance(lost, Glass), "a dielectric's"
+    return lost
+
+
 def at_places(
-    model: OpenPBR, ratio: Scalar, eta: Scalar, medium: Scalar
+    model: _OpenPBR, ratio: Scalar, eta: Scalar, medium: Scalar
 ) -> tuple[list[Scalar], tuple[Spectrum, ...], Scalar]:
     """F of the bare dielectric at `PLACES`, what a film adds there, and the mean of that."""
-    cosines = [x + 0.0 * ratio for x in PLACES]
+    cosines = [x + zeros_like(ratio) for x in PLACES]
     bare = [exact.dielectric(cos, fresnel.cos_transmitted(cos, ratio), ratio) for cos in cosines]
-    if not model._has("thin_film_weight"):
-        return bare, (), 0.0 * ratio
+    if not model.has("thin_film_weight"):
+        return bare, (), zeros_like(ratio)
     filmed = tuple(
-        (model._clear_film(cos, eta, medium) - one) * model.thin_film_weight
+        (model.clear_film(cos, eta, medium) - one) * model.thin_film_weight
         for cos, one in zip(cosines, bare, strict=True)
     )
     return bare, filmed, mean(averaged(list(filmed)))
 
 
 def misses_otherwise(
-    model: OpenPBR, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
+    model: _OpenPBR, glass: Glass, bare: list[Scalar], filmed: tuple[Spectrum, ...], rough: Scalar, eta: Scalar
 ) -> Other:
     """What that glass misses more or less than bare glass of index eta."""
-    white = 1.0 + 0.0 * model.base_color
+    white = ones_like(model.base_color)
     less, reflected = [], white * fresnel.kind("exact").dielectric_average(eta)
     for n, (x, one, weight) in enumerate(zip(PLACES, bare, WEIGHTS, strict=True)):
-        cos = x + 0.0 * eta
+        cos = x + zeros_like(eta)
         known = exact.dielectric(cos, fresnel.cos_transmitted(cos, eta), eta)
         less.append(white * (one - known) + filmed[n] if filmed else white * (one - known))
         reflected = reflected + less[-1] * weight
     few = tuple(total_of([one * share for one, share in zip(less, row, strict=True)]) for row in FROM_PLACES)
-    shares = tables.spared_on_average(rough, eta, model._masking)
+    shares = tables.spared_on_average(rough, eta, model.masking)
     count = len(few)
     thin, dense = (
-        maximum(over_pi(side.whole) + total_of([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
+        maximum(over_pi(side.true_scale) + total_of([one * d for one, d in zip(few, part, strict=True)]), 2.0 * NOTHING)
         for side, part in ((glass.thin, shares[:count]), (glass.dense, shares[count:]))
     )
     enters = (1.0 - reflected) / (thin + dense)
     return Other(few, thin, dense, enters * dense, enters * thin / sqr(eta))
 
 
-def kept_at_nodes(model: OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
+def kept_at_nodes(model: _OpenPBR, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> list[Spectrum]:
     """1 - E of the base's dielectric surface at the roots of cosines `NODES`."""
-    found = []
-    E_of = tables.reflected_at_nodes(rough, ratio, model._masking)[HATS:]
-    faced = tables.faced_at_nodes(rough, model._masking) if filmed else [()] * len(E_of)
+    kept_of = []
+    E_of = tables.reflected_at_nodes(rough, ratio, model.masking)[HATS:]
+    faced = tables.faced_at_nodes(rough, model.masking) if filmed else [()] * len(E_of)
     for E, shares in zip(E_of, faced, strict=True):
-        found.append(1.0 - covered(E + 0.0 * model.base_color, filmed, shares))
-    return found
+        kept_of.append(1.0 - covered(E + zeros_like(model.base_color), filmed, shares))
+    return kept_of
 
 
-def balanced(model: OpenPBR, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar, ...]:
+def balanced(model: _OpenPBR, rough: Scalar, transmitted: list[Scalar]) -> tuple[Scalar, ...]:
     """w at nodes of the cosine, with w(o) int w(i) P(o, i) = 1 - E_coat(o), P what white facets scatter.
 
     A few steps of Sinkhorn's iteration, damped. It starts at the solution for facets that send a share b of their
@@ -210,26 +219,26 @@ def balanced(model: OpenPBR, rough: Scalar, kept: list[Scalar]) -> tuple[Scalar,
 
     kept  1 - E_coat at the nodes
     """
-    rows, w = tables.scattered_at_nodes(rough, model._masking), []
-    q = sqrt(kept[round(0.67 * (HATS - 1))])  # where most light is
-    for n, one in enumerate(kept):
+    rows, w = tables.scattered_at_nodes(rough, model.masking), []
+    q = sqrt(transmitted[round(0.67 * (HATS - 1))])  # where most light is
+    for n, one in enumerate(transmitted):
         cos = (n / (HATS - 1.0)) ** 2
         b = sqr(rough) / (sqr(rough) + cos + 1e-3)
         w.append(2.0 * one / (b * q + sqrt(sqr(b * q) + 4.0 * (1.0 - b) * one + 1e-12)))
     for _ in range(STEPS):
-        met = [total_of([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
-        w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, kept, met, strict=True)]
+        gathered = [total_of([p * one for p, one in zip(row, w, strict=True)]) for row in rows]
+        w = [sqrt(one * share / maximum(m, 1e-4)) for one, share, m in zip(w, transmitted, gathered, strict=True)]
     return tuple(w)
 
 
 def returned_less(
-    model: OpenPBR, rough: Scalar, ratio: Scalar, kept: list[Scalar], facets: tuple[Scalar, ...]
+    model: _OpenPBR, rough: Scalar, ratio: Scalar, transmitted: list[Scalar], facets: tuple[Scalar, ...]
 ) -> Scalar:
     """The mean of E (1 - E_coat - w <w>), see `layers.under`."""
-    E_of = tables.reflected_at_nodes(rough, ratio, model._masking)[:HATS]
-    rows = tables.scattered_at_nodes(rough, model._masking)
+    E_of = tables.reflected_at_nodes(rough, ratio, model.masking)[:HATS]
+    rows = tables.scattered_at_nodes(rough, model.masking)
     less = []
-    for n, (E, one, w, row) in enumerate(zip(E_of, kept, facets, rows, strict=True)):
-        cos = (n / (HATS - 1.0)) ** 2 + 0.0 * rough
+    for n, (E, one, w, row) in enumerate(zip(E_of, transmitted, facets, rows, strict=True)):
+        cos = (n / (HATS - 1.0)) ** 2 + zeros_like(rough)
         less.append(E * (one - w * seen_by(cos, ratio, row, facets)) * tables.MEANS[n])
     return total_of(less)

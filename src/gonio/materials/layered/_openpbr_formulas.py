@@ -29,7 +29,7 @@ from ...ops.backend import Array
 from ...optics import frame, fresnel
 from ...optics.fresnel.schlick import schlick
 from ...optics.special import gauss
-from ._openpbr_tables import HATS, LARGEST
+from ._openpbr_tables import HATS, MAX_ROOT_F0
 
 
 def mix(a: Array, b: Array, share: Scalar) -> Array:
@@ -41,7 +41,7 @@ def mix(a: Array, b: Array, share: Scalar) -> Array:
 def modulated(ratio: Scalar, weight: Scalar) -> Scalar:
     """The index whose F0 is that of `ratio` times a weight, held at index 5."""
     root = (ratio - 1.0) / (ratio + 1.0)
-    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), LARGEST), root)
+    epsilon = ops.copysign(minimum(abs(root) * sqrt(maximum(weight, 1e-24)), MAX_ROOT_F0), root)
     return (1.0 + epsilon) / (1.0 - epsilon)
 
 
@@ -56,13 +56,13 @@ def seen_by(cos: Scalar, ratio: Scalar, row: tuple[Scalar, ...], facets: tuple[S
     """<w>: the mean factor of facets over what those of a dielectric send to a direction of a cosine. They reflect most
     where light grazes: shares of the light are white facets' times F of the facet half way between."""
     sin, r0 = safe_sqrt(1.0 - sqr(cos)), fresnel.r0_dielectric(ratio)
-    met, total = 0.0 * cos, 0.0 * cos
+    weighted, total = ops.zeros_like(cos), ops.zeros_like(cos)
     for n, (share, w) in enumerate(zip(row, facets, strict=True)):
         other = (n / (HATS - 1.0)) ** 2
         half = safe_sqrt(0.5 + 0.5 * (other * cos - math.sqrt(1.0 - other * other) * sin))
         one = share * schlick(half, r0)
-        met, total = met + one * w, total + one
-    return met / maximum(total, 1e-9)
+        weighted, total = weighted + one * w, total + one
+    return weighted / maximum(total, 1e-9)
 
 
 @function
@@ -75,9 +75,9 @@ def rough_along(w: Direction, alpha: Pair, index: Scalar) -> Scalar:
     return minimum(sqrt(sqrt(total * ops.exp(share * log(seen2 / total)))), 1.0)
 
 
-def covered_less(kept: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
+def covered_less(transmitted: Scalar, less: Scalar, let_in: Spectrum) -> Spectrum:
     """What a coat leaves of light that facets let in: its own, and what they send out less than white ones."""
-    return kept + less * (1.0 - let_in) / maximum(let_in, 1e-3)
+    return transmitted + less * (1.0 - let_in) / maximum(let_in, 1e-3)
 
 
 def covered(E: Spectrum, filmed: tuple[Spectrum, ...], shares: tuple[Scalar, ...]) -> Spectrum:

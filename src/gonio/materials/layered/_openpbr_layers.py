@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from ... import ops
 from ...material import binding
 from ...ops import (
     Direction,
@@ -16,22 +17,23 @@ from ...ops import (
     inv_pi,
     maximum,
     minimum,
+    ones_like,
     safe_sqrt,
     sqr,
     sqrt,
     where,
+    zeros_like,
 )
 from ...optics import fresnel
 from ...optics.fresnel import exact
 from ..diffuse.eon import AVERAGE as MEAN_LOSS
 from ..diffuse.eon import GRAZING as GRAZING_LOSS
 from ..diffuse.eon import Eon
+from ..sheen.sheen import Sheen
 from . import _openpbr_tables as tables
-from ._openpbr_formulas import covered_less, direction_at, mix, power, rough_along, seen_by, total_of
+from ._openpbr_formulas import covered, covered_less, direction_at, mix, power, rough_along, seen_by, total_of
+from ._openpbr_slabs import _OpenPBR
 from ._openpbr_tables import HATS, NODES
-
-if TYPE_CHECKING:
-    from .openpbr import OpenPBR
 
 
 class Sides(NamedTuple):
@@ -48,39 +50,59 @@ class Sides(NamedTuple):
     above: Mask
 
 
-def even(model: OpenPBR, w: Direction, coated: bool) -> Scalar:
+def let_in(model: _OpenPBR, w: Direction) -> Spectrum:
+    """1 - E of the base's dielectric surface; of two widths that of the one that stands for them along w."""
+    b = model.derived
+    rough = b.rough
+    if model.anisotropic:
+        rough = rough_along(w, b.alpha, b.ratio)
+    return kept_below(model, w.z, rough, b.ratio, b.filmed)
+
+
+def kept_below(model: _OpenPBR, cos: Scalar, rough: Scalar, ratio: Scalar, filmed: tuple[Spectrum, ...]) -> Spectrum:
+    """The same by what follows from the parameters."""
+    E = tables.reflected(cos, rough, ratio, model.masking) + ops.zeros_like(model.base_color)
+    return 1.0 - covered(E, filmed, tables.faced(cos, rough, model.masking) if filmed else ())
+
+
+def fuzz_lobe(model: _OpenPBR) -> Sheen:
+    """The fuzz as the `sheen` of its color and roughness."""
+    return binding.bound_copy(Sheen(), {"albedo": model.fuzz_color, "roughness": model.fuzz_roughness})
+
+
+def even(model: _OpenPBR, w: Direction, coated: bool) -> Scalar:
     """Factor of the rough diffuse lobe at a direction, under the base's surface or the coat's too.
 
     The lobe sends more light to some cosines than Lambert's, and those surfaces let less through there. Its mean
     over azimuth is known: the factor makes a white base whole to second order.
     """
     rough = model.base_diffuse_roughness
-    lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": 1.0 + 0.0 * model.base_color, "roughness": rough})
-    sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), 0.0 * w.z
+    lobe = binding.bound_copy(Eon(energy="fit"), {"albedo": ones_like(model.base_color), "roughness": rough})
+    sin, lost, total = safe_sqrt(1.0 - sqr(w.z)), lobe._lost(w), zeros_like(w.z)
     nodes = [x * x for x in NODES]
     for node, off in zip(nodes, model.derived.bent[coated], strict=True):
         slant = sin * (math.sqrt(1.0 - node * node) * inv_pi) * (1.0 / maximum(w.z, node) - 1.0)
-        twice = lost * (lobe._lost(direction_at(node + 0.0 * w.z)) / (GRAZING_LOSS - MEAN_LOSS))
+        twice = lost * (lobe._lost(direction_at(node + zeros_like(w.z))) / (GRAZING_LOSS - MEAN_LOSS))
         total = total + off * (slant + twice)
     return 1.0 / (1.0 + lobe._single() * rough * total)
 
 
-def coat_kept(model: OpenPBR, w: Direction) -> Scalar:
+def coat_kept(model: _OpenPBR, w: Direction) -> Scalar:
     """1 - E of the coat's surface; of two widths as `_let_in`."""
     rough = model.coat_roughness
-    if model._is_drawn_out("coat_roughness_anisotropy"):
+    if model.may_be_anisotropic("coat_roughness_anisotropy"):
         rough = rough_along(w, model.derived.coat_alpha, model.coat_ior)
-    return 1.0 - tables.reflected(w.z, rough, model.coat_ior, model._masking)
+    return 1.0 - tables.reflected(w.z, rough, model.coat_ior, model.masking)
 
 
 @function
-def inside(model: OpenPBR, cos: Scalar) -> Scalar:
+def inside(model: _OpenPBR, cos: Scalar) -> Scalar:
     """The cosine in the coat."""
     return maximum(safe_sqrt(1.0 - (1.0 - sqr(cos)) / sqr(model.coat_ior)), 0.05)
 
 
 @function
-def darkened(model: OpenPBR, cos: Scalar) -> Spectrum:
+def darkened(model: _OpenPBR, cos: Scalar) -> Spectrum:
     """(1 - K) / (1 - E_b K), K what the coat sends back down, E_b the base's albedo from above."""
     b = model.derived
     outer = exact.dielectric(cos, fresnel.cos_transmitted(cos, model.coat_ior), model.coat_ior)
@@ -89,13 +111,13 @@ def darkened(model: OpenPBR, cos: Scalar) -> Spectrum:
     rough = mix(1.0, model.specular_roughness, f0)
     K = mix(outer, broad, mix(rough, model.specular_roughness, model.base_metalness))
     body = mix(model.base_color * model.base_weight, model.subsurface_color, model.subsurface_weight)
-    body = mix(body, 1.0 + 0.0 * body, model.transmission_weight)
+    body = mix(body, ones_like(body), model.transmission_weight)
     metal = model.base_color * (model.base_weight * minimum(model.specular_weight, 1.0))
     E_b = mix(f0 + (1.0 - f0) * body, metal, model.base_metalness)
     return mix(1.0, (1.0 - K) / (1.0 - E_b * K), model.coat_darkening)
 
 
-def under(model: OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
+def under(model: _OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scalar]:
     """At a direction outside: what the coat's surface lets through, what its colour leaves of one crossing with
     the root of the darkening, the factor of a lobe of facets, and what those of a dielectric, for all that they
     reflect, send out less than white ones: they reflect most where light grazes, and the coat covers most there.
@@ -103,17 +125,17 @@ def under(model: OpenPBR, w: Direction) -> tuple[Scalar, Spectrum, Scalar, Scala
     A last step of the iteration (`balanced`): of a mirror the root of 1 - E, as exact as that itself.
     """
     b, cos = model.derived, w.z
-    kept = coat_kept(model, w)
+    transmitted = coat_kept(model, w)
     tint = power(model.coat_color, 0.5 / inside(model, cos)) * sqrt(darkened(model, cos))
     place = sqrt(maximum(cos, 0.0)) * (HATS - 1.0)
     here = total_of([maximum(1.0 - abs(place - float(n)), 0.0) * w for n, w in enumerate(b.facets)])
-    row = tables.scattered(cos, b.rough, model._masking)
-    met = total_of([p * w for p, w in zip(row, b.facets, strict=True)])
-    facets = sqrt(here * kept / maximum(met, 1e-4))
-    return kept, tint, facets, kept - facets * seen_by(cos, b.ratio, row, b.facets)
+    row = tables.scattered(cos, b.rough, model.masking)
+    gathered = total_of([p * w for p, w in zip(row, b.facets, strict=True)])
+    facets = sqrt(here * transmitted / maximum(gathered, 1e-4))
+    return transmitted, tint, facets, transmitted - facets * seen_by(cos, b.ratio, row, b.facets)
 
 
-def through_coat(model: OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
+def through_coat(model: _OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum]) -> tuple[Spectrum, Spectrum]:
     """Factors of the base's facets and of its diffuse lobe, of which those let in so much from both directions; 1
     where there is no coat on their side."""
     C = model.coat_weight
@@ -128,21 +150,21 @@ def through_coat(model: OpenPBR, pair: Sides, let_in: tuple[Spectrum, Spectrum])
     tint = tint_o * tint_i
     facets = (1.0 - C) + tint * (facet_o * facet_i * C)
     both = 1.0 / model.derived.joint
-    for kept, less, let in ((kept_o, less_o, let_in[0]), (kept_i, less_i, let_in[1])):
-        both = both * covered_less(kept, less, let)
-    if model._bends:
+    for transmitted, less, let in ((kept_o, less_o, let_in[0]), (kept_i, less_i, let_in[1])):
+        both = both * covered_less(transmitted, less, let)
+    if model.balances_diffuse:
         for w in (pair.wo, pair.wi):
             both = both * (even(model, w, True) / even(model, w, False))
     diffuse = (1.0 - C) + tint * (both * C)
     return where(pair.above, facets, 1.0), where(pair.above, diffuse, 1.0)
 
 
-def past_layers(model: OpenPBR, w: Direction) -> Spectrum:
+def past_layers(model: _OpenPBR, w: Direction) -> Spectrum:
     """What coat and fuzz leave of light that passes them once, on its way in or out."""
-    left = 1.0 + 0.0 * model.base_color
-    if model._has("coat_weight"):
-        kept, tint, _, less = under(model, w)
-        left = mix(1.0, tint * covered_less(kept, less, model._let_in(w)), model.coat_weight) * left
-    if model._has("fuzz_weight"):
-        left = left * (1.0 - model.fuzz_weight * model._fuzz()._lobe(w).R)
+    left = ones_like(model.base_color)
+    if model.has("coat_weight"):
+        transmitted, tint, _, less = under(model, w)
+        left = mix(1.0, tint * covered_less(transmitted, less, let_in(model, w)), model.coat_weight) * left
+    if model.has("fuzz_weight"):
+        left = left * (1.0 - model.fuzz_weight * fuzz_lobe(model)._lobe(w).R)
     return left

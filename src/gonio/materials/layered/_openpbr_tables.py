@@ -16,6 +16,7 @@ from ...ops.backend import Array
 from ...ops.table import read_in_numpy
 from ...optics import frame, fresnel
 from ...optics import masking as terms
+from ...optics.lattice import r_sequence
 from ...optics.ndf import NDF
 from ...optics.roughness import SMOOTH
 from ...optics.special import gauss
@@ -23,7 +24,7 @@ from ..compensated.kulla_conty import KullaConty
 from ..microfacet.conductor import Conductor
 
 SHARP = math.sqrt(SMOOTH)  # roughness of the tables' first row: below it facets are a mirror, whatever it is
-LARGEST = 2.0 / 3.0  # root of F0 at index 5, where the tables end
+MAX_ROOT_F0 = 2.0 / 3.0  # root of F0 at index 5, where the tables end
 INDICES, ROUGHNESSES, COSINES = 33, 33, 65  # at grazing angles F is met to 2e-3 whatever the index, else to 5e-4
 DRAWS = 1 << 12  # of each direction
 HATS = 12  # nodes of the cosine, over its root: a white coated metal is met to .5 %, with 8 to 1 %
@@ -37,7 +38,7 @@ def _row(roughness: Scalar) -> Scalar:
 
 def _root_of(eta: Scalar) -> Scalar:
     """Where an index stands in the tables: nodes get closer toward 1, where F changes fastest at grazing angles."""
-    return sqrt(maximum(eta - 1.0, 1e-12) / ((eta + 1.0) * LARGEST))
+    return sqrt(maximum(eta - 1.0, 1e-12) / ((eta + 1.0) * MAX_ROOT_F0))
 
 
 def _rows(count: int) -> np.ndarray:
@@ -59,7 +60,7 @@ def _albedos(masking: str) -> Table:
     """E over (root of sqrt(F0), roughness, root of the cosine)."""
 
     def build() -> np.ndarray:
-        root = np.linspace(0.0, 1.0, INDICES)[:, None, None] ** 2 * LARGEST
+        root = np.linspace(0.0, 1.0, INDICES)[:, None, None] ** 2 * MAX_ROOT_F0
         alpha = _rows(ROUGHNESSES)[None, :, None] ** 2
         mu = np.linspace(0.0, 1.0, COSINES)[None, None, :] ** 2
         eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-6)
@@ -78,15 +79,15 @@ def reflected_at_nodes(roughness: Scalar, index: Scalar, masking: str) -> tuple[
 def scattered_at_nodes(roughness: Scalar, masking: str) -> list[tuple[Scalar, ...]]:
     """`scattered` at the cosines of `HATS`."""
     table = _at_nodes(masking).scattered
-    found = lookup(table, inset(_row(roughness), *table.shape))
-    return [found[n : n + HATS] for n in range(0, HATS * HATS, HATS)]
+    shares = lookup(table, inset(_row(roughness), *table.shape))
+    return [shares[n : n + HATS] for n in range(0, HATS * HATS, HATS)]
 
 
 def faced_at_nodes(roughness: Scalar, masking: str) -> list[tuple[Scalar, ...]]:
     """`faced` at the cosines of `NODES`."""
     table = _at_nodes(masking).faced
-    found, count = lookup(table, inset(_row(roughness), *table.shape)), len(PLACES)
-    return [found[n : n + count] for n in range(0, count * len(NODES), count)]
+    shares, count = lookup(table, inset(_row(roughness), *table.shape)), len(PLACES)
+    return [shares[n : n + count] for n in range(0, count * len(NODES), count)]
 
 
 class _AtNodes(NamedTuple):
@@ -127,17 +128,16 @@ def _scattering(masking: str) -> Table:
     def build() -> np.ndarray:
         cos = np.maximum(np.linspace(0.0, 1.0, COSINES) ** 2, 1e-4)
         wo = np.repeat(np.stack([np.sqrt(1.0 - cos * cos), 0.0 * cos, cos], -1), DRAWS, 0)
-        # R3, powers of x^4 = x + 1
-        u = np.tile(np.arange(1, DRAWS + 1)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0) % 1.0, (COSINES, 1))
-        found = []
+        u = np.tile(r_sequence(DRAWS, 3), (COSINES, 1))
+        rows = []
         for roughness in _rows(ROUGHNESSES):
             drawn = KullaConty(Conductor(alpha=roughness**2, fresnel="one", masking=masking)).sample(wo, u)
             weight = np.where(drawn.pdf > 0.0, drawn.weight[:, 0], 0.0)
             hats = _hats(np.sqrt(np.clip(drawn.wi[:, 2], 0.0, 1.0))) * weight[:, None]
-            found.append(hats.reshape(COSINES, DRAWS, HATS).mean(1))
-        shares = np.array(found)
-        whole: np.ndarray = shares / shares.sum(-1, keepdims=True)
-        return whole
+            rows.append(hats.reshape(COSINES, DRAWS, HATS).mean(1))
+        shares = np.array(rows)
+        normalized: np.ndarray = shares / shares.sum(-1, keepdims=True)
+        return normalized
 
     values = cache.remember(("openpbr-scattered", masking, ROUGHNESSES, COSINES, HATS), build)
     return Table("openpbr_scattered", values)
@@ -148,11 +148,11 @@ def _hats(x: np.ndarray) -> np.ndarray:
     lines what layers let through, which is bent, is too small in the mean; beyond the ends it goes straight on."""
     d = np.abs(x[:, None] * (HATS - 1) - np.arange(-1, HATS + 1))
     near, far = 1.0 + d * d * (1.5 * d - 2.5), 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)
-    found: np.ndarray = np.where(d < 1.0, near, np.where(d < 2.0, far, 0.0))
+    weights: np.ndarray = np.where(d < 1.0, near, np.where(d < 2.0, far, 0.0))
     for ghost, end, next_one in ((0, 1, 2), (HATS + 1, HATS, HATS - 1)):
-        found[:, end] += 2.0 * found[:, ghost]
-        found[:, next_one] -= found[:, ghost]
-    return found[:, 1:-1]
+        weights[:, end] += 2.0 * weights[:, ghost]
+        weights[:, next_one] -= weights[:, ghost]
+    return weights[:, 1:-1]
 
 
 # means with the cosine of what is known at those nodes
@@ -174,14 +174,14 @@ def prepare(masking: str) -> None:
 
 def shares_of(x: Array, places: list[float]) -> list[Array]:
     """Lagrange's polynomials: by how much the value at each place counts at x."""
-    found = []
+    shares = []
     for n, here in enumerate(places):
         others = [one for m, one in enumerate(places) if m != n]
         value: Array = 1.0
         for one in others:
             value = value * ((x - one) * (1.0 / (here - one)))
-        found.append(value)
-    return found
+        shares.append(value)
+    return shares
 
 
 FROM_PLACES: list[list[float]] = np.array(
@@ -244,7 +244,7 @@ def _spared(masking: str) -> tuple[Table, Table]:
         return tuple(more * share for share in shares_of(ops.where(eta > 1.0, o_m, cos_t), FEW_PLACES))
 
     def build() -> np.ndarray:
-        root = np.linspace(0.0, 1.0, LOSS_INDICES)[:, None, None] ** 2 * LARGEST
+        root = np.linspace(0.0, 1.0, LOSS_INDICES)[:, None, None] ** 2 * MAX_ROOT_F0
         eta = np.maximum((1.0 + root) / (1.0 - root), 1.0 + 1e-4)
         alpha = _rows(LOSS_ROUGHNESSES)[None, :, None] ** 2
         x, w = gauss(16)

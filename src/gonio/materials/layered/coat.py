@@ -9,8 +9,8 @@ from ... import ops
 from ...errors import InputError
 from ...material import (
     BSDF,
-    Breach,
     Colour,
+    KnownViolation,
     Number,
     Sample,
     Width,
@@ -26,11 +26,12 @@ from ...material import width as width_parameter
 from ...material.bsdf import Delta
 from ...ops import Direction, Mode, Pair, Scalar, Spectrum, clamp, exp, function, inv_pi, maximum, mean, sqr, where
 from ...optics import frame, fresnel
+from ...optics.fresnel import exact
 from ...optics.roughness import widths
 from ...optics.warp import square_to_cosine_hemisphere
 from ..microfacet import microfacet  # fmt: skip
 from ..microfacet.dielectric import Dielectric
-from .interior import Account, account_of, colour_of, colour_place, left_place
+from .interior import LayerTables, colour_of, colour_place, left_place, tables_of
 
 BOUNCES = {
     "coloured": "the base's, once more with each bounce: deeper and darker than the base alone",
@@ -59,8 +60,8 @@ class Coat(BSDF):
     other value may, and derivatives leave the change of the tables out.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "what a rough top reflects and lets through is met to so much, by draws of rough glass",
             lambda model: 0.0 if microfacet.delta_of(model.alpha) == "always" else 0.004,
             certain=False,
@@ -98,11 +99,11 @@ class Coat(BSDF):
 
     def prepare(self) -> None:
         """Find the tables, before a loop is recorded."""
-        account_of(self.plain)
+        tables_of(self.plain)
 
     @property
-    def _account(self) -> Account:
-        return account_of(self.plain)
+    def _tables(self) -> LayerTables:
+        return tables_of(self.plain)
 
     @property
     def _mirror(self) -> bool:
@@ -113,7 +114,7 @@ class Coat(BSDF):
     def _top(self) -> Dielectric:
         """The outside, as glass that only reflects."""
         kind = Dielectric(transmission=False, ndf=self.ndf, masking=self.masking)
-        one = 1.0 + 0.0 * self.absorption
+        one = ops.ones_like(self.absorption)
         return binding.bound_copy(kind, {"eta": self.index, "alpha": self.alpha, "rotation": None, "albedo": one})
 
     # ------------------------------------------------------------------ formulas
@@ -129,12 +130,11 @@ class Coat(BSDF):
         """T of a smooth top, by Fresnel's equations: not 1 - R, which at grazing angles has no digits left."""
         cos = ops.abs(w.z)
         cos_t = fresnel.cos_transmitted(cos, self.index)
-        across, along = cos + self.index * cos_t, self.index * cos + cos_t
-        return 2.0 * self.index * cos * cos_t * (1.0 / sqr(across) + 1.0 / sqr(along))
+        return exact.transmittance(cos, cos_t, self.index)
 
     def _at(self, w: Direction) -> tuple[Scalar, ...]:
         """The coat's table at a direction outside."""
-        table = self._account.coat
+        table = self._tables.coat
         at = ops.inset(ops.sqrt(ops.abs(w.z)), table.shape[0])
         return ops.lookup(table, at)
 
@@ -156,26 +156,24 @@ class Coat(BSDF):
 
     def _colour(self, w: Direction) -> Spectrum:
         """a: what colours the base's light, with each bounce."""
-        white = 1.0 + 0.0 * self.absorption
-        up = ops.vec3(0.0 * w.z, 0.0 * w.z, 1.0 + 0.0 * w.z)
+        white = ops.ones_like(self.absorption)
+        up = ops.vec3(ops.zeros_like(w.z), ops.zeros_like(w.z), ops.ones_like(w.z))
         return clamp(colour_of(self.base, up) * white, 0.0, 1.0)
 
     def _bounced_again(self, a: Spectrum, wo: Direction, wi: Direction) -> tuple[Spectrum, Spectrum]:
         """(factor of the base's lobe, the separable lobe), of what bounces between coat and base of colour a."""
-        met = 1.0 + 0.0 * a if self.bounces == "white" else a
-        u = self._crossed() + 0.0 * a
-        account, ends = self._account, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
+        bounce_color = ops.ones_like(a) if self.bounces == "white" else a
+        u = self._crossed() + ops.zeros_like(a)
+        tables, ends = self._tables, [ops.sqrt(ops.abs(w.z)) for w in (wo, wi)]
         factors, rests = [], []
-        for colour, left in zip(ops.channels(colour_place(met)), ops.channels(left_place(u)), strict=True):
-            place = [ops.inset(x, n) for x, n in zip((colour, left), account.again.shape, strict=True)]
-            over_factor, norm = ops.lookup(account.again, *place)
+        for colour, left in zip(ops.channels(colour_place(bounce_color)), ops.channels(left_place(u)), strict=True):
+            place = [ops.inset(x, n) for x, n in zip((colour, left), tables.bounced.shape, strict=True)]
+            over_factor, norm = ops.lookup(tables.bounced, *place)
             factors.append(1.0 / over_factor)
-            if account.rest is not None:
-                at_o, at_i = (
-                    ops.lookup(account.rest, ops.inset(end, account.rest.shape[0]), *place)[0] for end in ends
-                )
+            if tables.rest is not None:
+                at_o, at_i = (ops.lookup(tables.rest, ops.inset(end, tables.rest.shape[0]), *place)[0] for end in ends)
                 rests.append(at_o * at_i * ops.safe_div(1.0, norm))
-        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else 0.0 * a
+        rest = ops.of_channels(a, rests) * a * sqr(u) if rests else ops.zeros_like(a)
         return ops.of_channels(a, factors), rest
 
     @method
@@ -202,10 +200,10 @@ class Coat(BSDF):
         through = where(smooth, self._sharp(wo), 1.0 - reflected)
         reflected = where(smooth, sharp, reflected)
         inner = self._inside(wo)
-        tint = clamp(self.base.tint(inner) * (1.0 + 0.0 * self.absorption), 0.0, 1.0)
+        tint = clamp(self.base.tint(inner) * ops.ones_like(self.absorption), 0.0, 1.0)
         below = through * mean(self._left(inner) * tint) + 2.0 * beyond
         under = clamp((below + 1e-3) / (reflected + below + 1e-3), 0.02, 0.98)  # without a jump at a black base
-        cosine = 0.0 * even if self._mirror else even
+        cosine = ops.zeros_like(even) if self._mirror else even
         return ops.vec2(under, cosine)
 
     @method
@@ -215,7 +213,7 @@ class Coat(BSDF):
         above = (wo.z > 0.0) & (wi.z > 0.0)
         top = self._top.pdf(wo, wi)
         if self._mirror:
-            return 0.0 * top
+            return ops.zeros_like(top)
         o, i = self._inside(wo), self._inside(wi)
         base = self.base.pdf(o, i) * wi.z / (sqr(self.index) * maximum(i.z, frame.TINY))
         below = shares.y * wi.z * inv_pi + (1.0 - shares.y) * base
@@ -253,7 +251,7 @@ class Coat(BSDF):
             weight = where(from_base, s_base.weight * self._bounced(wo, o), weight)
             weight = where(from_base, weight * ops.safe_div(1.0, shares.x), weight)
         pdf = where((wo.z > 0.0) & (wi.z > 0.0), where(delta, ideal, density), 0.0)
-        return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), 1.0 + 0.0 * pdf)
+        return Sample(wi, where(pdf > 0.0, weight, 0.0), pdf, delta & (pdf > 0.0), ops.ones_like(pdf))
 
     @function
     def _bounced(self, wo: Direction, inner: Direction) -> Spectrum:
@@ -263,9 +261,9 @@ class Coat(BSDF):
         tint = self.base.tint(inner)
         return sqr(through) * left2 / (1.0 - (k if self.bounces == "white" else k * tint))
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Over the white base, and without absorption."""
-        white = self.base.white()
+        white = self.base.lossless()
         values = {"base": white, "absorption": self.absorption * 0.0 if self.is_bound else 0.0}
         return binding.bound_copy(self, values) if self.is_bound else tree.rebuild(self, values)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple, Self
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, never
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Angle, Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -79,20 +79,20 @@ class Disney(BSDF):
     clearcoat: Number = number(default=0.0, doc="strength of the second lobe", low=0.0, high=1.0)
     clearcoat_gloss: Number = number(default=1.0, doc="0 is satin, 1 gloss", low=0.0, high=1.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "the lobes are added, and rough diffuse reflection gains at grazing angles: nothing bounds their sum",
             2.5,
             certain=False,
         ),
-        "linearity": Breach("tints are ratios of the base colour to its mean", 10.0, certain=False),
+        "linearity": KnownViolation("tints are ratios of the base colour to its mean", 10.0, certain=False),
     }
 
     @property
     def isotropic(self) -> bool:
         return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
 
-    def white(self) -> Self:
+    def lossless(self) -> Self:
         """Itself: no values of the added lobes return all light."""
         return self
 
@@ -105,7 +105,7 @@ class Disney(BSDF):
 
     @function
     def _coat_width(self) -> Scalar:
-        """.1 to .001."""
+        """alpha of the clearcoat: 0.1 for satin to 0.001 for gloss."""
         return 0.1 + self.clearcoat_gloss * (0.001 - 0.1)
 
     @function
@@ -113,11 +113,11 @@ class Disney(BSDF):
         """The base colour over its mean, 1 of black."""
         level = mean(self.base_color)
         some = level > 0.0
-        return where(some, self.base_color / where(some, level, 1.0), 1.0 + 0.0 * self.base_color)
+        return where(some, self.base_color / where(some, level, 1.0), ops.ones_like(self.base_color))
 
     @function
     def _normal_reflectance(self) -> Spectrum:
-        """F0."""
+        """F0, the reflectance at normal incidence."""
         tinted = 1.0 + (self._tint() - 1.0) * self.specular_tint
         dielectric = tinted * (0.08 * self.specular)
         return dielectric + (self.base_color - dielectric) * self.metallic
@@ -144,7 +144,7 @@ class Disney(BSDF):
         f0 = self._normal_reflectance()
         four = 4.0 * wo.z
         specular = (f0 + (1.0 - f0) * at_h) * (ndf.D(m, alpha) * g / four)
-        satin = vec2(COAT_WIDTH + 0.0 * cos, COAT_WIDTH + 0.0 * cos)
+        satin = vec2(COAT_WIDTH + ops.zeros_like(cos), COAT_WIDTH + ops.zeros_like(cos))
         coat_g = masking.masking_shadowing("smith-separable", ndf, wo, wi, h, satin)
         strength = (0.01 + 0.24 * at_h) * self.clearcoat  # a quarter of Fresnel's
         coat = self._coat_density(h) * coat_g * strength / four
@@ -153,7 +153,7 @@ class Disney(BSDF):
             self.base_color * (_mix(diffuse, below, self.subsurface) * body * inv_pi),
             specular,
             tint * (at_h * self.sheen * body),
-            coat + 0.0 * self.base_color,
+            coat + ops.zeros_like(self.base_color),
         )
 
     @method
@@ -195,11 +195,11 @@ class Disney(BSDF):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the lobe."""
-        o = where(wo.z > 0.0, wo, frame.upright(wo))
+        o = where(wo.z > 0.0, wo, frame.normal_like(wo))
         shares = self._shares(o)
-        turned = frame.rotate(o, self.rotation)
-        m = distribution("ggx").sample_visible(turned, u.y, u.z, self._widths())
-        specular = frame.rotate_back(frame.reflect(turned, m), self.rotation)
+        wo_local = frame.rotate(o, self.rotation)
+        m = distribution("ggx").sample_visible(wo_local, u.y, u.z, self._widths())
+        specular = frame.rotate_back(frame.reflect(wo_local, m), self.rotation)
         # GTR1: cos^2 = (1 - a^(2 - 2 u)) / (1 - a^2)
         a2 = sqr(self._coat_width())
         sin2 = clamp((ops.exp(log(a2) * (1.0 - u.y)) - a2) / (1.0 - a2), 0.0, 1.0)
@@ -209,7 +209,7 @@ class Disney(BSDF):
         wi = where(u.x < shares.x, specular, where(on_coat, coat, square_to_cosine_hemisphere(u.y, u.z)))
         pdf = self.pdf(wo, wi)
         weight = self.eval(wo, wi, mode) * ops.safe_div(1.0, pdf)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """The base colour and F0."""

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ... import ops
-from ...material import BSDF, Breach, Colour, Number, Sample, binding, flag, method, number, spectrum
+from ...material import BSDF, Colour, KnownViolation, Number, Sample, binding, flag, method, number, spectrum
 from ...material.bsdf import Delta, Interior
 from ...material.parameters import Angle
 from ...ops import Direction, Mode, Node, Scalar, Spectrum, backend, clamp, max_component, sqrt, where
 from ...optics import frame
 from ...optics.roughness import SMOOTH
 from ..microfacet.microfacet import rotation_angle
-from .openpbr import Between, OpenPBR
+from ._openpbr_derived import Between
+from .openpbr import OpenPBR
 
 COAT_INDEX = 1.5  # of the clearcoat
 SATIN, GLOSS = 0.1, 0.001  # its widths at gloss 0 and 1
@@ -33,21 +34,21 @@ class _Slabs(OpenPBR):
         specular_ior: Number = number(1.5)
 
     # What there is of the slabs is known from the dials (`DisneyBSDF._kind`), whether those are recorded or not.
-    def _has(self, name: str) -> bool:
+    def has(self, name: str) -> bool:
         return bool(getattr(self.plain, name) != 0.0)
 
-    def _has_holes(self) -> bool:
+    def has_holes(self) -> bool:
         return False
 
-    def _may_be_smooth(self, name: str) -> bool:
+    def may_be_smooth(self, name: str) -> bool:
         return bool(getattr(self.plain, name) ** 2 < SMOOTH)
 
-    def _roughened(self) -> Scalar:
+    def roughened(self) -> Scalar:
         return self.specular_roughness
 
-    def _indices(self) -> tuple[Scalar, Scalar, Scalar]:
+    def indices(self) -> tuple[Scalar, Scalar, Scalar]:
         eta = ops.maximum(self.specular_ior, 1.001)
-        return eta, eta, 1.0 + 0.0 * eta
+        return eta, eta, ops.ones_like(eta)
 
 
 class DisneyBSDF(BSDF):
@@ -88,18 +89,20 @@ class DisneyBSDF(BSDF):
     flatness: Number = number(default=0.0, doc="1 takes the roughness from the diffuse lobe", low=0.0, high=1.0)
     thin: bool = flag(default=False, doc="whether it is a sheet without an inside")
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation(
             "the sheen's table of lobes is one of the viewer's direction alone",
             lambda model: 4.0 if _some(model.sheen) else 0.0,
             certain=False,
         ),
-        "energy": Breach(
-            OpenPBR.breaks["energy"].reason,
+        "energy": KnownViolation(
+            OpenPBR.known_violations["energy"].reason,
             lambda model: 0.15 if _some(model.anisotropic) else 0.01,
             certain=False,
         ),
-        "linearity": Breach("tints are ratios of the base colour, and glass takes its root", 10.0, certain=False),
+        "linearity": KnownViolation(
+            "tints are ratios of the base colour, and glass takes its root", 10.0, certain=False
+        ),
     }
 
     # ------------------------------------------------------------------ as slabs
@@ -133,7 +136,7 @@ class DisneyBSDF(BSDF):
     def _slabs(self) -> _Slabs:
         """The slabs that these dials stand for."""
         kind, colour = self._kind(), self.base_color
-        one, white = 1.0 + 0.0 * self.roughness, 1.0 + 0.0 * colour
+        one, white = ops.ones_like(self.roughness), ops.ones_like(colour)
         most = max_component(colour)
         tint = where(most > 0.0, colour / where(most > 0.0, most, 1.0), white)
         # alpha r^2 / a and r^2 a, a^2 = 1 - .9 anisotropic: the same ratio, and the roughness whose squares add up so
@@ -155,13 +158,13 @@ class DisneyBSDF(BSDF):
             "specular_ior": self.eta,
             "transmission_weight": self.spec_trans,
             "transmission_color": colour if self.thin else ops.safe_sqrt(colour),
-            "subsurface_weight": one if self.thin else 0.0 * one,
+            "subsurface_weight": one if self.thin else ops.zeros_like(one),
             "subsurface_color": colour,
             "subsurface_scatter_anisotropy": self.diff_trans - 1.0,
             "coat_weight": STRENGTH * self.clearcoat,
             "coat_roughness": sqrt(SATIN + (GLOSS - SATIN) * self.clearcoat_gloss),
             "coat_ior": COAT_INDEX * one,
-            "coat_darkening": 0.0 * one,
+            "coat_darkening": ops.zeros_like(one),
             "fuzz_weight": self.sheen * (1.0 - self.metallic),
             "fuzz_color": 1.0 + (tint - 1.0) * self.sheen_tint,
         }
@@ -190,12 +193,12 @@ class DisneyBSDF(BSDF):
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """That of the slabs."""
+        """The density of the slabs, along the axes of the anisotropy."""
         return self._slabs().pdf(self._turned(wo), self._turned(wi))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """That of the slabs."""
+        """A sample of the slabs, turned back to the surface."""
         drawn = self._slabs().sample(self._turned(wo), u, mode)
         return drawn._replace(wi=frame.rotate_back(drawn.wi, self.rotation))
 
@@ -203,7 +206,7 @@ class DisneyBSDF(BSDF):
 
     @property
     def transmits(self) -> bool:
-        return self.thin or bool(self._kind()._refracts)
+        return self.thin or bool(self._kind().refracts)
 
     @property
     def delta(self) -> Delta:
@@ -217,14 +220,14 @@ class DisneyBSDF(BSDF):
 
     @property
     def interior(self) -> Interior | None:
-        if self.thin or not self._kind()._refracts:
+        if self.thin or not self._kind().refracts:
             return None
         if not self.is_bound:
             return self.bind(backend.types("float64")).interior
-        return Interior(self._slabs()._indices()[1], 0.0 * self.base_color, 0.0 * self.eta)
+        return Interior(self._slabs().indices()[1], ops.zeros_like(self.base_color), ops.zeros_like(self.eta))
 
     def tint(self, wo: Direction) -> Spectrum:
-        """The slabs' colours."""
+        """The tint of the slabs."""
         return self._slabs().tint(wo)
 
 

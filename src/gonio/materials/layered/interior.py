@@ -39,6 +39,9 @@ from ...material import BSDF, guide_search, tree
 from ...material.parameters import pair_of
 from ...ops import Direction, Spectrum, Table, backend
 from ...ops.backend import Array
+from ...optics import frame
+from ...optics.fresnel import exact
+from ...optics.lattice import r_sequence
 from ...optics.roughness import SMOOTH
 from ..compensated.kulla_conty import KullaConty
 from ..microfacet.dielectric import Dielectric
@@ -50,23 +53,23 @@ POINTS = 1 << 13  # directions drawn at each node
 NODES = 97  # of the tables, at equal steps of the root of the cosine outside: R bends like it at grazing angles
 ROUGH = 33  # of those at which a rough interface is drawn from
 COLOURS, LEFT = 13, 13  # steps of the colour and of what one crossing leaves, see `colour_place` and `left_place`
-LEAST_LEFT = 0.03  # of the light after a crossing, the first step of that
-KEPT = 32  # accounts in memory
-LEAST = 1e-9
+MIN_LEFT = 0.03  # of the light after a crossing, the first step of that
+CACHE_SIZE = 32  # accounts in memory
+EPSILON = 1e-9
 
 
-class Account(NamedTuple):
+class LayerTables(NamedTuple):
     """What a coat must know of its inside, as tables.
 
     coat   over the root of the cosine outside, 0 to 1: the interface's albedo R, the share of the base's samples that a
            cosine should replace, the crossing of a rough interface for the base's lobe, and R's part beyond one bounce
     rest   over that root, `colour_place` and `left_place`: the separable lobe over a u^2; None where there is none
-    again  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
+    bounced  over the latter two: one over the lobe's factor, and the separable lobe's norm over a u^2
     """
 
     coat: Table
     rest: Table | None
-    again: Table
+    bounced: Table
 
 
 def colour_place(a: Array) -> Array:
@@ -91,24 +94,24 @@ class Coated(Protocol):
     masking: str
 
 
-_kept: OrderedDict[object, Account] = OrderedDict()
+_cache: OrderedDict[object, LayerTables] = OrderedDict()
 
 
-def account_of(coat: BSDF) -> Account:
+def tables_of(coat: BSDF) -> LayerTables:
     """The account of a coat as it was made, found once and kept; InputError while Dr.Jit records a loop."""
-    own = vars(coat).get("_account")
+    own = vars(coat).get("_layer_tables")
     if own is None:
         key = _bright(guide_search.plain_values(coat))
-        if key not in _kept:
+        if key not in _cache:
             if backend.drjit().flag(backend.drjit().JitFlag.SymbolicScope):
                 what = f"what lies under {type(coat).__name__} cannot be found inside a loop"
                 raise InputError(what, "eval", "call its `eval` once before the loop")
-            _kept[key] = find(key)  # type: ignore[arg-type]
-            while len(_kept) > KEPT:
-                _kept.popitem(last=False)
-        vars(coat)["_account"] = own = _kept[key]
-    found: Account = own
-    return found
+            _cache[key] = find(key)  # type: ignore[arg-type]
+            while len(_cache) > CACHE_SIZE:
+                _cache.popitem(last=False)
+        vars(coat)["_layer_tables"] = own = _cache[key]
+    tables: LayerTables = own
+    return tables
 
 
 def _bright(coat: BSDF) -> BSDF:
@@ -124,7 +127,7 @@ def colour_of(base: BSDF, up: Direction) -> Spectrum:
     """a: the tint of a bound base seen straight down, over that of its white twin; of a base that is its own white twin
     over its brightest channel."""
     tint = base.tint(up)
-    white = base.white()
+    white = base.lossless()
     if white is base:
         return ops.safe_div(tint, functools.reduce(ops.maximum, ops.channels(tint)))
     return ops.safe_div(tint, white.tint(up))
@@ -137,7 +140,7 @@ def _colours(base: BSDF) -> Floats:
     return backend.to_numpy(kind.vec3(1.0) * colour_of(base.bind(kind), up), 1)[0]
 
 
-def find(coat: Coated) -> Account:
+def find(coat: Coated) -> LayerTables:
     """The account of a coat whose shares of light are 1, one value each."""
     index = float(coat.index)  # type: ignore[arg-type]
     outside = np.linspace(0.0, 1.0, NODES) ** 2
@@ -145,17 +148,17 @@ def find(coat: Coated) -> Account:
     if coat.base.delta == "always":
         columns = [face.reflected(outside), 0.0 * outside, 1.0 - face.reflected(outside), face.beyond(outside)]
         once = Table("coat_again", np.array([1.0, 0.0]).reshape(1, 1, 2))
-        return Account(Table("coat", np.stack(columns, -1)), None, once)
-    seen = _drawn(coat.base, index)
-    totally = (seen.weight * (seen.position <= 0.0)).sum(1) / np.maximum(seen.weight.sum(1), LEAST)
+        return LayerTables(Table("coat", np.stack(columns, -1)), None, once)
+    draws = _drawn(coat.base, index)
+    totally = (draws.weight * (draws.position <= 0.0)).sum(1) / np.maximum(draws.weight.sum(1), EPSILON)
     t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
     colours = np.maximum(2.0 * t / (1.0 + t), 1e-4)
-    sums = [_series(seen, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), LEAST_LEFT)]
+    sums = [_series(draws, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
     rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
     # what is sampled by a cosine: what the base's own samples lose totally, and the rest
-    share = np.maximum(1.7 * np.interp(np.sqrt(outside), seen.place, totally), 0.7 * sums[-1].share)
+    share = np.maximum(1.7 * np.interp(np.sqrt(outside), draws.place, totally), 0.7 * sums[-1].share)
     columns = [face.reflected(outside), np.clip(share, 0.05, 0.95), face.lobe(outside), face.beyond(outside)]
-    return Account(
+    return LayerTables(
         Table("coat", np.stack(columns, -1)),
         Table("coat_rest", rest[..., None]) if rest.any() else None,
         Table("coat_again", np.stack([over_factor, norm], -1)),
@@ -184,8 +187,8 @@ class _Interface(NamedTuple):
 
     def lobe(self, x: Floats) -> Floats:
         """The crossing that the base's lobe makes at each end: a narrow one makes T(o) going in and T(i) coming out."""
-        found: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, LEAST))))
-        return found
+        crossing: Floats = np.sqrt((1.0 - self.reflected(x)) * self.out(np.sqrt(np.maximum(x, EPSILON))))
+        return crossing
 
 
 def _interface(coat: Coated, index: float) -> _Interface:
@@ -194,19 +197,14 @@ def _interface(coat: Coated, index: float) -> _Interface:
     if max(x_width, y_width) < SMOOTH or index < 1.0 + 1e-5:
 
         def fresnel(cos: Floats) -> Floats:
-            cos = np.maximum(cos, LEAST)
-            cos_t = np.sqrt(1.0 - (1.0 - cos**2) / index**2)
-            r_s = (cos - index * cos_t) / (cos + index * cos_t)
-            r_p = (index * cos - cos_t) / (index * cos + cos_t)
-            found: Floats = 0.5 * (r_s**2 + r_p**2)
-            return found
+            return exact.dielectric_array(np.maximum(cos, EPSILON), index)
 
         return _Interface(
             fresnel, lambda p: np.where(p > 0.0, 1.0 - fresnel(p * p), 0.0), lambda x: 0.0 * x, None, None
         )
     surface = KullaConty(glass)
     root = np.linspace(0.0, 1.0, ROUGH)
-    lattice = _lattice(POINTS)
+    lattice = r_sequence(POINTS, 4)
     wo, u = _directions(np.maximum(root**2, 1e-4), lattice), np.tile(lattice[:, :3], (ROUGH, 1))
     up = surface.sample(wo, u, "importance", "float64")
     weight = np.where(up.pdf > 0.0, up.weight.mean(1), 0.0).reshape(ROUGH, POINTS)
@@ -221,7 +219,7 @@ def _interface(coat: Coated, index: float) -> _Interface:
     weight /= weight.sum(1, keepdims=True)
     cosine = down.wi[:, 2].reshape(len(mu), POINTS)
     leaves = (weight * (cosine > 0.0)).sum(1)
-    stays, again = np.where(cosine < 0.0, weight, 0.0), np.clip(-cosine, 1e-4, 1.0)
+    stays, returning_cosine = np.where(cosine < 0.0, weight, 0.0), np.clip(-cosine, 1e-4, 1.0)
     # R is that of one reflection, by quadrature, and what is beyond it
     single = tree.replace(glass, {"transmission": False})
     angles = (0.0,) if x_width == y_width else (0.0, 0.25 * np.pi, 0.5 * np.pi)
@@ -235,19 +233,14 @@ def _interface(coat: Coated, index: float) -> _Interface:
         lambda p: np.interp(p, place, leaves),
         lambda cos: np.interp(np.sqrt(cos), fine, more * scale),
         (goes_in, inside, _place_of(inside, index)),
-        (stays, again, _place_of(again, index)),
+        (stays, returning_cosine, _place_of(returning_cosine, index)),
     )
-
-
-def _lattice(count: int) -> Floats:
-    """R4, powers of x^5 = x + 1."""
-    return np.arange(1, count + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5.0) % 1.0
 
 
 def _directions(mu: Floats, lattice: Floats) -> Floats:
     """Directions of each cosine at the lattice's azimuths, (len(mu) * len(lattice), 3)."""
     phi, sin = np.tile(2.0 * np.pi * lattice[:, 3], len(mu)), np.repeat(np.sqrt(1.0 - mu**2), len(lattice))
-    return np.stack([sin * np.cos(phi), sin * np.sin(phi), np.repeat(mu, len(lattice))], -1)
+    return frame.spherical_array(sin, np.repeat(mu, len(lattice)), phi)
 
 
 def _places(index: float) -> tuple[Floats, Floats]:
@@ -263,12 +256,12 @@ def _place_of(cosine: Floats, index: float) -> Floats:
     """The place of directions inside, by their cosines."""
     outside2 = 1.0 - index**2 * (1.0 - cosine**2)
     critical = np.sqrt(max(1.0 - index**-2, 0.0))
-    beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, LEAST), 0.0))
-    found: Floats = np.clip(np.where(outside2 > 0.0, np.maximum(outside2, 0.0) ** 0.25, beyond), -1.0, 1.0)
-    return found
+    beyond = -np.sqrt(np.maximum(1.0 - cosine / max(critical, EPSILON), 0.0))
+    place: Floats = np.clip(np.where(outside2 > 0.0, np.maximum(outside2, 0.0) ** 0.25, beyond), -1.0, 1.0)
+    return place
 
 
-class _Seen(NamedTuple):
+class _Draws(NamedTuple):
     """What the white base does with light inside.
 
     place, mu           of the nodes
@@ -286,12 +279,12 @@ class _Seen(NamedTuple):
     share: Floats
 
 
-def _drawn(base: BSDF, index: float) -> _Seen:
+def _drawn(base: BSDF, index: float) -> _Draws:
     """Draws of the white base's own sampling from the nodes, over all azimuths. Of a base that is its own white twin
     the brightest channel is met."""
-    white = base.white()
+    white = base.lossless()
     place, mu = _places(index)
-    lattice = _lattice(POINTS)
+    lattice = r_sequence(POINTS, 4)
     wo = _directions(mu, lattice)
     drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
     channels = drawn.weight
@@ -310,7 +303,7 @@ def _drawn(base: BSDF, index: float) -> _Seen:
     weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # a base that gains light would do so without end
     cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
     share = share.reshape(-1, len(mu), POINTS)
-    return _Seen(place, mu, weight, cosine, _place_of(cosine, index), colours, share)
+    return _Draws(place, mu, weight, cosine, _place_of(cosine, index), colours, share)
 
 
 class _Sum(NamedTuple):
@@ -322,32 +315,32 @@ class _Sum(NamedTuple):
     share: Floats
 
 
-def _series(seen: _Seen, colours: Floats, u: float, face: _Interface, index: float) -> _Sum:
+def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: float) -> _Sum:
     """The series, summed and shared out."""
-    n = len(seen.place)
-    out, t = face.out(seen.position), u ** (1.0 / seen.cosine)
-    out = np.where((seen.position <= 0.0) & (face.entering is None), 0.0, out)
+    n = len(draws.place)
+    out, t = face.out(draws.position), u ** (1.0 / draws.cosine)
+    out = np.where((draws.position <= 0.0) & (face.entering is None), 0.0, out)
     x = np.linspace(0.0, 1.0, NODES) ** 2
     root = np.sqrt(x)
-    through = u ** (1.0 / np.interp(root, seen.place, seen.mu))
-    crossing = np.where(seen.position > 0.0, face.lobe(np.maximum(seen.position, 0.0) ** 2), 0.0)
+    through = u ** (1.0 / np.interp(root, draws.place, draws.mu))
+    crossing = np.where(draws.position > 0.0, face.lobe(np.maximum(draws.position, 0.0) ** 2), 0.0)
     back = None
     if face.returning is not None:
         weight, cosine, place = face.returning
         back = _onto(weight * u ** (1.0 / cosine), place, n)
     kinds = []
-    for share in seen.share[1:]:  # of black nothing comes
-        weight = seen.weight * share
+    for share in draws.share[1:]:  # of black nothing comes
+        weight = draws.weight * share
         # a smooth interface sends light back as a mirror does
         P = (
-            _onto(weight * (1.0 - out) * t**2, seen.position, n)
+            _onto(weight * (1.0 - out) * t**2, draws.position, n)
             if back is None
-            else _onto(weight * t, seen.position, n) @ back
+            else _onto(weight * t, draws.position, n) @ back
         )
-        lobe = face.lobe(x) * through * np.interp(root, seen.place, (weight * crossing * t).sum(1))
+        lobe = face.lobe(x) * through * np.interp(root, draws.place, (weight * crossing * t).sum(1))
         kinds.append((P, (weight * out * t).sum(1), lobe))
     if face.entering is None:
-        enters = _at_nodes(root, seen.place) * ((1.0 - face.reflected(x)) * through)[:, None]
+        enters = _at_nodes(root, draws.place) * ((1.0 - face.reflected(x)) * through)[:, None]
     else:
         weight, cosine, place = face.entering
         rows = _onto(weight * u ** (1.0 / cosine), place, n)
@@ -356,16 +349,16 @@ def _series(seen: _Seen, colours: Floats, u: float, face: _Interface, index: flo
     judged = x > 1e-3  # at the horizon both vanish
     rests, factors, norms, share = [], [], [], 0.0 * x
     for a in colours:
-        mixed = [float(np.interp(a, seen.colours, one)) for one in np.eye(len(seen.colours))[1:]]
+        mixed = [float(np.interp(a, draws.colours, one)) for one in np.eye(len(draws.colours))[1:]]
         P, first, lobe = (
             sum(m * one for m, one in zip(mixed, parts, strict=True)) for parts in zip(*kinds, strict=True)
         )
         # a perfect mirror keeps forever what it reflects totally, though nothing gets there
-        leaves = enters @ np.linalg.solve(np.eye(n) - P * (1.0 - LEAST), first)
+        leaves = enters @ np.linalg.solve(np.eye(n) - P * (1.0 - EPSILON), first)
         some = judged & (lobe > 1e-6 * a)
-        factor = float(np.min((leaves / np.maximum(lobe, LEAST * a))[some], initial=1e3))
+        factor = float(np.min((leaves / np.maximum(lobe, EPSILON * a))[some], initial=1e3))
         rest = np.maximum(leaves - factor * lobe, 0.0)
-        share = rest / np.maximum(leaves, LEAST)
+        share = rest / np.maximum(leaves, EPSILON)
         rest = rest / (a * u * u)
         norm = 2.0 * np.pi * float(area @ rest)
         some_rest = norm > 1e-7  # less is roundings
@@ -383,12 +376,12 @@ def _continued(values: list[Floats]) -> Floats:
 def _onto(weight: Floats, position: Floats, n: int) -> Floats:
     """Draws of each row shared out among the nodes on both sides of their places -1 to 1, (rows, n)."""
     scaled = (position + 1.0) * (0.5 * (n - 1))
-    cell = np.minimum(scaled, n - 1 - LEAST).astype(int)
+    cell = np.minimum(scaled, n - 1 - EPSILON).astype(int)
     part, row = scaled - cell, np.arange(len(weight))[:, None] * n
     size = n * len(weight)
-    found = np.bincount((row + cell).ravel(), (weight * (1.0 - part)).ravel(), size)
-    found += np.bincount((row + cell + 1).ravel(), (weight * part).ravel(), size)
-    return np.asarray(found, float).reshape(len(weight), n)
+    sums = np.bincount((row + cell).ravel(), (weight * (1.0 - part)).ravel(), size)
+    sums += np.bincount((row + cell + 1).ravel(), (weight * part).ravel(), size)
+    return np.asarray(sums, float).reshape(len(weight), n)
 
 
 def _at_nodes(x: Floats, nodes: Floats) -> Floats:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ... import ops
-from ...material import BSDF, Breach, Sample, file, method, never
+from ...material import BSDF, KnownViolation, Sample, file, method
 from ...material.angular_range import AngularRange
 from ...measure import SAMPLE, names_table, read
 from ...measure.tables.base import Measurement, above
@@ -27,26 +27,26 @@ class Measured(BSDF):
         doc="file of measured values; behind a colon which one, of files that hold several; `sample` comes with Gonio",
     )
     only_rgb: ClassVar[bool] = True
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "the measured albedo is over 1, and shown as it is",
             lambda model: max(1.05 * float(model.table.albedos().max()) - 1.0, 0.0),
             certain=False,
         ),
-        "reciprocity": Breach(
+        "reciprocity": KnownViolation(
             "measured values are shown as they are", lambda model: 0.0 if model.table.reciprocal else 2.0, certain=False
         ),
-        "positivity": Breach(
+        "positivity": KnownViolation(
             "values below 0 were measured, and are shown; as a share of the largest",
             lambda model: 1.0 if model.table.flaws.get("negative") else 0.0,
             certain=False,
         ),
-        "isotropy": Breach(
+        "isotropy": KnownViolation(
             "the table is not its own mirror image, or its place is found by sums that lose digits where a lobe ends",
             lambda model: 0.0 if model.table.mirrored else 2.0,
             certain=False,
         ),
-        "precision": Breach(
+        "precision": KnownViolation(
             "the place in a table is found by sums that lose digits where a lobe ends",
             lambda model: 0.1 if model.table.sums else 0.0,
             certain=False,
@@ -94,4 +94,4 @@ class Measured(BSDF):
         pdf = where(above(wo, wi), pdf, 0.0)
         value = self.table.value(wo, wi)
         weight = where(pdf > 0.0, value * ops.safe_div(1.0, pdf), 0.0)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)

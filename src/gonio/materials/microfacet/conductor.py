@@ -26,7 +26,7 @@ class Conductor(_Reflector):
     eta: Colour = spectrum(default=0.0, doc="real part of the refractive index, over the outside's", low=0.0)
     k: Colour = spectrum(default=1.0, doc="imaginary part of the refractive index, over the outside's", low=0.0)
     alpha: Width = microfacet.alpha_width()
-    rotation: Angle = microfacet.rotation_angle()
+    rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
     ndf: str = microfacet.ndf_choice()
     masking: str = microfacet.masking_choice()
     fresnel: str = microfacet.fresnel_choice()

@@ -13,7 +13,7 @@ from ...material.calling import method
 from ...material.parameters import Angle, Colour, Index, Number, Width, flag, index, number, spectrum
 from ...material.polarization import Polarized
 from ...material.sample import Sample
-from ...ops import abs, backend, dot, fma, function, maximum, rsqrt, safe_div, sqr, where
+from ...ops import abs, backend, dot, fma, function, maximum, ones_like, rsqrt, safe_div, sqr, where, zeros_like
 from ...ops.types import Direction, Mask, Mode, Pair, Scalar, Spectrum
 from ...optics import frame, fresnel, indices, masking
 from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass, refracted
@@ -108,7 +108,7 @@ class Dielectric(microfacet._Microfacet):
         alpha, smooth = self._widths()
         dot_o, dot_i = dot(wo, m), dot(wi, m)
         reflects = wo.z * wi.z > 0.0
-        spread = 0.25 + 0.0 * dot_o
+        spread = 0.25 + zeros_like(dot_o)
         if self.transmission:
             # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which keeps its digits where eta is near 1
             thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
@@ -150,7 +150,7 @@ class Dielectric(microfacet._Microfacet):
 
     def _share(self, f: Scalar) -> Scalar:
         """Probability of choosing reflection."""
-        return f if self.transmission else 1.0 + 0.0 * f
+        return f if self.transmission else ones_like(f)
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """albedo F or 1 - F of the lobe over the probability with which it is chosen, which is that where both are."""
@@ -177,17 +177,17 @@ class Dielectric(microfacet._Microfacet):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
-        turned = frame.rotate(wo, self.rotation)
+        wo_local = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
-        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
+        m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
         facing = where(wo.z < 0.0, -m, m)  # a facet faces the side of wo
-        cos_o = abs(dot(turned, facing))
+        cos_o = abs(dot(wo_local, facing))
         cos_t = fresnel.cos_transmitted(cos_o, eta)
         f = self.reflectance(cos_o, cos_t, eta)
         share = self._share(f)
         reflects = u.x < share
-        wi = where(reflects, frame.reflect(turned, facing), frame.refract(turned, facing, cos_t, eta))
+        wi = where(reflects, frame.reflect(wo_local, facing), frame.refract(wo_local, facing, cos_t, eta))
         wi = frame.rotate_back(wi, self.rotation)
         sides = wo.z * wi.z
         right_side = where(reflects, sides > 0.0, sides < 0.0)
@@ -207,11 +207,11 @@ class Dielectric(microfacet._Microfacet):
         """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        m = where(delta, frame.upright(wo), m)  # equal indices send light straight on, at no normal of their own
+        m = where(delta, frame.normal_like(wo), m)  # equal indices send light straight on, at no normal of their own
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
-        through = 1.0 - f if self.transmission else 0.0 * f
+        through = 1.0 - f if self.transmission else zeros_like(f)
         ideal = where(reflects, f, through if mode == "importance" else through / sqr(eta))
         value = where(delta, self.albedo * ideal, self.eval(wo, wi, mode))
         back, on = self._polarization(cos_o, cos_i, eta)
@@ -265,7 +265,7 @@ class Dielectric(microfacet._Microfacet):
 
     def normal_reflectance(self) -> Spectrum:
         """F at normal incidence, times the albedo."""
-        one = 1.0 + 0.0 * self.eta
+        one = ones_like(self.eta)
         return self.reflectance(one, one, self.eta) * self.albedo
 
     def mean_reflectance(self, average: str = "exact") -> Scalar:

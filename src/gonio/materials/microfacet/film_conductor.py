@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from ...material.parameters import Colour, Number, choice, number, spectrum
-from ...ops import Scalar, Spectrum, function
+from ...ops import Scalar, Spectrum, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel import film
 from ...optics.fresnel.polarization import Diattenuation
@@ -52,7 +52,7 @@ class FilmConductor(Conductor):
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F of the film, times albedo, at a facet seen under cos_theta."""
         if self.fresnel == "one":
-            return self.albedo * (1.0 + 0.0 * cos_theta)
+            return self.albedo * ones_like(cos_theta)
         return self.albedo * film.reflectance(cos_theta, self._film())
 
     def _film(self) -> film.Film:
@@ -64,6 +64,6 @@ class FilmConductor(Conductor):
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
         """The integral of F, whatever fit is asked for; its rule of ten angles follows films up to about 1 um."""
         if self.fresnel == "one":
-            return 1.0 + 0.0 * self.eta
-        one = 1.0 + 0.0 * self.film_eta
+            return ones_like(self.eta)
+        one = ones_like(self.film_eta)
         return mean_over_angles(lambda mu: film.reflectance(mu * one, self._film()))

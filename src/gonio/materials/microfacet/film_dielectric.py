@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...material.bsdf import Breach, InnerAlbedo, Microsurface
+from ...material.bsdf import InnerAlbedo, KnownViolation, Microsurface
 from ...material.parameters import Colour, Number, choice, number, spectrum
-from ...ops import Mask, Scalar, Spectrum, abs, function, mean, safe_div, sqr, where
+from ...ops import Mask, Scalar, Spectrum, abs, function, mean, ones_like, safe_div, sqr, where, zeros_like
 from ...optics import fresnel
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel import film
@@ -36,29 +36,29 @@ class FilmDielectric(Dielectric):
     form: str = film_form()
 
     reads_wavelengths: ClassVar[bool] = True
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "delta": Breach("it reflects as its film does, not as the bare index would", 1.0, certain=False)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "delta": KnownViolation("it reflects as its film does, not as the bare index would", 1.0, certain=False)
     }
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Spectrum:  # type: ignore[override]
         """F of the film at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
-        white = 1.0 + 0.0 * self.albedo
+        white = ones_like(self.albedo)
         if self.fresnel == "one":
-            return white * (1.0 + 0.0 * cos_o)
-        found = film.reflectance(where(self._inside(eta), cos_t, cos_o), self._film())
-        return where(cos_t > 0.0, found, white)
+            return white * ones_like(cos_o)
+        filmed = film.reflectance(where(self._inside(eta), cos_t, cos_o), self._film())
+        return where(cos_t > 0.0, filmed, white)
 
     def _inside(self, eta: Scalar) -> Mask:
         """Whether light comes from the glass, by the index on the far side over that on its own."""
         return (eta - 1.0) * (self.eta - 1.0) < 0.0
 
     def _film(self) -> film.Film:
-        zero = 0.0 * self.albedo
+        zero = zeros_like(self.albedo)
         return film.Film(zero + self.eta, zero, self.film_eta, self.thickness, self.form, self.wavelengths)
 
     def _share(self, f: Spectrum) -> Scalar:  # type: ignore[override]
-        return mean(f) if self.transmission else 1.0 + 0.0 * mean(f)
+        return mean(f) if self.transmission else ones_like(mean(f))
 
     def _over_chance(self, facet: _Facet, eta: Scalar) -> Spectrum:
         """The lobes are chosen by their mean colours."""
@@ -83,11 +83,11 @@ class FilmDielectric(Dielectric):
         through = film.polarization(where(inside, cos_t, cos_o), self._film())[1]
         size = 1.0 / (sqr(through.c) + sqr(through.s) + 1e-12)
         cos2, sin2 = (sqr(through.c) - sqr(through.s)) * size, 2.0 * through.c * through.s * size
-        turned = Diattenuation(back.d, back.c * cos2 + back.s * sin2, back.c * sin2 - back.s * cos2)
-        total, white = reflected_by_glass(cos_o, eta), 1.0 + 0.0 * self.albedo
+        from_inside = Diattenuation(back.d, back.c * cos2 + back.s * sin2, back.c * sin2 - back.s * cos2)
+        total, white = reflected_by_glass(cos_o, eta), ones_like(self.albedo)
 
         def chosen(place: int) -> Spectrum:
-            return where(cos_t > 0.0, where(inside, turned[place], back[place]), white * total[place])
+            return where(cos_t > 0.0, where(inside, from_inside[place], back[place]), white * total[place])
 
         return Diattenuation(chosen(0), chosen(1), chosen(2)), on
 
@@ -99,8 +99,8 @@ class FilmDielectric(Dielectric):
     def mean_reflectance(self, average: str = "exact") -> Spectrum:  # type: ignore[override]
         """From outside; the integral of F, whose rule of ten angles follows films up to about 1 um."""
         if self.fresnel == "one":
-            return 1.0 + 0.0 * self.albedo
-        one = 1.0 + 0.0 * self.film_eta
+            return ones_like(self.albedo)
+        one = ones_like(self.film_eta)
         return mean_over_angles(lambda mu: film.reflectance(mu * one, self._film()))
 
     def known_albedo(

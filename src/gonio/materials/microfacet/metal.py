@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...material.bsdf import Breach
+from ...material.bsdf import KnownViolation
 from ...material.parameters import Angle, Colour, Width, choice, spectrum
-from ...ops import Scalar, Spectrum, function
+from ...ops import Scalar, Spectrum, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel.f82 import GRAZING, f82
 from ...optics.fresnel.schlick import schlick
@@ -25,15 +25,15 @@ class Metal(_Reflector):
     films and polarization want a `conductor`.
     """
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "linearity": Breach("where the edge is below a half and r0 dark, F is held at 0", 1.0, certain=False),
-        "precision": Breach("beside the places where F is held at 0 it is a difference", 0.01, certain=False),
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "linearity": KnownViolation("where the edge is below a half and r0 dark, F is held at 0", 1.0, certain=False),
+        "precision": KnownViolation("beside the places where F is held at 0 it is a difference", 0.01, certain=False),
     }
 
     r0: Colour = spectrum(default=0.9, doc="reflectance from above", low=0.0, high=1.0, soft_high=True)
     edge: Colour = spectrum(default=1.0, doc="factor on Schlick's curve at 82 degrees", low=0.0, high=1.0)
     alpha: Width = microfacet.alpha_width()
-    rotation: Angle = microfacet.rotation_angle()
+    rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
     ndf: str = microfacet.ndf_choice()
     masking: str = microfacet.masking_choice()
     fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")
@@ -44,7 +44,7 @@ class Metal(_Reflector):
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F times albedo, at a facet seen under cos_theta."""
         if self.fresnel == "one":
-            return self.albedo * (1.0 + 0.0 * cos_theta)
+            return self.albedo * ones_like(cos_theta)
         return self.albedo * self._curve(cos_theta)
 
     def _curve(self, cos_theta: Scalar | float) -> Spectrum:
@@ -53,5 +53,5 @@ class Metal(_Reflector):
     def mean_reflectance(self, average: str = "exact") -> Spectrum:
         """The curve's integral, whatever fit is asked for."""
         if self.fresnel == "one":
-            return 1.0 + 0.0 * self.r0
+            return ones_like(self.r0)
         return mean_over_angles(self._curve)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...material.bsdf import BSDF, Delta, InnerAlbedo, Microsurface
 from ...material.parameters import Angle, Colour, Width, angle, choice, pair_of, spectrum, width
-from ...ops import Direction, Pair, Scalar, Spectrum, abs, backend, dot, function, safe_div, where
-from ...optics import fresnel, masking
+from ...ops import Direction, Mask, Pair, Scalar, Spectrum, abs, backend, dot, function, ones_like, safe_div, where
+from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
-from ...optics.roughness import SMOOTH
+from ...optics.roughness import SMOOTH, widths
 
 SAMPLINGS = {
     "visible": "normals as wo sees them",
@@ -90,6 +90,19 @@ class _Microfacet(BSDF):
     def delta(self) -> Delta:
         return delta_of(self.plain.alpha)
 
+    def _roughness(self) -> tuple[Pair, Mask]:
+        """Widths of the distribution, and where the surface is smooth."""
+        return widths(self.alpha)
+
+    def _one(self) -> Scalar:
+        """1 for every ray: the cosine along the normal."""
+        return ones_like(self.alpha.x)
+
+    @property
+    def _turn(self) -> Pair | None:
+        """The rotation of the anisotropy's axes, as `frame.rotate` takes it."""
+        return self.rotation
+
     @property
     def microsurface(self) -> Microsurface:
         kinds = self.ndf, self.masking, self.fresnel
@@ -106,7 +119,7 @@ class _Microfacet(BSDF):
         if self.delta != "always":
             return None
         sin = np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
-        wo = np.stack([sin * np.cos(phi), sin * np.sin(phi), mu], axis=-1)
+        wo = frame.spherical_array(sin, mu, phi)
         drawn = self.sample(wo, np.full((len(mu), 3), 0.5), precision="float64")
         return np.asarray(drawn.weight, np.float64) * (mu > 0.0)[:, None]
 

@@ -10,7 +10,7 @@ from ...material.calling import method
 from ...material.parameters import Colour, spectrum
 from ...material.polarization import Polarized
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum, where
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, ones_like, where, zeros_like
 from ...optics import frame
 from ...optics.fresnel.polarization import Diattenuation
 
@@ -23,25 +23,25 @@ class Mirror(BSDF):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """0: a delta lobe has no finite value."""
-        return self.albedo * (0.0 * wo.z)
+        return self.albedo * zeros_like(wo.z)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """0: a delta lobe has no density."""
-        return 0.0 * wo.z
+        return zeros_like(wo.z)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """wo mirrored at the normal."""
         above = wo.z > 0.0
-        one = where(above, 1.0 + 0.0 * wo.z, 0.0)
-        return Sample(frame.mirror(wo), self.albedo * one, one, above, 1.0 + 0.0 * wo.z)
+        one = where(above, ones_like(wo.z), 0.0)
+        return Sample(frame.mirror(wo), self.albedo * one, one, above, ones_like(wo.z))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
         """All of it: s turns over and p does not, as at a perfect conductor."""
-        zero = 0.0 * wo.z
+        zero = zeros_like(wo.z)
         value = self.albedo * where(delta & (wo.z > 0.0), 1.0 + zero, 0.0)
-        return (Polarized(value, frame.upright(wo), Diattenuation(zero, zero - 1.0, zero)),)
+        return (Polarized(value, frame.normal_like(wo), Diattenuation(zero, zero - 1.0, zero)),)
 
     @property
     def delta(self) -> Delta:

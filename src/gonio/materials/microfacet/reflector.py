@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ...material.calling import method
-from ...material.parameters import Angle, Colour, Width
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, safe_div, where
+from ...ops import Direction, Mask, Mode, Pair, Scalar, Spectrum, abs, dot, ones_like, safe_div, where
 from ...optics import frame, masking
 from ...optics.ndf import distribution
-from ...optics.roughness import widths
 from . import microfacet
 from .microfacet import Terms
 
 
 class _Reflector(microfacet._Microfacet):
     """f = F D G / (4 (n.o)(n.i)), F at the half vector. A subclass gives `reflectance` and `mean_reflectance`."""
-
-    if TYPE_CHECKING:  # declared by each; mypy forgets what an inherited field is
-        alpha: Width
-        rotation: Angle
-        ndf: str
-        masking: str
-        fresnel: str
-        albedo: Colour
-        sampling: str
 
     def reflectance(self, cos_theta: Scalar) -> Spectrum:
         """F, times albedo, at a facet seen under cos_theta."""
@@ -35,8 +22,8 @@ class _Reflector(microfacet._Microfacet):
         """(wo, wi, normal m of the facet that mirrors one into the other, widths, whether a rough lobe joins them), all
         along the axes of the anisotropy; turned last, as wo + wi would cancel with the rounding of the turn."""
         m = frame.half_vector(wo, wi)
-        alpha, smooth = widths(self.alpha)
-        wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
+        alpha, smooth = self._roughness()
+        wo, wi, m = (frame.rotate(w, self._turn) for w in (wo, wi, m))
         return wo, wi, m, alpha, _above(wo, wi) & ~smooth
 
     @method
@@ -54,18 +41,18 @@ class _Reflector(microfacet._Microfacet):
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """wo mirrored at a sampled normal; a direction below the surface is a failed sample."""
-        alpha, smooth = widths(self.alpha)
-        turned = frame.rotate(wo, self.rotation)
-        m = where(smooth, frame.upright(wo), microfacet.sample_normal(self, turned, u.y, u.z, alpha))
-        wi = frame.rotate_back(frame.reflect(turned, m), self.rotation)
+        alpha, smooth = self._roughness()
+        wo_local = frame.rotate(wo, self._turn)
+        m = where(smooth, frame.normal_like(wo), microfacet.sample_normal(self, wo_local, u.y, u.z, alpha))
+        wi = frame.rotate_back(frame.reflect(wo_local, m), self._turn)
         # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
-        wo, turned, m, alpha, lit = self._facet(wo, wi)
-        density = 0.25 * microfacet.pdf_per_cosine(self, wo, m, alpha)
-        facets = where(lit, safe_div(microfacet.reflection(self, wo, turned, m, alpha), density), 0.0)
-        mirrors = smooth & _above(wo, turned)
-        weight = self.reflectance(abs(dot(wo, m))) * where(mirrors, 1.0, facets)
+        wo_local, wi_local, m, alpha, lit = self._facet(wo, wi)
+        density = 0.25 * microfacet.pdf_per_cosine(self, wo_local, m, alpha)
+        facets = where(lit, safe_div(microfacet.reflection(self, wo_local, wi_local, m, alpha), density), 0.0)
+        mirrors = smooth & _above(wo_local, wi_local)
+        weight = self.reflectance(abs(dot(wo_local, m))) * where(mirrors, 1.0, facets)
         pdf = where(mirrors, 1.0, where(lit, density, 0.0))
-        return Sample(wi, weight, pdf, mirrors, 1.0 + 0.0 * pdf)
+        return Sample(wi, weight, pdf, mirrors, ones_like(pdf))
 
     @method
     def terms(self, wo: Direction, wi: Direction) -> Terms:
@@ -81,7 +68,7 @@ class _Reflector(microfacet._Microfacet):
 
     def normal_reflectance(self) -> Spectrum:
         """F at normal incidence."""
-        return self.reflectance(1.0 + 0.0 * self.alpha.x)
+        return self.reflectance(self._one())
 
 
 def _above(wo: Direction, wi: Direction) -> Mask:

@@ -13,7 +13,7 @@ from ...material.calling import method
 from ...material.parameters import Colour, Number, choice, number
 from ...material.polarization import Polarized
 from ...material.sample import Sample
-from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, function, sqr, where
+from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, function, ones_like, sqr, where, zeros_like
 from ...optics import frame, fresnel, indices
 from ...optics.fresnel import exact
 from ...optics.fresnel.polarization import Diattenuation, reflected_by_glass
@@ -75,19 +75,19 @@ class ThinDielectric(BSDF):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """0: delta lobes have no finite value."""
-        return self.albedo * (0.0 * wo.z)
+        return self.albedo * zeros_like(wo.z)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """0: delta lobes have no density."""
-        return 0.0 * wo.z
+        return zeros_like(wo.z)
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 chooses reflection with probability R'; else the direction is -wo."""
         share = self.reflectance(abs(wo.z))
         reflects = u.x < share
-        one = 1.0 + 0.0 * wo.z
+        one = ones_like(wo.z)
         pdf = where(reflects, share, 1.0 - share)
         mirrored = frame.mirror(wo)
         return Sample(where(reflects, mirrored, -wo), self.albedo * one, pdf, pdf > 0.0, one)
@@ -103,11 +103,11 @@ class ThinDielectric(BSDF):
         s, p = where(reflects, sheet.s, 1.0 - sheet.s), where(reflects, sheet.p, 1.0 - sheet.p)
         over = 1.0 / (s + p + 1e-12)
         d, c = (s - p) * over, 2.0 * where(reflects, sheet.cross, sheet.passed) * over
-        zero = 0.0 * cos
+        zero = zeros_like(cos)
         matrix = Diattenuation(where(crosses, d, zero), where(crosses, c, total.c), where(crosses, zero, total.s))
         share = self.reflectance(cos)
         value = self.albedo * where(delta, where(reflects, share, 1.0 - share), 0.0)
-        return (Polarized(value, frame.upright(wo), matrix),)
+        return (Polarized(value, frame.normal_like(wo), matrix),)
 
     @property
     def transmits(self) -> bool:
@@ -119,7 +119,7 @@ class ThinDielectric(BSDF):
 
     def normal_reflectance(self) -> Spectrum:
         """R' at normal incidence, times the albedo."""
-        return self.albedo * self.reflectance(1.0 + 0.0 * self.eta)
+        return self.albedo * self.reflectance(ones_like(self.eta))
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach, InnerAlbedo, never
+from ...material.bsdf import BSDF, InnerAlbedo, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...material.sample import Sample
@@ -53,8 +53,8 @@ class Sheen(BSDF):
         high=1.0,
     )
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "reciprocity": Breach("its table of lobes is one of the viewer's direction alone", 2.0)
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "reciprocity": KnownViolation("its table of lobes is one of the viewer's direction alone", 2.0)
     }
 
     @function
@@ -74,13 +74,13 @@ class Sheen(BSDF):
 
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
-        """albedo R D."""
+        """albedo R D, the lobe times its albedo."""
         lobe = self._lobe(wo)
         return self.albedo * (lobe.R * self._density(lobe, wo, wi))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
-        """D."""
+        """D, the density of the transformed cosine."""
         return self._density(self._lobe(wo), wo, wi)
 
     @method
@@ -92,7 +92,7 @@ class Sheen(BSDF):
         wi = frame.rotate_back(wi * ops.rsqrt(maximum(dot(wi, wi), frame.TINY)), frame.azimuth(wo))
         pdf = self._density(lobe, wo, wi)
         weight = self.albedo * where(pdf > 0.0, lobe.R, 0.0)
-        return Sample(wi, weight, pdf, never(pdf), pdf * 0.0 + 1.0)
+        return Sample.of_density(wi, weight, pdf)
 
     def tint(self, wo: Direction) -> Spectrum:
         """albedo R."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ... import ops
-from ...material.bsdf import BSDF, Breach
+from ...material.bsdf import BSDF, KnownViolation
 from ...material.calling import method
 from ...material.parameters import Colour, Number, number, spectrum
 from ...ops import Direction, Mode, Scalar, Spectrum, exp, function, inv_pi, log, sqr, where
@@ -35,8 +35,8 @@ class SheenCharlie(BSDF):
     albedo: Colour = spectrum(default=1.0, doc="factor on everything reflected", low=0.0, high=1.0, soft_high=True)
     alpha: Number = number(default=0.3, doc="how far fibres lean from the surface's plane", low=0.01, high=1.0)
 
-    breaks: ClassVar[Mapping[str, Breach]] = {
-        "energy": Breach(
+    known_violations: ClassVar[Mapping[str, KnownViolation]] = {
+        "energy": KnownViolation(
             "Lambda's fit masks too little where alpha is under .07: at 89 degrees the albedo is then over 1",
             lambda model: _gain(model),
             certain=False,
@@ -57,18 +57,18 @@ class SheenCharlie(BSDF):
         """exp L(mu) below mu = 1/2, exp(2 L(1/2) - L(1 - mu)) above."""
         low = mu < 0.5
         at = self._exponent(where(low, mu, 1.0 - mu))
-        return exp(where(low, at, 2.0 * self._exponent(0.5 + 0.0 * mu) - at))
+        return exp(where(low, at, 2.0 * self._exponent(0.5 + ops.zeros_like(mu)) - at))
 
     @function
     def _exponent(self, x: Scalar) -> Scalar:
-        """L."""
+        """L, the exponent of the fit to Lambda."""
         share = sqr(1.0 - self.alpha)
         a, b, c, d, e = (share * narrow + (1.0 - share) * wide for narrow, wide in zip(NARROW, WIDE, strict=True))
         return a / (1.0 + b * ops.pow(x, c)) + d * x + e
 
     @function
     def _visible(self, wo: Direction, wi: Direction) -> Scalar:
-        """G."""
+        """G, the masking of both directions."""
         return 1.0 / (1.0 + self._lambda(wo.z) + self._lambda(wi.z))
 
     @method

@@ -14,6 +14,7 @@ from ...errors import InputError
 from ...material.angular_range import EVERYWHERE, AngularRange
 from ...members import Family, subclasses_of
 from ...ops import Direction, Mask, Scalar, Spectrum, backend, vec3
+from ...optics.lattice import r_sequence
 from .. import colours
 
 Floats = NDArray[np.float64]
@@ -134,7 +135,7 @@ POINTS = 4096  # draws for an albedo
 def albedo(table: Measurement, theta: Floats) -> Floats:
     """int f cos theta_i d omega_i at angles of view, (N, 3), by the table's own draws of a lattice."""
     types = backend.types("float64")
-    lattice = (np.arange(1, POINTS + 1)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0) + 0.5) % 1.0
+    lattice = r_sequence(POINTS, 3, shift=0.5)
     found = []
     for angle in theta:
         wo = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], (POINTS, 3))

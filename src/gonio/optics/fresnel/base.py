@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, TypeVar
 
 from ...members import Family, instances_of
-from ...ops import Scalar, Spectrum, fma, function, maximum, safe_sqrt, sqr, where
+from ...ops import Scalar, Spectrum, fma, function, maximum, safe_sqrt, sqr, where, zeros_like
 from ..part import Part
 from ..special import gauss
 
@@ -68,7 +68,12 @@ class Fresnel(Part):
         From the denser side it is 1 - (1 - F_avg) / eta^2, eta > 1, by reciprocity.
         """
         eta = maximum(eta, 1.0 / eta)
-        return average(lambda mu: self.dielectric(mu + 0.0 * eta, cos_transmitted(mu + 0.0 * eta, eta), eta))
+
+        def at(mu: float) -> Scalar:
+            cos = mu + zeros_like(eta)
+            return self.dielectric(cos, cos_transmitted(cos, eta), eta)
+
+        return average(at)
 
 
 Fresnel.family = Family("Fresnel kind", "gonio.fresnels", (__package__,), instances_of(Fresnel), "fresnel")

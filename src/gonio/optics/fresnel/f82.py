@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...ops import Scalar, Spectrum, function, maximum, minimum, sqr, where
+from ...ops import Scalar, Spectrum, function, maximum, minimum, sqr, where, zeros_like
 from . import exact
 from .base import Fresnel, R, cos_transmitted, r0_conductor, r0_dielectric
 from .schlick import schlick
@@ -29,7 +29,7 @@ class F82(Fresnel):
 def _edge(eta: Scalar) -> Scalar:
     """The exact reflectance of a dielectric at 82 degrees from its less dense side."""
     eta = maximum(eta, 1.0 / eta)
-    cos = GRAZING + 0.0 * eta
+    cos = GRAZING + zeros_like(eta)
     return exact.dielectric(cos, cos_transmitted(cos, eta), eta)
 
 

@@ -32,6 +32,7 @@ from ...ops import (
     sqr,
     sqrt,
     where,
+    zeros_like,
 )
 from ...ops.types import Value
 from .. import colour
@@ -179,8 +180,8 @@ def _face(above: Scalar, below: Complex, contrast: Complex, sin2: Scalar) -> tup
     both = Complex(above + below.re, below.im)
     s = contrast.over(both.times(both))
     product = below.scaled(above)
-    turned = Complex(sin2 - product.re, -product.im).over(Complex(sin2 + product.re, product.im))
-    return s, s.times(turned)
+    ratio = Complex(sin2 - product.re, -product.im).over(Complex(sin2 + product.re, product.im))
+    return s, s.times(ratio)
 
 
 def _clear_face(above: Scalar, below: Scalar, contrast: Scalar, sin2: Scalar) -> tuple[Real, Real]:
@@ -261,17 +262,17 @@ def reflectance(cos_i: Scalar, film: Film) -> Spectrum:
 def _by_wavelengths(cos_i: Scalar, eta: Spectrum, k: Spectrum | None, film_eta: Scalar, thickness: Scalar) -> Spectrum:
     """The colour of R under daylight, summed over `NODES`."""
     mixing = WEIGHTS if len(channels(eta)) == 3 else np.tile((WEIGHTS @ colour.LUMINANCE)[:, None], 3)
-    seen = 0.0 * eta
+    total = zeros_like(eta)
     for nm, (red, green, blue) in zip(NODES.tolist(), mixing.tolist(), strict=True):
-        seen = seen + _node(cos_i, eta, k, film_eta, thickness, nm, red, green, blue)
+        total = total + _node(cos_i, eta, k, film_eta, thickness, nm, red, green, blue)
     # colours that no three lights mix would be more than all, or less than nothing
-    return clamp(seen, 0.0, 1.0)
+    return clamp(total, 0.0, 1.0)
 
 
 def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Diattenuation[Spectrum]]:
     """What reflection and refraction do to polarization, from outside, summed over wavelengths whatever the form is."""
 
-    def seen(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
+    def summed(what: Callable[[Amplitudes], Scalar]) -> Spectrum:
         def at(eta: Scalar, k: Scalar | None, nm: Scalar | float) -> Scalar:
             return what(airy(faces(cos_i, eta, k, film.film_eta, film.thickness), nm))
 
@@ -286,9 +287,9 @@ def polarization(cos_i: Scalar, film: Film) -> tuple[Diattenuation[Spectrum], Di
         size = maximum(1.0 - waves.s.square, 0.0) * maximum(1.0 - waves.p.square, 0.0)
         return phase.scaled(sqrt(size / maximum(phase.square, 1e-30)))
 
-    s, p = seen(lambda waves: waves.s.square), seen(lambda waves: waves.p.square)
-    back = seen(lambda waves: reflected(waves).re), seen(lambda waves: reflected(waves).im)
-    on = seen(lambda waves: transmitted(waves).re), seen(lambda waves: transmitted(waves).im)
+    s, p = summed(lambda waves: waves.s.square), summed(lambda waves: waves.p.square)
+    back = summed(lambda waves: reflected(waves).re), summed(lambda waves: reflected(waves).im)
+    on = summed(lambda waves: transmitted(waves).re), summed(lambda waves: transmitted(waves).im)
     return _over_sum(s, p, *back), _over_sum(1.0 - s, 1.0 - p, *on)
 
 
@@ -444,7 +445,7 @@ def _through(
 ) -> Band:
     """Through a curve that is a sum of bells, each height, place and variance."""
     film = faces(cos_i, eta, k, film_eta, thickness)
-    mean, wave = 0.0 * cos_i, 0.0 * cos_i
+    mean, wave = zeros_like(cos_i), zeros_like(cos_i)
     trips: list[Amplitude] = []  # once through the film and back, without the way
     sizes: list[Scalar] = []
     for number, top in enumerate(film.top):
@@ -462,15 +463,15 @@ def _through(
     powers = trips
     for order in range(1, HARMONICS + 1):
         if order > 1:
-            waves = [turned.times(bell.turn) for turned, bell in zip(waves, bells, strict=True)]
+            waves = [bell_wave.times(bell.turn) for bell_wave, bell in zip(waves, bells, strict=True)]
             powers = [power.times(trip) for power, trip in zip(powers, trips, strict=True)]
         parts = [
-            turned.scaled(_power(bell.left, order * order) * height)
-            for turned, bell, (height, _, _) in zip(waves, bells, fits, strict=True)
+            bell_wave.scaled(_power(bell.left, order * order) * height)
+            for bell_wave, bell, (height, _, _) in zip(waves, bells, fits, strict=True)
         ]
-        seen = parts[0] if len(parts) == 1 else parts[0].plus(parts[1])
+        curve = parts[0] if len(parts) == 1 else parts[0].plus(parts[1])
         for size, power in zip(sizes, powers, strict=True):
-            wave = wave + size * seen.times(power).re
+            wave = wave + size * curve.times(power).re
     return Band(mean, wave)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...ops import Scalar, Spectrum
+from ...ops import Scalar, Spectrum, ones_like
 from .base import Fresnel
 
 
@@ -13,17 +13,17 @@ class One(Fresnel):
     white = True
 
     def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """1."""
-        return 1.0 + 0.0 * eta
+        """1 at every angle: all light is reflected."""
+        return ones_like(eta)
 
     def dielectric(self, cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """1: nothing is transmitted."""
-        return 1.0 + 0.0 * eta
+        """1 at every angle: nothing is transmitted."""
+        return ones_like(eta)
 
     def conductor_average(self, eta: Spectrum, k: Spectrum) -> Spectrum:
-        """1."""
-        return 1.0 + 0.0 * eta
+        """1, the mean of F = 1."""
+        return ones_like(eta)
 
     def dielectric_average(self, eta: Scalar) -> Scalar:
-        """1."""
-        return 1.0 + 0.0 * eta
+        """1, the mean of F = 1."""
+        return ones_like(eta)

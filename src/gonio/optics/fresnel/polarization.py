@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Generic, NamedTuple, TypeVar
 
-from ...ops import Scalar, Spectrum, abs, fma, function, maximum, safe_sqrt, sqr, sqrt, where
+from ...ops import Scalar, Spectrum, abs, fma, function, maximum, safe_sqrt, sqr, sqrt, where, zeros_like
 
 V = TypeVar("V", Scalar, Spectrum)
 
@@ -58,4 +58,4 @@ def refracted(cos_i: Scalar, cos_t: Scalar, eta: Scalar) -> Diattenuation[Scalar
     """Of what enters glass: T_p / T_s = 1 / cos^2(theta_i - theta_t), and no phase between them."""
     g = cos_i * cos_t + (1.0 - sqr(cos_i)) / eta
     both = 1.0 / (1.0 + sqr(g))
-    return Diattenuation((sqr(g) - 1.0) * both, 2.0 * g * both, 0.0 * g)
+    return Diattenuation((sqr(g) - 1.0) * both, 2.0 * g * both, zeros_like(g))

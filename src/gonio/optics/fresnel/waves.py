@@ -119,7 +119,7 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
     """
     eta, k = np.broadcast_arrays(_real(eta, "eta"), _real(k, "k"))
     check_index(eta, k, "brewster_angle")
-    found = np.array(np.arctan(eta))
+    angles = np.array(np.arctan(eta))
     metal = k > 0.0
     if np.any(metal):
         e = (eta[metal] + 1j * k[metal]) ** 2
@@ -131,8 +131,8 @@ def brewster_angle(eta: ArrayLike, k: ArrayLike = 0.0) -> Reals:
         roots = np.linalg.eigvals(companion)
         inside = (np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real >= 1.0)
         least = 1.0 / np.max(np.where(inside, roots.real, 0.0), axis=-1, initial=np.finfo(float).tiny)
-        found[metal] = np.arcsin(np.sqrt(np.where(least <= 1.0, least, np.nan)))
-    return found
+        angles[metal] = np.arcsin(np.sqrt(np.where(least <= 1.0, least, np.nan)))
+    return angles
 
 
 def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
@@ -148,13 +148,13 @@ def mueller(along_s: Reals, along_p: Reals, cross: Waves) -> Reals:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def check_index(eta: Reals, k: Reals, where: str) -> None:
+def check_index(eta: Reals, k: Reals, location: str) -> None:
     """Raise InputError for an index that no medium has."""
     if np.any(eta <= 0.0):
-        raise InputError(f"eta = {np.min(eta):g}, a positive index expected", f"{where}: eta", "that of air is 1")
+        raise InputError(f"eta = {np.min(eta):g}, a positive index expected", f"{location}: eta", "that of air is 1")
     if np.any(k < 0.0):
         what = f"k = {np.min(k):g}, which would give light"
-        raise InputError(what, f"{where}: k", "an index that absorbs is eta + i k with k >= 0")
+        raise InputError(what, f"{location}: k", "an index that absorbs is eta + i k with k >= 0")
 
 
 def _real(value: ArrayLike, name: str) -> Reals:

@@ -67,5 +67,5 @@ def masking_shadowing(
     chosen = term(kind)
     g = (chosen.transmitted if transmits else chosen.reflected)(ndf, wo, wi, m, alpha)
     # v.m and v.n must agree in sign, or the facet is seen through the surface
-    seen = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
-    return where(seen, g, 0.0)
+    visible = (dot(wo, m) * wo.z > 0.0) & (dot(wi, m) * wi.z > 0.0)
+    return where(visible, g, 0.0)

@@ -274,7 +274,7 @@ class Stretched(NDF):
             return super().sample(u1, u2, alpha)
         r = self.slope(u1)
         s, c = sincos((2.0 * ops.pi) * u2)
-        return normalize(vec3(r * c * alpha.x, r * s * alpha.y, 1.0 + 0.0 * r))
+        return normalize(vec3(r * c * alpha.x, r * s * alpha.y, ops.ones_like(r)))
 
     @function
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:

@@ -74,9 +74,9 @@ class Beckmann(Stretched):
         """
         sin_v, cos_v = sqrt(sin2(v)), maximum(v.z, 1e-6)
         tan_v = sin_v / cos_v
-        upright = sin_v < 1e-6
-        cos_phi = where(upright, 1.0, v.x / where(upright, 1.0, sin_v))
-        sin_phi = where(upright, 0.0, v.y / where(upright, 1.0, sin_v))
+        at_normal = sin_v < 1e-6
+        cos_phi = where(at_normal, 1.0, v.x / where(at_normal, 1.0, sin_v))
+        sin_phi = where(at_normal, 0.0, v.y / where(at_normal, 1.0, sin_v))
 
         # the slope is below cot; erf(4) is 1 within float32
         cot = minimum(1.0 / maximum(tan_v, 1e-6), 4.0)
@@ -101,7 +101,7 @@ class Beckmann(Stretched):
         rise = gauss * facing
         x = where(rise > 1e-3, x - (0.5 * (1.0 + b) + 0.5 * tan_v * gauss - target) / maximum(rise, 1e-3), x)
         y = erfinv(clamp(2.0 * u2 - 1.0, -B_LIMIT, B_LIMIT))
-        return vec3(sin_phi * y - cos_phi * x, -sin_phi * x - cos_phi * y, 1.0 + 0.0 * x)
+        return vec3(sin_phi * y - cos_phi * x, -sin_phi * x - cos_phi * y, ops.ones_like(x))
 
 
 def _sine_and_cotangent(v: Direction) -> tuple[Scalar, Scalar]:

@@ -63,7 +63,7 @@ class Energy(Law):
             finding.trials.append(Trial(p, text, repeat))
         self._known(subject, wo, value, error, finding)
         white = lossless_variant(subject)
-        if white is None and getattr(subject.model, "lossless", None) is not None:
+        if white is None and getattr(subject.model, "lossless_tolerance", None) is not None:
             white = subject  # it has no albedo to set, and claims to lose nothing
         if white is not None:
             self._furnace(white, wo, effort, seed, finding, curves)
@@ -154,7 +154,7 @@ class Energy(Law):
         known = float(error.max())
         finding.notes.append(text + (f", known to {known:.1g}" if known > 1e-3 else ""))
         curves.loss = average
-        claim = getattr(white.model, "lossless", None)
+        claim = getattr(white.model, "lossless_tolerance", None)
         # a black one reflects nothing, whatever it claims
         if claim is not None and value.max() > 0.0 and lost[where] > claim + float(error.max()):
             finding.problems.append(
@@ -262,7 +262,7 @@ def _agreement(value: np.ndarray, error: np.ndarray, mean: np.ndarray, noise: np
 def lossless_variant(subject: Subject) -> Subject | None:
     """The subject with every albedo 1 and F = 1; None where it has neither."""
     try:
-        variant = subject.model.white()
+        variant = subject.model.lossless()
     except InputError:
         return None
     return None if variant is subject.model else Subject(variant, subject.target, subject.settings)
