@@ -30,9 +30,11 @@ demo: .venv/rendering
 	$(BIN)/gonio view --export out/shading-balls.html
 	@printf '%s\n' '' 'The pictures and the page are in out. Next, in this shell:' '    . .venv/bin/activate' '    gonio view'
 
+# the files of a reader who tries README here are the reader's own
+OURS := benchmarks docs examples src tests
 lint: .venv/installed
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	$(BIN)/ruff check $(OURS)
+	$(BIN)/ruff format --check $(OURS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 

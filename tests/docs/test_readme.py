@@ -105,6 +105,16 @@ def test_the_extras_that_it_names_are_there() -> None:
     assert named and set(",".join(named).split(",")) <= set(extras)
 
 
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make")
+def test_files_that_a_reader_makes_here_are_not_linted() -> None:
+    """Else `make test` fails once README's lines have been typed."""
+    done = subprocess.run(["make", "-n", "lint"], cwd=ROOT, capture_output=True, text=True, check=True)
+    linted = [set(line.split()[1:]) for line in done.stdout.splitlines() if "/ruff " in line]
+    assert len(linted) == 2
+    for words in linted:
+        assert "." not in words and {"benchmarks", "docs", "examples", "src", "tests"} <= words
+
+
 # ---------------------------------------------------------------------- the whole of it
 
 
