@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,7 @@ from scipy.interpolate import CubicSpline
 
 from ... import ops
 from ...errors import GonioWarning, InputError, summary, user_line
-from ...ops import Pair, Scalar, Table, inset, lookup, sqrt, vec2
-
-if TYPE_CHECKING:
-    from .base import NDF
+from ...ops import Direction, Pair, Scalar, Table, inset, lookup, sqrt, vec2
 
 Floats: TypeAlias = NDArray[np.float64]
 Density: TypeAlias = Callable[[Floats, Floats], Floats]
@@ -89,7 +86,21 @@ def _row_of(alpha: Pair, count: int) -> Scalar:
     return inset((sqrt(sqrt(alpha.x)) - LEAST) * (1.0 / (1.0 - LEAST)), count)
 
 
-def tables_of(ndf: NDF) -> Tables:
+class HasDensity(Protocol):
+    """What the tables are found from: a distribution of which D alone is written."""
+
+    name: str
+
+    def D(self, m: Direction, alpha: Pair) -> Scalar:
+        """Density of normals, 1/sr."""
+        ...
+
+    def place(self, formula: str) -> str:
+        """File and line of a formula, for errors."""
+        ...
+
+
+def tables_of(ndf: HasDensity) -> Tables:
     """The tables of a distribution, found when they are first asked for and kept with its class, so that they are gone
     when a user's file is run anew. InputError where D is not finite, or has no symmetry that they can have."""
     cls = type(ndf)
@@ -125,7 +136,7 @@ class _Row(NamedTuple):
     whole: float
 
 
-def _found(ndf: NDF) -> Tables:
+def _found(ndf: HasDensity) -> Tables:
     density = _density(ndf)
     log_s = np.arange(LOWEST, HIGHEST, STEP)
     widths = np.linspace(LEAST, 1.0, ROWS) ** 4
@@ -155,7 +166,7 @@ def _columns(shares: Floats, log_s: Floats) -> Floats:
     return np.stack([_areas(shares, log_s), _inverses(shares, log_s), _inverses(shares * np.exp(log_s), log_s)], -1)
 
 
-def _density(ndf: NDF) -> Density:
+def _density(ndf: HasDensity) -> Density:
     """D on NumPy arrays, (3, N) and (2, N), in float64: from its recording, so that a loop of Dr.Jit's or a shader that
     is being recorded may ask for the tables."""
     try:
@@ -193,7 +204,7 @@ def _row(density: Density, width: float, log_s: Floats) -> _Row | None:
     return _Row(width, w, shares / whole, whole)
 
 
-def _meaning(ndf: NDF, density: Density, widths: list[float]) -> str:
+def _meaning(ndf: HasDensity, density: Density, widths: list[float]) -> str:
     """What two widths mean to D; see `Tables`."""
     s = np.exp(np.arange(-8.0, 8.0, STEP))
     for width in widths:
