@@ -49,7 +49,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ('{"type": "roughplastic"}', Kind.PLUGIN),
         ("lamberd", Kind.NAME),
         (LONG, Kind.NAME),
-        ("x" * 5000, Kind.SCENE),
         ("sub/mine.py:Ward", Kind.CODE),
         ("sub/mine.py:Ward(alpha=.3)", Kind.CODE),
         ("gold.binary", Kind.TABLE),
@@ -98,7 +97,10 @@ def test_what_is_there_goes_before_what_is_a_name_alone(here: Path) -> None:
         ("nowhere/a", MATERIALS, ["no file or folder 'nowhere/a'", "check the path"]),
         ("broken.json", MATERIALS, ["no JSON: ", "broken.json"]),
         ("sub/mine.py", MATERIALS, ["names a file, but no class in it", "sub/mine.py:CLASS"]),
-        ("y" * 5000 + "/", {Kind.TABLES}, ["no file or folder 'yyy", "..."]),
+        ("y" * 5000, MATERIALS, ["'yyy", "...' names no material, and no file can have that name"]),
+        ("y" * 5000 + "/scene", {Kind.SCENE}, ["no file can have that name"]),
+        ("a\0b", {Kind.SCENE}, ["no file can have that name"]),
+        ("a" * 300 + ".exr", {Kind.SCENE}, ["no file can have that name"]),
     ],
 )
 def test_what_is_not_accepted_is_told_what_it_is(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import difflib
 import enum
+import errno
 import json
 import os
 import re
@@ -69,13 +70,17 @@ def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str
     kind = next((one for one in found if one in accepted), None)
     if kind is not None:
         return kind
-    shown = text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+    shown = _shortened(text)
     what, hint = f"'{shown}' is {found[0].value}, {_expected(accepted)} expected", _TAKEN.get(found[0], "")
     if Kind.SCENE in found and (reason := _broken(Path(text))):
         what, where, hint = reason, text, "mend the file"
     elif not _exists(Path(text)) and found[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
         what, hint = f"no file or folder '{shown}'; {_expected(accepted)} expected", "check the path"
     raise InputError(what, where, hint)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def _expected(accepted: Collection[Kind]) -> str:
@@ -108,6 +113,9 @@ def readings(text: str) -> list[Kind]:
     if head.lower().endswith(".py"):
         raise InputError(f"'{head}' names a file, but no class in it", "MODEL", f"give {head}:CLASS")
     path = Path(text)
+    if not _may_be_a_path(Path(head)):
+        what = f"'{_shortened(text)}' names no material, and no file can have that name"
+        raise InputError(what, "MODEL", "such as 'conductor(alpha=.3)', or the path of a file")
     if _is_folder(path):
         return _in_folder(path, _names(head))
     if documents.names_document(head):
@@ -121,7 +129,7 @@ def readings(text: str) -> list[Kind]:
         return [Kind.FILE]
     if settings or _names(head) or _resembles(head):
         return _names(head) or [Kind.NAME]
-    return [Kind.SCENE, *([Kind.NAME] if os.sep not in text else []), Kind.PICTURE, Kind.FOLDER, Kind.FILE]
+    return [Kind.SCENE, *([Kind.NAME] if os.sep not in text else []), Kind.PICTURE]
 
 
 def _described(name: str, kind: Kind) -> list[Kind]:
@@ -211,6 +219,17 @@ def _broken(path: Path) -> str:
     except (OSError, ValueError, RecursionError) as error:
         return f"no JSON: {str(error)[:200]}"
     return ""
+
+
+def _may_be_a_path(path: Path) -> bool:
+    """Whether a file could have that name: it is not too long, and has no zero byte."""
+    try:
+        os.stat(path)
+    except ValueError:
+        return False
+    except OSError as error:
+        return error.errno != errno.ENAMETOOLONG
+    return True
 
 
 def _exists(path: Path) -> bool:
