@@ -44,8 +44,8 @@ __all__ = [
 def material(name: str, fit: str = "", **parameters: Value) -> BSDF:
     """A named material, `material("alum-bronze")`, by one of the published fits; or one of a file, "chest.gltf:Wood".
 
-    name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them. Or a file in which another program
-                describes materials, behind a colon which, where it holds several
+    name        of the MERL database, or `NAME:FILE/FIT`; `materials()` lists them. Or a file that describes materials,
+                another program's or what a fit found ("gold.json"), behind a colon which, where it holds several
     fit         FILE/FIT; Bagher2012's if not given
     parameters  in place of the fitted ones
     Raises InputError, with the nearest known name, where it is unknown or the paper left the material out, and for a

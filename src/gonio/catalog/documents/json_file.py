@@ -11,11 +11,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar, TypeAlias
 
 from ...errors import InputError
+from ...material import tree
 from .. import outside
 from . import Described, Document, Notation, from_scenes
 
@@ -48,7 +49,7 @@ class JsonFile(Document):
             raise InputError("it has the material as a text only, which is not read from files", str(path), hint)
         if not isinstance(entry, dict) or not isinstance(entry.get("type"), str):
             raise InputError('a material is an object with a "type"', str(path), 'such as {"type": "openpbr", ...}')
-        return Described(_located(from_scenes(entry), path.parent, str(path)), ())
+        return Described(from_scenes(_located(entry, path.parent, str(path))), ())
 
 
 def _entries(path: Path) -> dict[str, Json] | None:
@@ -98,13 +99,16 @@ def _found(content: Json) -> Iterator[tuple[str, Json]]:
             yield "1", {"type": "measured", "file": file}
 
 
-def _located(notation: Notation, folder: Path, where: str) -> Notation:
-    """The notation with the paths of its files, which start from a folder. InputError for a document in a document."""
+def _located(notation: Mapping[str, object], folder: Path, where: str, depth: int = 0) -> Notation:
+    """The notation with the paths of its files, which start from a folder. InputError for a document in a document, and
+    for more materials inside each other than a material may have."""
+    if depth > tree.MAX_MATERIALS:
+        raise InputError(f"more than {tree.MAX_MATERIALS} materials inside each other", where, "mix fewer materials")
     found: Notation = {}
     for key, value in notation.items():
         if isinstance(value, dict):
-            found[key] = _located(value, folder, where)
-        elif key == "type" and value in Document.family.all():
+            found[key] = _located(value, folder, where, depth + 1)
+        elif key == "type" and from_scenes({key: value})[key] in Document.family.all():
             raise InputError(f"a material of type '{value}' in it, which is in another file", where, "name that file")
         elif isinstance(value, str) and (key == "file" or outside.names_code(value)):
             found[key] = str(folder / Path(value).expanduser())
