@@ -21,7 +21,9 @@ class Baking:
     lut: Annotated[str, Option(metavar="E,Eavg,dfg,glass,prefiltered", help="Which tables.")] = ""
     size: Annotated[int, Option(metavar="N", help="Texels along each axis.")] = 128
     method: Annotated[str, Option(metavar="NAME", help="quadrature, cosine, ggx, visible, ...")] = "quadrature"
-    masking: Annotated[str | None, Option(metavar="NAME", help="Of a distribution: smith-correlated, ...")] = None
+    masking: Annotated[
+        str | None, Option(metavar="NAME", help="Of a distribution: smith-correlated, ..., FILE.py:CLASS.")
+    ] = None
     spp: Annotated[int, Option(metavar="N", help="Samples a texel, where sampled.")] = 1024
     points: Annotated[str, Option(metavar="hammersley|independent", help="Which random points.")] = "hammersley"
     seed: Annotated[int, Option(metavar="N", help="Of independent points.")] = 0
@@ -33,7 +35,8 @@ class Baking:
     store: Annotated[str, Option(metavar="E|1-E", help="What the homework's pictures hold.")] = "E"
     flip: Annotated[bool, Option("--flip/--no-flip", help="Homework: lowest roughness at the bottom.")] = True
     ndf: Annotated[
-        str | None, Option(metavar="NAME", help="Of an environment: the distribution it is blurred by; ggx.")
+        str | None,
+        Option(metavar="NAME", help="Of an environment: the distribution it is blurred by; ggx, ..., FILE.py:CLASS."),
     ] = None
     levels: Annotated[int | None, Option(metavar="N", help="Of an environment: maps from roughness 0 to 1; 6.")] = None
 

@@ -130,16 +130,18 @@ class NDF(Part):
     def _tabulates_area(self) -> bool:
         return type(self).Lambda is NDF.Lambda
 
-    @function
     def sample_visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
-        """A normal as v (v.z >= 0) sees them; where a `sample` is given without this, all normals instead.
+        """A normal as v (v.z >= 0) sees them, from tables; where a `sample` is given without this, all normals
+        instead."""
+        return self._visible(v, u1, u2, alpha) if self.tabulated else self.sample(u1, u2, alpha)
 
-        From tables, by v.m = v.z m.z + v_h.m_h with h the part along the surface: a share of the samples has the
-        density D m.z, the others D max(0, v_h.m_h), as a grazing direction sees them. Where v_h.m_h < 0 that is more
-        than v sees, so that up to a sixth of the samples fail.
+    @function
+    def _visible(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
+        """A normal as v sees them, by v.m = v.z m.z + v_h.m_h with h the part along the surface.
+
+        A share of the samples has the density D m.z, the others D max(0, v_h.m_h), as a grazing direction sees them.
+        Where v_h.m_h < 0 that is more than v sees, so that up to a sixth of the samples fail.
         """
-        if not self.tabulated:
-            return self.sample(u1, u2, alpha)
         seen = stretch(v, tabulated.tables_of(self).pair(alpha))
         level = safe_sqrt(seen.x * seen.x + seen.y * seen.y)
         share = 0.5 * level / (v.z + 0.5 * level)
@@ -165,17 +167,19 @@ class NDF(Part):
         """Density of `sample_visible`."""
         return abs(dot(v, m)) * self.visible_per_cosine(v, m, alpha)
 
-    @function
     def visible_per_cosine(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
         """`pdf_visible` over |v.m|: the cosine cancels in the density of what is mirrored at m (Walter2007, eq. 14)."""
-        if not self.tabulated:
-            return safe_div(self.pdf(m, alpha), abs(dot(v, m)))
+        density = self._visible_pdf(v, m, alpha) if self.tabulated else self.pdf(m, alpha)
+        return safe_div(density, abs(dot(v, m)))
+
+    @function
+    def _visible_pdf(self, v: Direction, m: Direction, alpha: Pair) -> Scalar:
+        """Density of `_visible`."""
         seen = stretch(v, tabulated.tables_of(self).pair(alpha))
         level = safe_sqrt(seen.x * seen.x + seen.y * seen.y)
         upward = where(v.z < 0.0, -1.0, 1.0)
         facing = abs(v.z) * m.z + maximum(upward * (v.x * m.x + v.y * m.y), 0.0)
-        density = where(m.z > 0.0, self.D(m, alpha) * facing, 0.0)
-        return safe_div(density, (abs(v.z) + 0.5 * level) * abs(dot(v, m)))
+        return where(m.z > 0.0, self.D(m, alpha) * facing / (abs(v.z) + 0.5 * level), 0.0)
 
     def sample_bounded(self, v: Direction, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
         """A visible normal whose reflection is less likely to fall below the surface; else `sample_visible`."""
