@@ -396,6 +396,25 @@ def test_changed_values_compile_no_kernel() -> None:
         assert compiled(scene, key, first * 0.9) == 0, key
 
 
+def test_tables_follow_a_changed_value() -> None:
+    """Those of a coat are found from its base's width: they stayed those of the first."""
+
+    def coat(alpha: float) -> Any:
+        return mi.load_dict({"type": "gonio_coat", "base": {"type": "gonio_conductor", "alpha": alpha}})
+
+    def values(bsdf: Any) -> np.ndarray:
+        return np.array(bsdf.eval(mi.BSDFContext(), _interaction(WO), mi.Vector3f(WI.T)))
+
+    changed = coat(0.1)
+    before = values(changed)
+    params = mi.traverse(changed)
+    params["base.alpha"] = mi.Float(0.6)
+    params.update()
+    found = values(changed)
+    np.testing.assert_allclose(found, values(coat(0.6)), rtol=1e-5, atol=1e-7)
+    assert abs(found - before).max() > 0.1
+
+
 def test_another_scene_with_other_values_compiles_no_kernel() -> None:
     def picture(alpha: float) -> None:
         dr.eval(mi.render(_scene({"type": "gonio_conductor", "alpha": alpha, "preset": "Cu"}), spp=4, seed=1))

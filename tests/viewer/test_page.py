@@ -81,13 +81,18 @@ def test_tables_come_whole(homework: dict[str, Any]) -> None:
         assert np.isfinite(values).all()
 
 
-def test_the_split_sum_is_the_albedo_of_white(homework: dict[str, Any]) -> None:
-    width, height = homework["dfg"]["size"]
-    table = np.frombuffer(base64.b64decode(homework["dfg"]["data"]), "<f4").reshape(height, width, 2)
-    row, column = height // 2, width // 2
-    roughness, mu = (row + 0.5) / height, (column + 0.5) / width
-    white = go.Conductor(eta=0.0, k=1.0, alpha=roughness**2)
-    assert table[row, column].sum() == pytest.approx(float(go.albedo(white, mu).value.mean()), abs=1e-3)
+def test_the_split_sum_is_the_albedo_of_white_by_each_masking(homework: dict[str, Any]) -> None:
+    """Each shader's own: a page that toggles masking showed one masking's table for both."""
+    facets = {tuple(variant["facets"]) for material in homework["materials"] for variant in material["variants"]}
+    assert facets == {("ggx", "smith-correlated"), ("ggx", "schlick-direct")}
+    assert {tuple(table["facets"]) for table in homework["dfg"]} == facets
+    for found in homework["dfg"]:
+        width, height = found["size"]
+        table = np.frombuffer(base64.b64decode(found["data"]), "<f4").reshape(height, width, 2)
+        row, column = height // 2, width // 2
+        roughness, mu = (row + 0.5) / height, (column + 0.5) / width
+        white = go.Conductor(eta=0.0, k=1.0, alpha=roughness**2, masking=found["facets"][1])
+        assert table[row, column].sum() == pytest.approx(float(go.albedo(white, mu).value.mean()), abs=1e-3)
 
 
 # --------------------------------------------------------------------------- any models
@@ -113,6 +118,64 @@ def test_several_models_are_rows_and_given_parameters_are_fixed() -> None:
     assert what.materials["m2"].bsdf.alpha == 0.5  # type: ignore[attr-defined]
     assert all("alpha" not in ball.values for row in (what.rows[0], what.rows[2]) for ball in row.balls)
     assert len(what.rows[1].balls) == 5  # over its albedo
+
+
+def test_an_option_reaches_the_material_inside_too() -> None:
+    """What one row has and the other silently has not would be compared as if nothing else differed."""
+    what = stage.of_targets(["kulla-conty", "conductor"], ["masking=schlick-direct", "preset=Au"])
+    inside, plain = what.materials["m0"].bsdf.base, what.materials["m1"].bsdf  # type: ignore[attr-defined]
+    assert inside.masking == plain.masking == "schlick-direct"
+    assert inside.eta == plain.eta == go.Conductor.preset("Au").eta
+    assert what.notes == ()
+    mixed = stage.of_targets(["mix(a=conductor,b=conductor)", "conductor"], ["masking=schlick-direct"]).materials["m0"]
+    assert mixed.bsdf.a.masking == mixed.bsdf.b.masking == "schlick-direct"  # type: ignore[attr-defined]
+    (path,) = stage.of_targets(["kulla-conty"], ["base.alpha=0.2"]).materials.values()
+    assert path.bsdf.base.alpha == 0.2  # type: ignore[attr-defined]
+    own = stage.of_targets(["kulla-conty(base=conductor(alpha=.4))"], ["alpha=.2"]).materials["m0"].bsdf
+    assert own.base.alpha == 0.4  # type: ignore[attr-defined]
+
+
+def test_an_option_that_does_not_reach_everything_says_so() -> None:
+    what = stage.of_targets(["coat", "conductor"], ["masking=schlick-direct"])
+    assert what.notes == ("masking is set of Coat itself; base.masking stays as it is",)
+    what = stage.of_targets(["mix(a=conductor,b=conductor)", "conductor"], ["alpha=0.2"])
+    assert what.notes[0].startswith("alpha sets nothing of Mix, which has a.alpha and b.alpha: give one of them")
+    with pytest.raises(InputError, match=r"alpha sets nothing of Mix.*\n.*--param a\.alpha=0\.2"):
+        stage.of_targets(["mix(a=conductor,b=conductor)"], ["alpha=0.2"])
+
+
+def test_rows_run_over_the_same_also_where_it_is_inside() -> None:
+    what = stage.of_targets(["kulla-conty(base=conductor(preset=Au))", "conductor(preset=Au)"])
+    labels = [[ball.label for ball in row.balls] for row in what.rows]
+    assert labels[0] == labels[1] and len(labels[0]) == 5
+    fixed = stage.of_targets(['kulla-conty(base={"type": "conductor", "alpha": .2})']).rows[0]
+    assert not any("base.alpha" in ball.values for ball in fixed.balls)
+    labels = [
+        [*ball.values.values()]
+        for row in stage.of_targets(["opacity(base=lambert)", "lambert"]).rows
+        for ball in row.balls
+    ]
+    assert labels[:5] == labels[5:]
+
+
+def test_an_exported_page_has_a_shader_for_what_presets_choose() -> None:
+    data = page.material_data("m0", stage.of_targets(["ashikhmin-shirley"]).materials["m0"])
+    chosen = [{k: v for k, v in p["set"].items() if isinstance(v, str | bool)} for p in data["presets"]]
+    assert {"fresnel": "exact"} in chosen
+    assert all(any(v["choices"] == made for v in data["variants"]) for made in chosen if made)
+
+
+def test_other_values_than_tables_were_found_from_are_another_variant() -> None:
+    """A coat over a base of another width has other tables: they were those of its default on every ball."""
+    what = stage.of_targets(["coat"])
+    variants = page.page_data(what)["materials"][0]["variants"][: len(what.rows[0].balls)]
+    widths = [ball.values["base.alpha"][0] for ball in what.rows[0].balls]  # type: ignore[index]
+    assert [v["fixed"]["base.alpha"] for v in variants] == widths
+    assert len({v["key"] for v in variants}) == 5 and len({v["text"] for v in variants}) == 1
+    declared = [p["value"] for v in variants for p in v["manifest"]["parameters"] if p["path"] == "base.alpha"]
+    assert declared == [0.3] * 5
+    with pytest.raises(InputError, match="no table is found from 'depth'"):
+        page.variant_data(what.materials["m0"].bsdf, {}, (), {"depth": 2.0})
 
 
 @pytest.mark.parametrize(

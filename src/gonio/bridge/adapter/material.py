@@ -149,7 +149,15 @@ class PlacedMaterial:
         """Values have been changed."""
         for slot in self.slots.values():
             dr.make_opaque(*slot.values.values())
+        if self.model.fixed:  # tables are found from the model's plain values
+            self.model = self.now()
+            self.sides = TwoSided(self.model) if self.sides is not None else None
         self.derive()
+
+    def now(self) -> BSDF:
+        """The model with the values of now, where those are the same everywhere."""
+        inner = {name: held.now() for name, (_, held) in self.inner.items() if isinstance(held, PlacedMaterial)}
+        return tree.rebuild(self.model, {**{name: slot.now() for name, slot in self.slots.items()}, **inner})
 
 
 def _preset(props: Properties, model: type[BSDF]) -> NamedPreset:
