@@ -26,18 +26,7 @@ from numpy.typing import NDArray
 from ..bridge.adapter.material import PlacedMaterial
 from ..bridge.adapter.slots import Slot
 from ..bridge.faults.lost_derivatives import own_variable
-from ..bridge.types import (
-    BSDFPlugin,
-    BSDFSample,
-    Float,
-    Mask,
-    Point,
-    Radiance,
-    Scene,
-    Sensor,
-    UInt,
-    Vector,
-)
+from ..bridge.types import BSDFPlugin, BSDFSample, Float, Mask, Point, Radiance, Scene, Sensor, UInt, Vector
 from ..errors import InputError
 from ..material.parameters import IndexParameter
 from .integrators import Integrator, LightTransport, Path, Render, Settings
