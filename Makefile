@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all test-gpu fuzz lint bench install clean docs browser
+.PHONY: demo test test-all test-gpu fuzz lint words bench install clean docs browser
 
 install: .venv/installed
 
@@ -37,6 +37,10 @@ lint: .venv/installed
 	$(BIN)/ruff format --check $(OURS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# names and prose that are still to be replaced by the field's words; not part of `lint` until it is empty
+words:
+	$(PYTHON) tools/words.py
 
 # Shaders and the page are tested in a real browser: the one that is here, else Debian's, else Playwright's.
 browser: .venv/installed

@@ -83,7 +83,7 @@ def test_a_trial_takes_the_command_lines_options(tmp_path: Path) -> None:
     assert "reciprocity" in report._repr_html_() and "<pre>" in report._repr_html_()
     with pytest.raises(InputError, match="quick and deep"):
         go.verify("lambert", quick=True, deep=True)
-    with pytest.raises(InputError, match="sweep of an object"):
+    with pytest.raises(InputError, match="sweep of a Python object"):
         go.verify(go.Lambert(), sweep="albedo=0.1,0.5")
 
 

@@ -155,8 +155,8 @@ _KINDS: dict[str, tuple[Check, str]] = {
 def _check_of(annotation: str) -> Check | None:
     """The check of an annotation; None for one that says nothing known."""
     options = []
-    for part in re.split(r"\|(?![^\[]*\])", annotation):
-        found = _one(part.strip())
+    for part in _alternatives(annotation):
+        found = _one(part)
         if found is None:
             return None
         options.append(found)
@@ -171,6 +171,18 @@ def _check_of(annotation: str) -> Check | None:
         raise ValueError(expected)
 
     return check
+
+
+def _alternatives(annotation: str) -> list[str]:
+    """The types of an annotation, split at the bars outside of brackets."""
+    parts, depth = [""], 0
+    for letter in annotation:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "|" and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts]
 
 
 def _one(name: str) -> tuple[Check, str] | None:

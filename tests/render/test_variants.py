@@ -247,10 +247,10 @@ class Ward(BSDF):
 
 
 @pytest.mark.parametrize("order", [
-    "import gonio.mitsuba; go.models.BSDF.family.add(Ward)",
-    "go.models.BSDF.family.add(Ward); import gonio.mitsuba",
-    "import mitsuba as mi; mi.set_variant('llvm_ad_spectral'); import gonio.mitsuba; go.models.BSDF.family.add(Ward)",
-    "import mitsuba as mi; mi.set_variant('llvm_ad_spectral'); import gonio.mitsuba; go.models.BSDF.family.add(Ward); "
+    "import gonio.mitsuba; go.BSDF.family.add(Ward)",
+    "go.BSDF.family.add(Ward); import gonio.mitsuba",
+    "import mitsuba as mi; mi.set_variant('llvm_ad_spectral'); import gonio.mitsuba; go.BSDF.family.add(Ward)",
+    "import mitsuba as mi; mi.set_variant('llvm_ad_spectral'); import gonio.mitsuba; go.BSDF.family.add(Ward); "
     "mi.set_variant('llvm_ad_mono')",
 ])  # fmt: skip
 def test_a_registered_material_is_a_plugin_whenever_it_was_registered(order: str) -> None:

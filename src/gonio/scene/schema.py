@@ -525,6 +525,7 @@ def _finished(schema: Any) -> Any:
     if PLACEHOLDER.items() <= schema.items():
         schema = {**{key: item for key, item in schema.items() if key not in PLACEHOLDER}, "$ref": MATERIAL}
     options = [item for item in schema.get("anyOf", ()) if item != {"type": "null"}]
-    if len(options) == 1:
-        schema = {**{key: item for key, item in schema.items() if key != "anyOf"}, **options[0]}
+    if options:
+        rest = {key: item for key, item in schema.items() if key != "anyOf"}
+        schema = rest | (options[0] if len(options) == 1 else {"anyOf": options})
     return {key: _finished(item) for key, item in schema.items() if not (key == "default" and item is None)}

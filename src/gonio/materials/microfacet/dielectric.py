@@ -136,7 +136,8 @@ class Dielectric(microfacet._Microfacet):
 
     def _value(self, facet: _Facet) -> Scalar:
         """Radiance's eval without albedo and F."""
-        facets = safe_div(distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet), abs(facet.wo.z))
+        d_g = distribution(self.ndf).D(facet.m, facet.alpha) * self._masking(facet)
+        facets = safe_div(d_g, abs(facet.wo.z))
         return where(facet.lit, facets * facet.spread, 0.0)
 
     def _density(self, facet: _Facet, eta: Scalar) -> Scalar:

@@ -22,7 +22,6 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ... import ops
 from ...errors import GonioWarning, InputError, summary, user_line
@@ -156,6 +155,8 @@ def _found(ndf: HasDensity) -> Tables:
         return Tables(Table(f"normals_{stem}", _columns(middle.shares[None], log_s)[0]), scale, kind)
     # a width at which D has a gap, such as (alpha^2 - 1) / log(alpha^2) at 1, has its neighbour's shape
     shares = np.stack([min(rows, key=lambda row: abs(row.width - width)).shares for width in widths])
+    from scipy.interpolate import CubicSpline  # slow to import, and needed by few
+
     logs = CubicSpline(np.log([row.width for row in rows]), np.log([row.w / row.width for row in rows]))
     fine = np.exp(logs(np.log(np.clip(np.linspace(LEAST, 1.0, FINE) ** 4, 0.9 * rows[0].width, 1.1 * rows[-1].width))))
     return Tables(Table(f"normals_{stem}", _columns(shares, log_s)), Table(f"widths_{stem}", fine[:, None]), kind)
