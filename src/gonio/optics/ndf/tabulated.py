@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +88,7 @@ def _row_of(alpha: Pair, count: int) -> Scalar:
 class HasDensity(Protocol):
     """What the tables are found from: a distribution of which D alone is written."""
 
-    name: str
+    name: ClassVar[str]
 
     def D(self, m: Direction, alpha: Pair) -> Scalar:
         """Density of normals, 1/sr."""
