@@ -115,7 +115,7 @@ def tables() -> None:
     for ndf in NDFS:
         for masking in MASKINGS:
             name = f"{ndf}, {masking}:"
-            fine = quadrature.moments(ndf, masking, MU, ROUGHNESS**2, nodes=(110, 90)).whole
+            fine = quadrature.moments(ndf, masking, MU, ROUGHNESS**2, nodes=(110, 90)).white
             found = bake.bake(ndf, ["E"], masking=masking)
             own = found.manifest["error"]["E"]
             figure(f"{name} E at the nodes, roughness >= .05", np.abs(found.arrays["E"] - fine)[rough].max(), 2e-5)
@@ -146,7 +146,7 @@ def two_widths() -> None:
         found = bake.bake(ndf, ["E", "Eavg"], masking=masking, aspect=aspect, layout="stretched")
         axes = bake.Axes("stretched", ndf, masking, 128, aspect, 24)
         part = np.ix_(np.arange(0, 24, 5), np.arange(29, 128, 14), np.arange(0, 128, 9))  # roughness >= .2
-        fine = quadrature.moments(ndf, masking, *axes.at(*part), nodes=(200, 120)).whole
+        fine = quadrature.moments(ndf, masking, *axes.at(*part), nodes=(200, 120)).white
         name = f"{ndf}, {masking}, alpha_y / alpha_x = {aspect}:"
         figure(f"{name} E", np.abs(found.arrays["E"][part] - fine).max(), 2e-5)
         figure(f"{name} between nodes", found.manifest["error"]["E"]["interpolation"])
@@ -154,9 +154,9 @@ def two_widths() -> None:
 
 def sampling() -> None:
     """Quadrature against sampling, GGX, smith-correlated; then the homework's layout, before 8 bits."""
-    exact = quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2, nodes=(110, 90)).whole
+    exact = quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2, nodes=(110, 90)).white
     ways = {
-        "quadrature": lambda: quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2).whole,
+        "quadrature": lambda: quadrature.moments("ggx", "smith-correlated", MU, ROUGHNESS**2).white,
         "normals, 1024 independent samples": lambda: (
             monte_carlo.estimate("ggx", "smith-correlated", MU, ROUGHNESS**2, "ggx", 1024, "independent").value
         ),
@@ -171,7 +171,7 @@ def sampling() -> None:
     figure("rms^2 x time, sampling over quadrature", second / first, 1e4, at_least=True)
     part = ROUGHNESS >= 0.1
     for masking in MASKINGS:
-        truth = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).whole
+        truth = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).white
         for points in ("hammersley", "independent"):
             found = monte_carlo.estimate("ggx", masking, MU, ROUGHNESS**2, "ggx", 1024, points)
             rms = np.sqrt(np.mean((found.value - truth)[part] ** 2))
@@ -190,7 +190,7 @@ def sampling() -> None:
 
         reference = Path(os.environ["GONIO_SHARED"]) / "reference" / "kulla-conty"
         engine.load("cpu")
-        truth = quadrature.moments("ggx", "schlick-ibl", MU, ROUGHNESS**2).whole[::-1]
+        truth = quadrature.moments("ggx", "schlick-ibl", MU, ROUGHNESS**2).white[::-1]
         picture = np.array(mi.Bitmap(str(reference / "homework_E_importance_sampled.png")))[..., 0] / 255.0
         rms = np.sqrt(np.mean((picture - truth)[ROUGHNESS[::-1] >= 0.3] ** 2))
         figure("a public solution's E against schlick-ibl, roughness >= .3, rms", rms, 0.004, ".4f")

@@ -313,7 +313,7 @@ def test_the_homeworks_pictures_follow_half_of_alpha_and_not_its_text(shared):
     average = read_png(reference / "homework_Eavg.png")[:, 0, 0].astype(float)
     table = (ROOT / "docs/energy.md").read_text(encoding="utf-8")
     for masking in ("schlick-ibl", "schlick-direct", "smith-correlated"):
-        error = picture - np.floor(255 * quadrature.moments("ggx", masking, mu, roughness**2).whole[::-1])
+        error = picture - np.floor(255 * quadrature.moments("ggx", masking, mu, roughness**2).white[::-1])
         error_avg = average - np.floor(255 * quadrature.average("ggx", masking, centres**2)[::-1])
         rms, rms_avg = (np.sqrt(np.mean(part**2)) for part in (error, error_avg))
         row = [text.strip() for text in table.partition(f"\n| `{masking}`")[2].partition("\n")[0].split("|")[1:4]]

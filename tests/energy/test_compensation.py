@@ -149,7 +149,7 @@ def test_the_polynomials_meet_the_quadrature():
         form = bend.form_of(ndf, masking)
         knee = bend.numpy_knee(form, masking, roughness**2)
         ours = curves.evaluate(form, rows[:, :-1], knee, np.broadcast_to(mu, (37, 60)))
-        exact = 1.0 - quadrature.moments(ndf, masking, mu, roughness[:, None] ** 2).whole
+        exact = 1.0 - quadrature.moments(ndf, masking, mu, roughness[:, None] ** 2).white
         assert np.abs(ours - exact).max() < bar
 
 
@@ -245,7 +245,7 @@ def test_turquin_scales_by_f0_and_what_is_missing():
         (np.array(gold.eta) + 1) ** 2 + np.array(gold.k) ** 2
     )
     for mu in (0.2, 0.8):
-        e = float(quadrature.moments("ggx", "smith-correlated", mu, 0.6).whole)
+        e = float(quadrature.moments("ggx", "smith-correlated", mu, 0.6).white)
         expected = gold.eval(direction(mu), direction(0.5, 2.0)) * (1.0 + f0 * (1.0 - e) / e)
         np.testing.assert_allclose(go.Turquin(gold).eval(direction(mu), direction(0.5, 2.0)), expected, rtol=5e-4)
 
@@ -255,7 +255,7 @@ def test_fdez_aguera_adds_a_diffuse_lobe_of_its_own_formula():
     f0 = (0.7**2 + 4.0) / (1.3**2 + 4.0)
     mu = 0.5
     found = quadrature.moments("ggx", "smith-correlated", mu, 0.7)
-    single, lost = f0 * (found.whole - found.schlick) + found.schlick, 1.0 - found.whole
+    single, lost = f0 * (found.white - found.schlick) + found.schlick, 1.0 - found.white
     f_avg = f0 + (1.0 - f0) / 21.0
     wo, wi = direction(mu), direction(0.4, 2.0)
     added = go.FdezAguera(metal).eval(wo, wi) - metal.eval(wo, wi)

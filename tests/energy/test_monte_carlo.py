@@ -16,7 +16,7 @@ MU, ROUGHNESS = np.meshgrid(CENTRES, CENTRES[CENTRES >= 0.1])
     [("schlick-direct", 0.005), ("schlick-ibl", 0.005), ("smith-separable", 0.006), ("smith-correlated", 0.006)],
 )
 def test_hammersley_points_at_1024_samples_meet_the_homeworks_bar(masking, bar):
-    exact = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).whole
+    exact = quadrature.moments("ggx", masking, MU, ROUGHNESS**2).white
     found = monte_carlo.estimate("ggx", masking, MU, ROUGHNESS**2, "ggx", 1024)
     assert np.sqrt(np.mean((found.value - exact) ** 2)) <= bar
 
@@ -25,14 +25,14 @@ def test_hammersley_points_at_1024_samples_meet_the_homeworks_bar(masking, bar):
     ("ndf", "method"), [("ggx", "ggx"), ("ggx", "visible"), ("beckmann", "beckmann"), ("beckmann", "visible")]
 )
 def test_independent_points_err_as_their_variance_predicts(ndf, method):
-    exact = quadrature.moments(ndf, "smith-correlated", MU, ROUGHNESS**2).whole
+    exact = quadrature.moments(ndf, "smith-correlated", MU, ROUGHNESS**2).white
     found = monte_carlo.estimate(ndf, "smith-correlated", MU, ROUGHNESS**2, method, 1024, "independent", seed=7)
     ratio = np.sqrt(np.mean((found.value - exact) ** 2) / np.mean(found.standard_error**2))
     assert 1 / 1.2 < ratio < 1.2
 
 
 def test_cosine_sampling_is_unbiased_where_the_lobe_is_broad():
-    exact = quadrature.moments("ggx", "smith-correlated", 0.6, 0.8).whole
+    exact = quadrature.moments("ggx", "smith-correlated", 0.6, 0.8).white
     found = monte_carlo.estimate(
         "ggx", "smith-correlated", 0.6, 0.8, "cosine", 1 << 16, "independent", precision="float64"
     )

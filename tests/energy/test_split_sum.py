@@ -29,8 +29,8 @@ def test_the_table_that_shaders_read_is_met_between_its_nodes(alpha):
     for mu in (0.07, 0.31, 0.62, 0.97):
         whole = quadrature.moments("ggx", "smith-correlated", mu, alpha)
         wo = kind.vec3(float(np.sqrt(1 - mu * mu)), 0.0, mu)
-        found = split_sum.reflected(bound, kind.vec3(f0, f0, f0), kind.float(float(whole.whole)), wo)
-        exact = f0 * (whole.whole - whole.schlick) + whole.schlick
+        found = split_sum.reflected(bound, kind.vec3(f0, f0, f0), kind.float(float(whole.white)), wo)
+        exact = f0 * (whole.white - whole.schlick) + whole.schlick
         assert found.x[0] == pytest.approx(float(exact), abs=3e-4)
 
 
