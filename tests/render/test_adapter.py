@@ -10,6 +10,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.bridge import engine
+from gonio.bridge.adapter import register_model
 
 from sphere import at, random_directions, random_numbers
 
@@ -396,22 +397,42 @@ def test_changed_values_compile_no_kernel() -> None:
         assert compiled(scene, key, first * 0.9) == 0, key
 
 
-def test_tables_follow_a_changed_value() -> None:
-    """Those of a coat are found from its base's width: they stayed those of the first."""
+class Dyed(go.BSDF):
+    """Lambert, with code for its dye where there is some."""
 
-    def coat(alpha: float) -> Any:
-        return mi.load_dict({"type": "gonio_coat", "base": {"type": "gonio_conductor", "alpha": alpha}})
+    dye: go.Number = go.number(0.0, "share of what a dye takes", low=0.0, high=1.0, off=0.0)
+
+    def eval(self, wo: Any, wi: Any, mode: str = "radiance") -> Any:
+        white = dr.maximum(wi.z, 0.0) * (1.0 / np.pi)
+        return white if self.plain.dye == 0.0 else white * (1.0 - self.dye)
+
+
+@pytest.mark.parametrize(
+    ("made", "key", "first", "then"),
+    [
+        (
+            lambda alpha: {"type": "gonio_coat", "base": {"type": "gonio_conductor", "alpha": alpha}},
+            "base.alpha",
+            0.1,
+            0.6,
+        ),
+        (lambda dye: {"type": register_model(mi, Dyed), "dye": dye}, "dye", 0.0, 0.8),
+    ],
+    ids=["tables of another width", "a layer that was off"],
+)
+def test_a_changed_value_is_as_if_it_had_been_made_so(made: Any, key: str, first: float, then: float) -> None:
+    """Tables that are found from it stayed those of the first value, and a layer that was off stayed so."""
 
     def values(bsdf: Any) -> np.ndarray:
         return np.array(bsdf.eval(mi.BSDFContext(), _interaction(WO), mi.Vector3f(WI.T)))
 
-    changed = coat(0.1)
+    changed = mi.load_dict(made(first))
     before = values(changed)
     params = mi.traverse(changed)
-    params["base.alpha"] = mi.Float(0.6)
+    params[key] = mi.Float(then)
     params.update()
     found = values(changed)
-    np.testing.assert_allclose(found, values(coat(0.6)), rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(found, values(mi.load_dict(made(then))), rtol=1e-5, atol=1e-7)
     assert abs(found - before).max() > 0.1
 
 
@@ -437,6 +458,7 @@ def test_registering_again_changes_nothing() -> None:
 SPECTRAL = """
 import gonio as go
 from gonio.bridge import engine
+from gonio.bridge.adapter import register_model
 mi = engine.load()
 import gonio.mitsuba
 import drjit as dr, numpy as np

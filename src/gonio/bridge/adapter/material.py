@@ -149,10 +149,17 @@ class PlacedMaterial:
         """Values have been changed."""
         for slot in self.slots.values():
             dr.make_opaque(*slot.values.values())
-        if self.model.fixed:  # tables are found from the model's plain values
+        if self.follows:
             self.model = self.now()
             self.sides = TwoSided(self.model) if self.sides is not None else None
         self.derive()
+
+    @property
+    def follows(self) -> bool:
+        """Whether the model's plain values must be those of now: tables are found from them, or layers that are off by
+        them have no code."""
+        layers = any(leaf.parameter.off is not None for leaf in tree.leaves(self.model))
+        return layers or bool(self.model.fixed)
 
     def now(self) -> BSDF:
         """The model with the values of now, where those are the same everywhere."""

@@ -99,6 +99,8 @@ def plugin_class(mi: ModuleType) -> OfVariant:
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.placed.changed()
+            if self.placed.follows:
+                self._set_flags(self.placed.model.delta)
             # a width that was 0 may be so no longer: both kinds of lobe are possible from now on
             if self.placed.model.delta == "always" and any(key.startswith("alpha") for key in keys):
                 self._set_flags("maybe")

@@ -118,11 +118,15 @@ class Slot:
         return any(texture.is_spatially_varying() for texture in self.textures.values())
 
     def now(self) -> Plain:
-        """Numbers that tell the values of now; of textures and curves what `plain` tells."""
+        """Numbers that tell the values of now, within their range; of textures and curves as `plain`."""
         if self.textures or self.curves or self.variant.spectral or not self.values:
             return self.plain
-        found = [np.asarray(dr.detach(value), float).ravel() for value in self.values.values()]
-        if self.parameter.kind == "spectrum":
+        parameter = self.parameter
+        found = [
+            np.clip(np.asarray(dr.detach(v), float).ravel(), parameter.low, parameter.high)
+            for v in self.values.values()
+        ]
+        if parameter.kind == "spectrum":
             return tuple(np.broadcast_to(found[0], 3).tolist())
         return tuple(float(value[0]) for value in found) if len(found) == 2 else float(found[0][0])
 
