@@ -29,7 +29,8 @@ Vector = tuple[Number, Number, Number]
 Colour = tuple[Positive, Positive, Positive]
 Key = Annotated[str, Field(pattern=r"^[0-9A-Za-z_-]{1,80}$")]
 Path = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]{0,120}$")]
-Value = Number | tuple[Number, Number] | Vector
+Parameter = Annotated[float, Field(allow_inf_nan=False, ge=-3e38, le=3e38)]  # fits of He-Torrance have specular = 3e13
+Value = Parameter | tuple[Parameter, Parameter] | tuple[Parameter, Parameter, Parameter]
 Choice = Annotated[str, Field(max_length=80)] | bool
 
 
