@@ -37,6 +37,17 @@ def test_names_docstrings_citations_and_constants_of_the_source_survive() -> Non
     assert "Below this width a facet's tilt" in text and "const float INV_PI = 0.31830987;" in text
 
 
+@pytest.mark.parametrize("name", ["lafortune", "disney", "normal-map"])
+def test_code_whose_values_may_tell_x_from_y_is_not_isotropic(name: str) -> None:
+    """It was by the values that it was written with: a page took the albedo along x for that of all azimuths."""
+    assert not bundle(name, "glsl").manifest["isotropic"]
+
+
+def test_the_manifest_tells_what_tables_were_found_from() -> None:
+    fixed = {p["path"] for p in bundle("coat", "glsl").manifest["parameters"] if p["fixed"]}
+    assert "base.alpha" in fixed and "depth" not in fixed
+
+
 def test_functions_that_differ_in_a_number_alone_are_one() -> None:
     for name in FEW:
         copies = [f for f in _functions(written(name).text) if re.fullmatch(r".*_[3-9]|.*_\d\d", f)]

@@ -167,14 +167,15 @@ export class ModelsSection {
     });
     const low = parameter.low ?? (kind === "angle" ? -Math.PI : 0);
     if (kind === "alpha") {
-      const isotropic = app.shaderOf(slot).manifest.isotropic;
+      const [first, second] = [parameter.value].flat();
+      const round = second === undefined || first === second;
       const width = (value: Value, k: 0 | 1) => (Array.isArray(value) ? (value[k] as number) : (value as number));
       const hint = (roughness: number) => `α = ${short(roughness * roughness)}`;
       const dial = name === "alpha" ? "roughness" : name.replace(/alpha$/, "roughness");
       // The artist's dial is the square root of the width: what looks like equal steps.
       const top = Math.sqrt(parameter.high ?? 1);
       const clamp = (r: number) => Number((r * r).toPrecision(6));
-      if (isotropic)
+      if (round)
         new RangeControl(gui, field(dial, (v) => Math.sqrt(width(v, 0)), (r) => [clamp(r), clamp(r)], "√α"), { low: 0, high: top, hint });
       else
         for (const k of [0, 1] as const)

@@ -148,6 +148,8 @@ class NormalMap(BSDF):
 
     @property
     def isotropic(self) -> bool:
+        if isinstance(self.lean_x, ops.Node):  # a recording's may lean anywhere
+            return False
         return not self.perturbs_normal and self.base.isotropic
 
     @property

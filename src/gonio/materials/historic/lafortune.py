@@ -10,7 +10,7 @@ import numpy as np
 from ... import ops
 from ...material.bsdf import KnownViolation
 from ...material.parameters import Colour, Number, number, spectrum
-from ...ops import Direction, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
+from ...ops import Direction, Node, Scalar, Spectrum, dot, exp, function, inv_pi, minimum, normalize, sqr, vec3, where
 from ...optics.frame import normal_like
 from ...optics.special import logrel
 from ...optics.warp import power_about, square_to_power_lobe, to_frame
@@ -39,7 +39,9 @@ class Lafortune(_Glossy):
 
     @property
     def isotropic(self) -> bool:
-        """Whether x and y count alike."""
+        """Whether x and y count alike; never of a recording, whose values are yet to come."""
+        if isinstance(self.cx, Node):
+            return False
         return bool(np.array_equal(np.asarray(self.plain.cx), np.asarray(self.plain.cy)))
 
     def _most(self) -> np.ndarray:

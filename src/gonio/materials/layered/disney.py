@@ -13,6 +13,7 @@ from ...material.sample import Sample
 from ...ops import (
     Direction,
     Mode,
+    Node,
     Pair,
     Scalar,
     Spectrum,
@@ -90,6 +91,8 @@ class Disney(BSDF):
 
     @property
     def isotropic(self) -> bool:
+        if isinstance(self.anisotropic, Node):  # a recording's may take any value
+            return False
         return isinstance(self.plain.anisotropic, int | float) and self.plain.anisotropic == 0
 
     def lossless(self) -> Self:
