@@ -94,7 +94,7 @@ class Family(Generic[Member]):
             return name
         check = getattr(member, "check_formulas", None)
         if callable(check) and not isinstance(member, type):
-            check(where)
+            check()
         overridable = getattr(standing, "overridable", False)
         if standing is not None and standing is not member and not overridable and _source(standing) != _source(member):
             what = f"the {self.kind} '{name}' is there already, in {_source(standing)[0]}"

@@ -313,6 +313,8 @@ class Half(go.Fresnel):
 
 
 assert_type(Cosine, type[Cosine])
+own = go.Conductor(ndf=Cosine, masking=Unmasked(), fresnel="schlick")
+assert_type(own.ndf, str)
 assert_type(Cosine.family.get("ggx"), go.NDF)
 film = go.fresnel(np.radians(60.0), eta=1.5, k=0.0)
 assert_type(film, go.Interface)

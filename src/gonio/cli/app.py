@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from ..errors import GonioError, GonioWarning, InputError
+from ..errors import GonioError, GonioWarning, InputError, in_user_code, out_of_loop
 from .signals import Ended, exit_code
 from .verbs.base import MATERIALS, PICTURES, SUPPORT, Verb
 
@@ -159,12 +159,17 @@ def _say_no_more() -> None:
 
 
 def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
-    """The exit code of what is a fault of Gonio, unless a signal came in the middle of an import."""
+    """The exit code of what is a fault of code that the user named, or else of Gonio, unless a signal came in the
+    middle of an import."""
     if ended.number:
         print(ended.line, file=sys.stderr)
         return ended.code
     if os.environ.get("GONIO_DEBUG"):
         raise error
+    cause = out_of_loop(error)
+    located = cause if isinstance(cause, GonioError) else in_user_code(cause)
+    if located is not None:
+        return _fail(located, as_json)
     what = f"Gonio failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"
     failure = GonioError(what, "", "this is a fault of Gonio; run `gonio --debug ...` and report what it prints")
     failure.code = 3

@@ -13,7 +13,9 @@ import functools
 import hashlib
 import inspect
 import io
+import os
 import sys
+import time
 import warnings
 from collections.abc import Callable
 from functools import lru_cache
@@ -25,6 +27,7 @@ import numpy as np
 from .. import archives, files
 from ..errors import GonioError, GonioWarning
 from ..members import Family
+from ..models.user_code import with_imports
 from ..optics.fresnel import Fresnel
 from ..optics.masking import Masking
 from ..optics.ndf import NDF
@@ -100,10 +103,21 @@ def of_members(build: Callable[..., Kept]) -> Callable[..., Kept]:
 
 
 def origin(*names: str) -> tuple[str, ...]:
-    """Hashes of the files of those among these members that are not Gonio's own: part of a key on disk."""
+    """Hashes of the files of those among these members that are not Gonio's own, and of what these import from their
+    folders: part of a key on disk. A class that no file has is another in every process."""
     members = [type(family.get(name)) for family, name in zip(FAMILIES, names, strict=False)]
-    files = [inspect.getsourcefile(cls) for cls in members if not cls.__module__.startswith("gonio.")]
-    return tuple(hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in files if file)
+    return tuple(_hash_of(cls) for cls in members if not cls.__module__.startswith("gonio."))
+
+
+def _hash_of(cls: type) -> str:
+    try:
+        found = with_imports(Path(inspect.getsourcefile(cls) or ""))
+        return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(found))).hexdigest()
+    except (OSError, TypeError):  # typed at a prompt
+        return f"{cls.__qualname__} {id(cls)} {_PROCESS}"
+
+
+_PROCESS = f"{os.getpid()} {time.time_ns()}"
 
 
 def _path(key: tuple) -> tuple[Path, str]:

@@ -25,6 +25,7 @@ from ..errors import GonioWarning, InputError, did_you_mean
 from ..members import Family
 from ..ops import Pair, Scalar, Spectrum, backend, graph, sincos
 from ..optics import indices
+from ..optics.part import Part
 from . import user_code
 
 CHANNELS = 3  # of a colour given as plain numbers; a renderer's spectra have their own number
@@ -37,6 +38,7 @@ Floats: TypeAlias = "NDArray[np.floating]"
 PlainNumber: TypeAlias = "float | list[float] | Floats | Scalar"
 PlainColour: TypeAlias = "float | tuple[float, float, float] | list[float] | Floats | Spectrum | Scalar"
 PlainIndex: TypeAlias = "PlainNumber | str"
+PlainMember: TypeAlias = "str | Part | type[Part]"  # a distribution, a masking term, a Fresnel kind
 PlainWidth: TypeAlias = "float | tuple[PlainNumber, PlainNumber] | list[float] | Floats | Pair | Scalar"
 
 if TYPE_CHECKING:
@@ -60,8 +62,12 @@ if TYPE_CHECKING:
         def __get__(self, owner: object, cls: type | None = None) -> Pair | None: ...
         def __set__(self, owner: Never, value: PlainNumber | None) -> None: ...
 
+    class Member:
+        def __get__(self, owner: object, cls: type | None = None) -> str: ...
+        def __set__(self, owner: Never, value: PlainMember) -> None: ...
+
 else:
-    Number = Index = Colour = Width = Angle = "a declared parameter"
+    Number = Index = Colour = Width = Angle = Member = "a declared parameter"
 
 
 # --------------------------------------------------------------------------- the kinds
@@ -337,6 +343,9 @@ class ChoiceParameter(Parameter):
 
     def check(self, value: object, location: str) -> None:
         known = self.choices
+        if self.family is not None and isinstance(value, str) and user_code.names_code(value):
+            hint = "name it on the command line, in a program, or in a scene with --allow-code; here give a name"
+            raise InputError(f"'{value}' is code, which is not run from here", location, hint)
         if not isinstance(value, str) or value not in known:
             raise InputError(f"unknown {self.name} '{value}'", location, did_you_mean(str(value), list(known)))
 

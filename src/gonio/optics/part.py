@@ -20,6 +20,10 @@ GUIDE = "docs/your-own-material.md, under 'A distribution, a masking term, a Fre
 SAMPLES = {"vec3": (0.36, 0.48, 0.8), "vec2": (0.3, 0.4), "spectrum": (0.2, 0.5, 0.9), "float": (0.6,)}
 
 
+class MissingFormula(InputError, NotImplementedError):
+    """A method that is asked for, and that a part of the user's own does not have."""
+
+
 class Part:
     """Base of the three.
 
@@ -40,13 +44,15 @@ class Part:
         """What must be written and is not, as its signature: "D(self, m, alpha)"; "" where nothing is missing."""
         return ""
 
-    def check_formulas(self, where: str = "") -> None:
+    def lacks(self, what: str, method: str) -> MissingFormula:
+        """The error where a method is asked for that is missing; `method` is its signature."""
+        return MissingFormula(f"{type(self).__name__} has {what}", self.place(), f"write {method}; see {GUIDE}")
+
+    def check_formulas(self) -> None:
         """Raise InputError where a formula is missing, cannot run, or returns what it must not."""
         missing = self.missing()
         if missing:
-            method = missing.partition("(")[0]
-            hint = f"write {missing}; see {GUIDE}"
-            raise InputError(f"{type(self).__name__} has no `{method}`", self.place() or where, hint)
+            raise self.lacks(f"no `{missing.partition('(')[0]}`", missing)
         for method, kinds in self.formulas.items():
             formula = inspect.unwrap(getattr(type(self), method))
             if not formula.__module__.startswith("gonio."):

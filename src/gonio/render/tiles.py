@@ -14,7 +14,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import GonioError, InputError, in_user_code, out_of_loop
 from ..transport import passes
 from ..transport.integrators import Render
 from ..transport.integrators.progressive import LANES
@@ -198,28 +198,46 @@ def travelling(prepared: Prepared) -> tuple[str, dict[str, Path]]:
 _last: dict[
     str, tuple[Prepared, tempfile.TemporaryDirectory[str]]
 ] = {}  # the scene that is loaded; parts follow each other
+_copies: dict[str, Path] = {}  # of its files, by the paths that whoever asked has them at
 _rates: dict[str, float] = {}  # samples a second that its last part made
 
 
 def part(spec: str, begin: int, end: int, first: int, last: int, start: Arrays | None) -> Arrays:
     """The sums of lanes [begin, end) with samples [first, last), added to those that were there."""
-    render = _prepared(spec).render
-    assert isinstance(render, Render)
-    render.select(slice(begin, end))
-    if start is not None:
-        render.restore(first, start)
-    lanes = end - begin
+    with _places_as_given():
+        render = _prepared(spec).render
+        assert isinstance(render, Render)
+        render.select(slice(begin, end))
+        if start is not None:
+            render.restore(first, start)
+        lanes = end - begin
 
-    def remember(progress: Progress) -> None:
-        _rates[spec] = progress.rate
+        def remember(progress: Progress) -> None:
+            _rates[spec] = progress.rate
 
-    passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * LONGEST_PASS / lanes), report=remember)
-    return {name: np.array(values) for name, values in render.state().items()}
+        passes.run(render, last, lanes, first=int(_rates.get(spec, 0.0) * LONGEST_PASS / lanes), report=remember)
+        return {name: np.array(values) for name, values in render.state().items()}
+
+
+@contextlib.contextmanager
+def _places_as_given() -> Iterator[None]:
+    """An error names the files of whoever asked for the job, not their copies here."""
+    try:
+        yield
+    except Exception as error:
+        cause = out_of_loop(error)
+        located = cause if isinstance(cause, GonioError) else in_user_code(cause)
+        if located is None:
+            raise
+        for path, copy in _copies.items():
+            located.where = located.where.replace(str(copy), path)
+        raise type(located)(located.what, located.where, located.hint) from error
 
 
 def _prepared(spec: str) -> Prepared:
     if spec not in _last:
         _last.clear()
+        _copies.clear()
         _rates.clear()
         folder = tempfile.TemporaryDirectory(prefix="gonio-scene-")
         known: Facts = json.loads(spec)
@@ -237,6 +255,7 @@ def _unpacked(known: Facts, folder: Path) -> Request:
         # code finds what it imports beside it
         inside = os.path.relpath(path, known["folder"] or Path(path).anchor)
         target = folder / inside
+        _copies[path] = target
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(crew.file(content), target)
         text = text.replace(json.dumps(path)[1:-1] + ":", json.dumps(str(target))[1:-1] + ":")  # FILE.py:CLASS

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..catalog import notation, outside
-from ..errors import GonioError, InputError
+from ..errors import GonioError, InputError, out_of_loop
 from ..material import BSDF, KnownViolation, Parameter, Sample, models, tree
 from ..material.sample import SampleArrays
 from ..ops import Direction, Mode, Precision, Spectrum, backend
@@ -283,9 +283,12 @@ def guarded(model: Any, method: str, run: Any) -> Any:
             return run()
     except (Fault, GonioError, KeyboardInterrupt, TimeoutError):
         raise
-    except (Exception, SystemExit, GeneratorExit) as error:
+    except (Exception, SystemExit, GeneratorExit) as raised:
+        error = out_of_loop(raised)
+        if isinstance(error, GonioError):
+            raise Fault(f"{error.what} in {method}", error.where) from raised
         text = str(error).strip().splitlines()
-        raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from error
+        raise Fault(f"{type(error).__name__} in {method}: {text[0] if text else ''}", _line(model, error)) from raised
 
 
 def _line(model: Any, error: BaseException) -> str:

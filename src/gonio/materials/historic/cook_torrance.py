@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...material.bsdf import KnownViolation
-from ...material.parameters import Angle, Colour, Width, spectrum, width
+from ...material.parameters import Angle, Colour, Member, Width, spectrum, width
 from ...ops import Direction, Scalar, Spectrum, function, zeros_like
 from ...optics import frame, fresnel
 from ...optics.masking.v_groove import v_groove
@@ -31,7 +31,7 @@ class CookTorrance(_Glossy):
     alpha: Width = width(default=0.15, doc="width of the distribution; two for anisotropy", low=1e-3, high=4.0)
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
-    fresnel: str = microfacet.fresnel_choice()
+    fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("D G / (pi cos cos) is four times what facets reflect, "),

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from ... import ops
 from ...material.bsdf import KnownViolation
-from ...material.parameters import Colour, Number, number, spectrum
+from ...material.parameters import Colour, Member, Number, number, spectrum
 from ...ops import (
     Direction,
     Pair,
@@ -59,7 +59,7 @@ class HeTorrance(_Glossy):
     tau: Number = number(default=3000.0, doc="correlation length of the heights", low=100.0, unit="nm")
     eta: Number = number(default=1.5, doc="refractive index, over the outside's", low=1.0)
     wavelength: Colour = spectrum(default=(645.0, 526.0, 444.0), doc="wavelength of each channel", low=100.0, unit="nm")
-    fresnel: str = microfacet.fresnel_choice()
+    fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "energy": sum_breach("toward grazing light G D grows faster than S falls, "),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import ops
 from ...material.bsdf import KnownViolation
-from ...material.parameters import Colour, Number, number, spectrum
+from ...material.parameters import Colour, Member, Number, number, spectrum
 from ...ops import Direction, Scalar, Spectrum, exp, function, inv_pi, log, safe_sqrt, sincos, sqr, vec3
 from ...optics import frame, fresnel
 from ...optics.masking.v_groove import v_groove
@@ -29,7 +29,7 @@ class LowMicrofacet(_Glossy):
     b: Number = number(default=300.0, doc="how narrow the peak is: it ends at 1 - n.h = 1 / b", low=1e-3)
     c: Number = number(default=1.5, doc="falloff beyond the peak: as (1 - n.h)^-c", low=0.0)
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
-    fresnel: str = microfacet.fresnel_choice()
+    fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("D is not normalized, ")}
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import ops
 from ...material.bsdf import KnownViolation
-from ...material.parameters import Colour, Number, number, spectrum
+from ...material.parameters import Colour, Member, Number, number, spectrum
 from ...ops import (
     Direction,
     Scalar,
@@ -48,7 +48,7 @@ class LowSmooth(_Glossy):
     b: Number = number(default=300.0, doc="how narrow the peak is: it ends at |Dp| = 1 / sqrt(b)", low=1e-3)
     c: Number = number(default=1.0, doc="falloff beyond the peak: as |Dp|^(-2 c)", low=0.0)
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
-    fresnel: str = microfacet.fresnel_choice()
+    fresnel: Member = microfacet.fresnel_choice()
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach("nothing normalizes the lobe, ")}
 

@@ -11,6 +11,7 @@ from ...material import (
     BSDF,
     Colour,
     KnownViolation,
+    Member,
     Number,
     Sample,
     Width,
@@ -72,8 +73,8 @@ class Coat(BSDF):
     alpha: Width = width_parameter(default=0.0, doc="width of the top's microfacets; 0 is smooth")
     absorption: Colour = spectrum(default=0.0, doc="a crossing straight down leaves exp(-absorption depth)", low=0.0)
     depth: Number = number(default=1.0, doc="how thick the coat is", low=0.0)
-    ndf: str = microfacet.ndf_choice()
-    masking: str = microfacet.masking_choice()
+    ndf: Member = microfacet.ndf_choice()
+    masking: Member = microfacet.masking_choice()
     bounces: str = choice("coloured", "colour of light that bounces between coat and base", BOUNCES)
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...material.bsdf import Preset
-from ...material.parameters import Angle, Colour, Width, spectrum
+from ...material.parameters import Angle, Colour, Member, Width, spectrum
 from ...material.polarization import Polarized
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, dot, function, where
 from ...optics import frame, fresnel, indices
@@ -27,9 +27,9 @@ class Conductor(_Reflector):
     k: Colour = spectrum(default=1.0, doc="imaginary part of the refractive index, over the outside's", low=0.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
-    ndf: str = microfacet.ndf_choice()
-    masking: str = microfacet.masking_choice()
-    fresnel: str = microfacet.fresnel_choice()
+    ndf: Member = microfacet.ndf_choice()
+    masking: Member = microfacet.masking_choice()
+    fresnel: Member = microfacet.fresnel_choice()
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected")
     sampling: str = microfacet.sampling_choice()
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...material.bsdf import Delta, InnerAlbedo, Interior, Preset
 from ...material.calling import method
-from ...material.parameters import Angle, Colour, Index, Number, Width, flag, index, number, spectrum
+from ...material.parameters import Angle, Colour, Index, Member, Number, Width, flag, index, number, spectrum
 from ...material.polarization import Polarized
 from ...material.sample import Sample
 from ...ops import abs, backend, dot, fma, function, maximum, ones_like, rsqrt, safe_div, sqr, where, zeros_like
@@ -62,9 +62,9 @@ class Dielectric(microfacet._Microfacet):
     eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()
-    ndf: str = microfacet.ndf_choice()
-    masking: str = microfacet.masking_choice()
-    fresnel: str = microfacet.fresnel_choice()
+    ndf: Member = microfacet.ndf_choice()
+    masking: Member = microfacet.masking_choice()
+    fresnel: Member = microfacet.fresnel_choice()
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
     transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
     sampling: str = microfacet.sampling_choice()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...material.bsdf import KnownViolation
-from ...material.parameters import Angle, Colour, Width, choice, spectrum
+from ...material.parameters import Angle, Colour, Member, Width, choice, spectrum
 from ...ops import Scalar, Spectrum, function, ones_like
 from ...optics.fresnel import average as mean_over_angles
 from ...optics.fresnel.f82 import GRAZING, f82
@@ -34,8 +34,8 @@ class Metal(_Reflector):
     edge: Colour = spectrum(default=1.0, doc="factor on Schlick's curve at 82 degrees", low=0.0, high=1.0)
     alpha: Width = microfacet.alpha_width()
     rotation: Angle = microfacet.rotation_angle()  # type: ignore[assignment]  # mypy mistakes an inherited field
-    ndf: str = microfacet.ndf_choice()
-    masking: str = microfacet.masking_choice()
+    ndf: Member = microfacet.ndf_choice()
+    masking: Member = microfacet.masking_choice()
     fresnel: str = choice("f82", "Fresnel reflectance", FRESNELS, white="one")
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected")
     sampling: str = microfacet.sampling_choice()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.bsdf import BSDF, Delta, InnerAlbedo, Microsurface
-from ...material.parameters import Angle, Colour, Width, angle, choice, pair_of, spectrum, width
+from ...material.parameters import Angle, Colour, Member, Width, angle, choice, pair_of, spectrum, width
 from ...ops import Direction, Mask, Pair, Scalar, Spectrum, abs, backend, dot, function, ones_like, safe_div, where
 from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
@@ -45,17 +45,17 @@ def rotation_angle() -> Angle:
     return angle(default=0.0, doc="turn of the anisotropy's axes about the normal, from dp/du")
 
 
-def ndf_choice() -> str:
+def ndf_choice() -> Member:
     """Declare the distribution of normals."""
     return choice("ggx", "distribution of microfacet normals", NDF.family)
 
 
-def masking_choice() -> str:
+def masking_choice() -> Member:
     """Declare the masking term."""
     return choice("smith-correlated", "masking and shadowing", masking.Masking.family)
 
 
-def fresnel_choice() -> str:
+def fresnel_choice() -> Member:
     """Declare the Fresnel reflectance."""
     return choice("exact", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
 
@@ -76,9 +76,9 @@ class _Microfacet(BSDF):
     if TYPE_CHECKING:  # declared by each, in the order in which its constructor takes them
         alpha: Width
         rotation: Angle
-        ndf: str
-        masking: str
-        fresnel: str
+        ndf: Member
+        masking: Member
+        fresnel: Member
         albedo: Colour
         sampling: str
 

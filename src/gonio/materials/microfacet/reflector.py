@@ -58,8 +58,8 @@ class _Reflector(microfacet._Microfacet):
     def terms(self, wo: Direction, wi: Direction) -> Terms:
         """D, G and F of the pair; eval is F D G / (4 cos theta_o)."""
         wo, wi, m, alpha, _ = self._facet(wo, wi)
-        ndf = distribution(self.ndf)
-        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)
+        ndf = distribution(self.ndf)  # type: ignore[arg-type]  # mypy mistakes an inherited field
+        g = masking.masking_shadowing(self.masking, ndf, wo, wi, m, alpha)  # type: ignore[arg-type]
         return Terms(ndf.D(m, alpha), g, self.reflectance(abs(dot(wo, m))))
 
     def tint(self, wo: Direction) -> Spectrum:

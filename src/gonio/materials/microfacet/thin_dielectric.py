@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...material.bsdf import BSDF, Delta, InnerAlbedo, Preset
 from ...material.calling import method
-from ...material.parameters import Colour, Number, choice, number
+from ...material.parameters import Colour, Member, Number, choice, number
 from ...material.polarization import Polarized
 from ...material.sample import Sample
 from ...ops import Direction, Mask, Mode, Scalar, Spectrum, abs, function, ones_like, sqr, where, zeros_like
@@ -44,7 +44,7 @@ class ThinDielectric(BSDF):
     """
 
     eta: Number = number(default=1.5, doc="index of the sheet over that around it", low=0.2, high=5.0)
-    fresnel: str = microfacet.fresnel_choice()
+    fresnel: Member = microfacet.fresnel_choice()
     bounces: str = choice("polarized", "what is summed over the bounces", BOUNCES)
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
 

@@ -40,12 +40,12 @@ class Fresnel(Part):
 
     def missing(self) -> str:
         own = type(self)
-        both = own.conductor is not Fresnel.conductor and own.dielectric is not Fresnel.dielectric
-        return "" if both or own.curve is not Fresnel.curve else "curve(self, cos_i, r0)"
+        written = (own.curve, own.conductor, own.dielectric) != (Fresnel.curve, Fresnel.conductor, Fresnel.dielectric)
+        return "" if written else "curve(self, cos_i, r0)"  # a kind may be for metals alone
 
     def curve(self, cos_i: Scalar | float, r0: R) -> R:
         """Reflectance under cos_i of an interface that reflects r0 at normal incidence."""
-        raise NotImplementedError(f"{type(self).__name__} has neither `curve` nor `conductor` and `dielectric`")
+        raise self.lacks("neither `curve` nor `conductor` and `dielectric`", "curve(self, cos_i, r0)")
 
     def conductor(self, cos_i: Scalar | float, eta: Spectrum, k: Spectrum) -> Spectrum:
         """Reflectance of a metal of complex index eta + i k; here the curve from R0."""

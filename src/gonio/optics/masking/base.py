@@ -36,7 +36,7 @@ class Masking(Part):
 
     def reflected(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """G of two directions on the same side of the surface, m the normal that mirrors one into the other."""
-        raise NotImplementedError(f"{type(self).__name__} has no `reflected`")
+        raise self.lacks("no `reflected`", "reflected(self, ndf, wo, wi, m, alpha)")
 
     def transmitted(self, ndf: NDF, wo: Direction, wi: Direction, m: Direction, alpha: Pair) -> Scalar:
         """G of two directions on opposite sides, m the normal that refracts one into the other; here as `reflected`."""

@@ -15,6 +15,7 @@ from ...ops import (
     Pair,
     Scalar,
     abs,
+    backend,
     dot,
     function,
     maximum,
@@ -68,7 +69,9 @@ class NDF(Part):
             return
         widths = tabulated.tables_of(self).widths
         x, y = alpha if isinstance(alpha, tuple | list) else (alpha, alpha)
-        if widths == "equal" and x is not y and not np.array_equal(np.asarray(x), np.asarray(y)):
+        if widths != "equal" or x is y or backend.is_drjit(x) or backend.is_drjit(y):
+            return
+        if not np.array_equal(np.asarray(x), np.asarray(y)):
             what = (
                 f"two widths, at which D of {type(self).__name__} is neither one surface stretched nor free of alpha.y"
             )
@@ -77,7 +80,7 @@ class NDF(Part):
 
     def D(self, m: Direction, alpha: Pair) -> Scalar:
         """Density of normals, 1/sr: its integral over D(m) m.z is 1."""
-        raise NotImplementedError(f"{type(self).__name__} has no `D`")
+        raise self.lacks("no `D`", "D(self, m, alpha)")
 
     @function
     def sample(self, u1: Scalar, u2: Scalar, alpha: Pair) -> Direction:
@@ -223,15 +226,15 @@ class Stretched(NDF):
 
     def density(self, n: Direction) -> Scalar:
         """D at width 1, times |n|^-4: density of the slopes (-n_x / n_z, -n_y / n_z) over n_z^4."""
-        raise NotImplementedError(f"{type(self).__name__} has no `density`")
+        raise self.lacks("no `density`", "density(self, n)")
 
     def area(self, v: Direction) -> Scalar:
         """Projected area at width 1 of the facets that face v (or, for v below the surface, -v), times |v|."""
-        raise NotImplementedError(f"{type(self).__name__} has no `area`")
+        raise self.lacks("no `area`", "area(self, v)")
 
     def slope(self, u: Scalar) -> Scalar:
         """The length of slope, at width 1, that a share u of the surface stays below."""
-        raise NotImplementedError(f"{type(self).__name__} has no `slope`")
+        raise self.lacks("no `slope`", "slope(self, u)")
 
     def visible_normal(self, v: Direction, u1: Scalar, u2: Scalar) -> Direction:
         """A normal at width 1, of any length, as v (unit, v.z >= 0) sees them; optional."""
