@@ -459,7 +459,7 @@ def angle(default: PlainNumber = 0.0, doc: str = "") -> Angle:
     return _declare(AngleParameter, default, doc, unit="rad")
 
 
-def choice(default: object, doc: str, choices: Choices, *, white: str | None = None) -> Value:
+def choice(default: PlainMember, doc: str, choices: Choices, *, white: str | None = None) -> str:
     """Declare a choice between names; it shapes the code, so it is known before anything runs.
 
     default  a name; of a family's members also a class or an instance, or FILE.py:CLASS beside the file that says so

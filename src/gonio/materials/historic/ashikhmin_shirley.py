@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import ops
 from ...material.bsdf import KnownViolation
-from ...material.parameters import Angle, Colour, Member, Width, choice, flag, spectrum, width
+from ...material.parameters import Angle, Colour, Width, choice, flag, spectrum, width
 from ...ops import Direction, Pair, Scalar, Spectrum, exp, function, inv_pi, log, maximum, safe_sqrt, sincos, sqr, sqrt
 from ...optics import frame, fresnel
 from ...optics.special import exprel, power_of_cosine
@@ -31,7 +31,7 @@ class AshikhminShirley(_Glossy):
     exponent: Width = width(default=100.0, doc="falloff of the lobe; two for anisotropy", low=0.0, high=math.inf)
     rotation: Angle = microfacet.rotation_angle()
     eta: Colour = spectrum(default=1.5, doc="refractive index, over the outside's", low=1.0)
-    fresnel: Member = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
+    fresnel: str = choice("schlick", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
     coupled: bool = flag(default=False, doc="the paper's diffuse part, which gives way to the lobe")
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {"energy": sum_breach()}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...material.bsdf import BSDF, Delta, InnerAlbedo, Microsurface
-from ...material.parameters import Angle, Colour, Member, Width, angle, choice, pair_of, spectrum, width
+from ...material.parameters import Angle, Colour, Member, Value, Width, angle, choice, pair_of, spectrum, width
 from ...ops import Direction, Mask, Pair, Scalar, Spectrum, abs, backend, dot, function, ones_like, safe_div, where
 from ...optics import frame, fresnel, masking
 from ...optics.ndf import NDF, distribution
@@ -47,17 +47,20 @@ def rotation_angle() -> Angle:
 
 def ndf_choice() -> Member:
     """Declare the distribution of normals."""
-    return choice("ggx", "distribution of microfacet normals", NDF.family)
+    declared: Value = choice("ggx", "distribution of microfacet normals", NDF.family)
+    return declared
 
 
 def masking_choice() -> Member:
     """Declare the masking term."""
-    return choice("smith-correlated", "masking and shadowing", masking.Masking.family)
+    declared: Value = choice("smith-correlated", "masking and shadowing", masking.Masking.family)
+    return declared
 
 
 def fresnel_choice() -> Member:
     """Declare the Fresnel reflectance."""
-    return choice("exact", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
+    declared: Value = choice("exact", "Fresnel reflectance", fresnel.Fresnel.family, white="one")
+    return declared
 
 
 def sampling_choice() -> str:
