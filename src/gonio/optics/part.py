@@ -91,7 +91,7 @@ class Part:
         except Exception:
             self._run(method, given)
             return
-        if kind != expected:
+        if kind not in (expected, "float"):  # one number serves all channels
             hint = "alpha is a pair: use alpha.x and alpha.y" if kind == "vec2" else "return one value per ray"
             what = f"{method} of {type(self).__name__} returned a {kind}, a {expected} expected"
             raise InputError(what, self.place(method), hint)
