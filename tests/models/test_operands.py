@@ -86,6 +86,7 @@ def test_what_is_there_goes_before_what_is_a_name_alone(here: Path) -> None:
     assert kind_of("phong", {Kind.SCENE, *MATERIALS}, "SCENE") is Kind.SCENE
     assert kind_of("phong", MATERIALS, "MODEL") is Kind.NAME
     assert kind_of("phong()", {Kind.SCENE, *MATERIALS}, "SCENE") is Kind.NAME
+    assert kind_of("notes.txt", {Kind.SCENE, *MATERIALS}, "SCENE") is Kind.SCENE  # which its reader judges
 
 
 @pytest.mark.parametrize(

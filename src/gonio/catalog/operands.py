@@ -126,7 +126,7 @@ def readings(text: str) -> list[Kind]:
     if by_suffix:
         return [*by_suffix, *_names(head)]
     if _exists(path):
-        return [Kind.FILE]
+        return [Kind.FILE, *_names(head), Kind.SCENE]  # a scene may have any name
     if settings or _names(head) or _resembles(head):
         return _names(head) or [Kind.NAME]
     return [Kind.SCENE, *([Kind.NAME] if os.sep not in text else []), Kind.PICTURE]
