@@ -14,7 +14,7 @@ import time
 import uuid
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,53 +33,22 @@ from ..render.finish import picture_of
 from ..render.prepare import Prepared, prepare
 from ..render.request import Request
 from ..render.request_json import described
-from ..scene.schema import SceneDescription
 from ..transport import passes
 from ..work import crew, parts
 from . import figures
 from .figures import Drawing
+from .variations import Variation, parse_variation, variation, with_cell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+__all__ = ["Sheet", "Variation", "draw", "parse_variation", "render_sheet", "study", "variation", "with_cell"]
 
 Pixels = NDArray[np.uint8]  # (H, W, 3)
 MOST_CELLS = 256  # a sheet of more is no longer looked at, and is a typing error more often than not
 WIDEST = 3200  # pixels; larger sheets are drawn at less than one picture pixel per sheet pixel
 GAP, MARGIN = 8, 20
 _DPI = 100
-
-
-@dataclass(frozen=True)
-class Variation:
-    """One --vary: a path into the scene or of a material, or a $parameter of a Mitsuba XML, and its values.
-
-    path    one, or several that vary together with commas between: "kd,ks"
-    values  one for each picture along it: of several paths a tuple with a value for each
-    """
-
-    path: str
-    values: tuple[object, ...]
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        return tuple(path.strip() for path in self.path.split(","))
-
-    @property
-    def name(self) -> str:
-        """The last step of each path that is a word: "p" of "scene.shapes.0.material.p", "eta[0]" of "...eta.0"."""
-        return ", ".join(map(_last_word, self.paths))
-
-    def settings(self, value: Any) -> dict[str, object]:
-        """What one of the values sets, by path."""
-        return dict(zip(self.paths, value if len(self.paths) > 1 else (value,), strict=True))
-
-
-def _last_word(path: str) -> str:
-    steps = [step for step in path.replace("/", ".").split(".") if step]
-    for back, step in enumerate(reversed(steps)):
-        if not step.isdigit() and step != "*":
-            return step + "".join(f"[{index}]" for index in steps[len(steps) - back :])
-    return path
 
 
 @dataclass(frozen=True)
@@ -109,41 +78,6 @@ class Sheet:
 
     def _repr_png_(self) -> bytes:
         return self.drawing._repr_png_()
-
-
-def parse_variation(text: str) -> Variation:
-    """A `Variation` of "shapes.0.material.p=4,16,64", or of several paths together, "kd,ks=(.2,.8),(.5,.5)".
-
-    Values are JSON; commas in brackets do not separate.
-    """
-    paths, values = notation.assignment(text, "--vary")
-    return variation(paths, figures.split_values(values))
-
-
-def variation(paths: str | Sequence[str], values: Sequence[object]) -> Variation:
-    """A `Variation` of one path, or of several that vary together, "kd,ks" or ("kd", "ks"): each value has then one for
-    each of them, (.2, .8) or "(.2,.8)". InputError where it has more or fewer."""
-    names = tuple(path.strip() for path in (paths.split(",") if isinstance(paths, str) else paths))
-    if not all(names) or len(set(names)) < len(names):
-        raise InputError(f"'{','.join(names)}' varies no path, or one twice", "--vary", "such as kd,ks=(.2,.8),(.5,.5)")
-    if len(names) == 1:
-        return Variation(names[0], tuple(values))
-    return Variation(",".join(names), tuple(_together(value, names) for value in values))
-
-
-def _together(value: object, names: Sequence[str]) -> tuple[object, ...]:
-    """The values that several paths have together."""
-    parts: Sequence[object] | None = None
-    if isinstance(value, str) and value.startswith("(") and value.endswith(")"):
-        parts = figures.split_values(value[1:-1])
-    elif isinstance(value, list | tuple):
-        parts = value
-    if parts is None or len(parts) != len(names):
-        count = "one value" if parts is None else f"{len(parts)} value{'s' if len(parts) != 1 else ''}"
-        what = f"'{value}' is {count}, {len(names)} expected"
-        hint = f"in round brackets, one for each: {','.join(names)}=({','.join('.5' for _ in names)}),..."
-        raise InputError(f"{what} for {', '.join(names)}", "--vary", hint)
-    return tuple(parts)
 
 
 @public
@@ -272,34 +206,6 @@ def render_sheet(
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
 
 
-def with_cell(request: Request, cell: Mapping[str, object], named: notation.Settings | None) -> Request:
-    """The request with one cell's values: of the scene, or of a material and of the scene that it is shown in."""
-    if named is None:
-        return replace(request, overrides={**request.overrides, **cell})
-    cls, given = named
-    own: dict[str, object] = {}
-    around: dict[str, object] = {}
-    for path, value in cell.items():
-        inside = path.removeprefix("scene.").removeprefix("shapes.0.material.")
-        first = path.lstrip("/").replace("/", ".").partition(".")[0]
-        if inside == path and first in _OF_A_SCENE and first not in cls.parameters():
-            around[path] = value
-        else:
-            own[inside] = value
-    try:
-        material = notation.build((cls, {**given, **own}))
-    except InputError as error:
-        option, _, path = error.where.partition(" ")
-        raise InputError(
-            error.what, f"--vary {path}" if option == "--param" and path in own else error.where, error.hint
-        ) from None
-    return replace(request, material=material, overrides={**request.overrides, **around})
-
-
-# what a path into the scene around a material begins with
-_OF_A_SCENE = {field.alias or name for name, field in SceneDescription.model_fields.items()} | {"shapes", "lights"}
-
-
 def _identity(request: Request) -> Sequence[object]:
     """What tells a study from others; of a class that this program alone knows nothing does: no part is used again."""
     try:
@@ -387,7 +293,7 @@ def _blocks(pictures: Sequence[Pixels], variations: Sequence[Variation]) -> list
     rows, columns = ([figures.show_value(v) for v in x.values] for x in (down, across_))
     blocks = []
     each = len(rows) * len(columns)
-    for index, values in enumerate(itertools.product(*(variation.values for variation in outer))):
+    for index, values in enumerate(itertools.product(*(one.values for one in outer))):
         of_block = pictures[index * each : (index + 1) * each]
         grid = [of_block[at : at + len(columns)] for at in range(0, each, len(columns))]
         named = zip(names, values, strict=False)
