@@ -52,10 +52,10 @@ def test_no_two_files_import_each_other() -> None:
     ("old", "new"),
     [
         ("from gonio.models import BSDF", "gonio.material"),
-        ("from gonio.materials.microfacet.conductor import Conductor", "gonio.materials.microfacet.conductor"),
-        ("from gonio.shaders.languages import languages", "gonio.shaders.languages"),
-        ("from gonio.transport.integrators import Integrator", "gonio.transport.integrators"),
-        ("import gonio.materials.compensated.kulla_conty", "gonio.materials.compensated.kulla_conty"),
+        ("from gonio.models.conductor import Conductor", "gonio.materials.microfacet.conductor"),
+        ("from gonio.emit.languages import languages", "gonio.shaders.languages"),
+        ("from gonio.render.integrators import Integrator", "gonio.transport.integrators"),
+        ("import gonio.energy.materials.kulla_conty", "gonio.materials.compensated.kulla_conty"),
     ],
 )
 def test_an_import_path_of_the_former_layout_works_and_names_the_new_one(old: str, new: str) -> None:

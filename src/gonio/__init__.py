@@ -66,8 +66,8 @@ _ALIASES = {"cluster": "Cluster", "mix": "Mix", "two_sided": "TwoSided"}
 
 if TYPE_CHECKING:
     from . import ops
+    from .catalog import notation as _notation
     from .catalog.library import fits, materials
-    from .catalog.notation import material
     from .energy.albedo import Albedo, albedo
     from .errors import GonioError, GonioWarning, InputError
     from .fitting.fit import fit
@@ -131,6 +131,8 @@ if TYPE_CHECKING:
     from .viewer.widget import view
     from .work.cluster import Cluster
     from .work.cluster import Cluster as cluster
+
+    material = _notation.material  # after `from .material`, which type checkers take to bind the subpackage
 
 
 if not TYPE_CHECKING:  # a type checker would accept every misspelt name

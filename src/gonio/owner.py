@@ -51,11 +51,24 @@ def alone(call: Callable[P, R]) -> Callable[P, R]:
                 cause = out_of_loop(error)
                 if cause is error:
                     raise
+                forget_frames(error)
                 raise cause from error
             finally:
                 settle()
 
     return held
+
+
+def forget_frames(error: BaseException) -> None:
+    """Drop the tracebacks of an exception and of its causes, and with them what Gonio's functions held.
+
+    A notebook keeps its last exception, and would keep the scene: Dr.Jit's virtual calls go to every BSDF that is
+    alive, so that each later render would run into the same error. GONIO_DEBUG=1 keeps them for a debugger.
+    """
+    chain: BaseException | None = None if os.environ.get("GONIO_DEBUG") else error
+    while chain is not None:
+        chain.__traceback__ = None
+        chain = chain.__cause__ or chain.__context__
 
 
 def public(call: Callable[P, R]) -> Callable[P, R]:

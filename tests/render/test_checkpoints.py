@@ -165,7 +165,7 @@ def test_a_checkpoint_runs_no_code_unasked(scene: Path, tmp_path: Path) -> None:
     with pytest.warns(GonioWarning, match="2 of 4"):
         go.resume(tmp_path / "c", allow_code=True)
     (tmp_path / "flat.py").write_text(source + "\n# another\n")
-    with pytest.raises(InputError, match=r"file flat.py has changed"):
+    with pytest.raises(InputError, match=r"file .*flat\.py has changed"):
         go.resume(tmp_path / "c", allow_code=True)
 
 

@@ -165,7 +165,7 @@ def cause(material: go.BSDF, law: str) -> str:
         (FresnelAtTheNormal, "reciprocity", "F(n.o) / F(n.i)"),
         (OneSidedCoupling, "reciprocity", "g(wo) / g(wi)"),
         (WrongScaling, "reciprocity", "eta^4 in transmission"),
-        (OnePercentMore, "energy", "1.01 times what comes in"),
+        (OnePercentMore, "energy", "1.01 times the incident light"),
         (MoreAtGrazing, "energy", "1.02 times that where wo's angle to the normal is beyond"),
         (BlueGains, "energy", "blue is 1.2 times the other channels"),
         (AlbedoSquared, "linearity", "albedo^2"),

@@ -23,6 +23,10 @@ class Good(go.BSDF):
     """Diffuse, half of the light."""
     def eval(self, wo, wi, mode="radiance"):
         return go.ops.vec3(*[where((wo.z > 0) & (wi.z > 0), wi.z * inv_pi * 0.5, 0.0)] * 3)
+    def pdf(self, wo, wi):
+        return where((wo.z > 0) & (wi.z > 0), wi.z * inv_pi, 0.0)
+    def sample(self, wo, u, mode="radiance"):
+        return self.sample_cosine(wo, u, mode)
 
 class LoopsInPython(Good):
     """Never returns, and hears the alarm."""

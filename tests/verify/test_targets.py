@@ -106,7 +106,8 @@ def test_a_wrong_answer_fails_the_law_with_its_place(
 
 def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "LIMIT", 1.0)
-    text = GOOD + "    def sample(self, wo, u, mode='radiance'):\n        while True:\n            pass\n"
+    text = GOOD + "    def pdf(self, wo, wi):\n        return wi.z\n"
+    text += "    def sample(self, wo, u, mode='radiance'):\n        while True:\n            pass\n"
     found = verify(f"{file(tmp_path, text)}:Good", quick=True, law=["weight", "shader"])
     assert "no end after 1 s" in found["weight"].why[0] and found["shader"].status == "does not apply"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from gonio.errors import InputError
 from gonio.viewer import contact_sheet, figures
-from gonio.viewer.contact_sheet import Variation
 from gonio.viewer.figures import Drawing
+from gonio.viewer.variations import Variation
 
 
 @pytest.mark.parametrize(

@@ -133,8 +133,9 @@ def readings(text: str) -> list[Kind]:
 
 
 def _described(name: str, kind: Kind) -> list[Kind]:
-    """Of a description by its type: Gonio's, or a plugin of Mitsuba's. Names that both have are Gonio's."""
-    known = is_model(re.sub("^gonio-", "", name)) or library.knows(name) or outside.names_code(name)
+    """Of a description by its type: Gonio's, or a plugin of Mitsuba's. Names that both have are Gonio's; `twosided` and
+    `thindielectric`, which other verbs take for two-sided and thin-dielectric, are plugins."""
+    known = re.sub("^gonio-", "", name) in models() or library.knows(name) or outside.names_code(name)
     plugins = [Kind.PLUGIN] if name else []
     return [kind, *plugins] if known or not plugins else [*plugins, kind]
 

@@ -26,8 +26,8 @@ import numpy as np
 
 from .. import archives, files
 from ..errors import GonioError, GonioWarning
+from ..material.user_code import with_imports
 from ..members import Family
-from ..models.user_code import with_imports
 from ..optics.fresnel import Fresnel
 from ..optics.masking import Masking
 from ..optics.ndf import NDF

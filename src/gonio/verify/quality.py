@@ -1,7 +1,7 @@
 """The quality of a BSDF's sampling: figures, not verdicts.
 
     gonio models --quality
-    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % fail, variance .013, ..."
+    go.verify("conductor").cards[0].quality.words       # "sampling: 3.9 % fail, variance 0.013, ..."
 
 A path tracer multiplies by the weight of each sample, so the weight's variance is noise in the picture, and a failed
 sample is a wasted path. Both can be poor while every law holds.
@@ -50,7 +50,7 @@ class Quality:
 
     @property
     def words(self) -> str:
-        """ "sampling: 2.1 % fail, variance .04, 31 x cosine sampling, 96 % of the ideal"."""
+        """ "sampling: 2.1 % fail, variance 0.04, 31 x cosine sampling, 96 % of the ideal"."""
         return "sampling: " + ", ".join(text for text in self.texts if text)
 
     @property
@@ -65,12 +65,11 @@ class Quality:
 
 
 def _short(value: float) -> str:
-    """Two digits: .013, 31, 4200."""
+    """Two digits: 0.013, 31, 4200."""
     if value < ROUNDING:
         return "0"
     value = float(f"{value:.2g}")
-    text = f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
-    return text.removeprefix("0") if text.startswith("0.") else text
+    return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
 
 
 def of(subject: Subject, seed: int = 1) -> Quality | None:

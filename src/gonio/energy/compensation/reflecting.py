@@ -80,12 +80,12 @@ class Reflecting(NamedTuple):
 class TwoWidths(NamedTuple):
     """M of two widths, which depends on azimuth; see `curves.anisotropic`.
 
-    azimuthal  coefficients in azimuth of each coefficient of M
+    c_phi     coefficients in azimuth of each coefficient of M
     alpha     the widths
     rotation  the base's
     """
 
-    azimuthal: tuple[Scalar, ...]
+    c_phi: tuple[Scalar, ...]
     alpha: Pair
     rotation: Pair | None
 
@@ -93,7 +93,7 @@ class TwoWidths(NamedTuple):
         """M at a direction above the surface."""
         azimuth = _azimuth(frame.rotate(w, self.rotation), self.alpha)
         form = form_of(ndf, masking)
-        rows = curves.turn(self.azimuthal, azimuth.along, azimuth.across)
+        rows = curves.turn(self.c_phi, azimuth.along, azimuth.across)
         return curves.missing(form, rows, knee(form, masking, azimuth.width), w.z)
 
 
