@@ -65,7 +65,8 @@ class LightGrid:
     def _row(self, p: Point) -> UInt:
         mi = self.mi
         at = [dr.clip((p[i] - self._low[i]) * self._scale[i], 0.0, self.cells - 1.0) for i in range(3)]
-        x, y, z = (mi.UInt32(v) for v in at)
+        # NaN, which a clip lets through, becomes 2^32 - 1 on processors without AVX-512
+        x, y, z = (dr.minimum(mi.UInt32(v), self.cells - 1) for v in at)
         return x + self.cells * (y + self.cells * z)
 
     def choose(self, p: Point, u: Float) -> tuple[UInt, Float, Float]:
