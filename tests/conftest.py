@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -69,15 +71,25 @@ def shared() -> Path:
     return folder
 
 
+CACHE = Path(__file__).parents[1] / ".cache"
+DAYS_KEPT = 3
+
+
 @pytest.fixture(scope="session", autouse=True)
-def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """One folder of tables for a run and all its workers, apart from the user's."""
-    base = tmp_path_factory.getbasetemp()
-    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "cache"
-    folder.mkdir(exist_ok=True)
+def cache_folder() -> Iterator[Path]:
+    """One folder of tables for all runs and their workers, apart from the user's.
+
+    A table's name contains the hash of the code that made it, so a table of other code is never read.
+    """
+    CACHE.mkdir(exist_ok=True)
+    oldest = time.time() - DAYS_KEPT * 86400
+    for file in CACHE.iterdir():
+        with contextlib.suppress(OSError):  # another worker was first
+            if file.is_file() and file.stat().st_mtime < oldest:
+                file.unlink()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GONIO_CACHE", str(folder))
-        yield folder
+        patch.setenv("GONIO_CACHE", str(CACHE))
+        yield CACHE
 
 
 @pytest.fixture
