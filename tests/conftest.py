@@ -54,10 +54,21 @@ SCENE = {
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark `shared` every test that asks for the folder of data: `-m shared` selects these and only these."""
+    """Mark `shared` every test that asks for the folder of data, and `slow` what is beyond a family's sample."""
+    families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if "shared" in getattr(item, "fixturenames", ()):
             item.add_marker("shared")
+        if item.get_closest_marker("sample"):
+            families.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for family in families.values():
+        mark = family[0].get_closest_marker("sample")
+        count = mark.args[0] if mark else len(family)
+        cases = [item for item in family if not item.get_closest_marker("slow")]
+        chosen = {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(min(count, len(cases)))}
+        for index, item in enumerate(cases):
+            if index not in chosen:
+                item.add_marker("slow")
 
 
 @pytest.fixture(scope="session")

@@ -103,6 +103,7 @@ def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_pa
     assert all(np.array_equal(table.arrays[name], other.arrays[name]) for name in table.arrays)
 
 
+@pytest.mark.slow
 def test_a_trial_gives_the_same_report_and_keeps_what_is_done(
     two: Cluster, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -137,6 +137,7 @@ def scene(material: dict) -> dict:
     }
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     "command",
     [
@@ -174,6 +175,7 @@ def test_a_scene_takes_a_file_where_code_is_allowed(here: Path, capsys: pytest.C
     np.testing.assert_array_equal(picture, own)
 
 
+@pytest.mark.slow
 def test_what_is_registered_is_known_by_name_everywhere(here: Path) -> None:
     (here / "scene.json").write_text(json.dumps(scene({"type": "conductor", "roughness": 0.2, "eta": 1, "k": 2})))
     before = go.render(here / "scene.json")

@@ -253,6 +253,7 @@ def test_other_processes_know_it_by_its_file(here: Path) -> None:
 # --------------------------------------------------------------------------- verbs
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "command",
     [

@@ -57,6 +57,7 @@ def test_layers_stand_in_the_order_of_the_specification(file: Path) -> None:
     assert (cloth["type"], cloth["a"]["type"]) == ("sum", "sheen-charlie")  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_materials_keep_to_their_light_and_a_dielectric_shows_its_colour_under_a_clear_layer(file: Path) -> None:
     """Khronos2021, appendix B: E of the layer, and 1 - E times the base colour, which no bounce darkens."""
     wo, u = np.array([[0.6, 0.0, 0.8]] * 8192), np.random.default_rng(1).random((8192, 3))

@@ -39,6 +39,7 @@ def test_inner_materials_have_switches_too() -> None:
     assert "b_varnish" in go.emit(mixed, functions=["eval"], lean=True)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("material", "share"),
     [

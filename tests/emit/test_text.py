@@ -48,6 +48,7 @@ def test_the_manifest_tells_what_tables_were_found_from() -> None:
     assert "base.alpha" in fixed and "depth" not in fixed
 
 
+@pytest.mark.slow
 def test_functions_that_differ_in_a_number_alone_are_one() -> None:
     for name in FEW:
         copies = [f for f in _functions(written(name).text) if re.fullmatch(r".*_[3-9]|.*_\d\d", f)]
@@ -261,6 +262,7 @@ def test_every_constant_that_is_no_multiple_of_pi_says_what_it_is() -> None:
     assert "NOTHING = 1.0e-5;  // M_avg below this" in text
 
 
+@pytest.mark.slow
 def test_the_text_is_the_same_in_every_process_and_for_every_value() -> None:
     names = ["kulla-conty-glass", "mix-compensated", "glass-turned"]
     code = (

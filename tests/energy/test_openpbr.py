@@ -65,6 +65,7 @@ def test_all_layers_together_are_reciprocal() -> None:
     np.testing.assert_allclose(forth, back, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_light_through_glass_is_reciprocal() -> None:
     model = go.OpenPBR(transmission_weight=0.8, coat_weight=0.5, specular_roughness=0.5, coat_color=(0.9, 0.5, 0.4))
     below = WI * [1.0, 1.0, -1.0]

@@ -55,6 +55,7 @@ def by_brute_force(light, n, alpha, ndf="ggx", parts=8):
     return (between(light, parts) * weight[..., None]).sum((0, 1)) / weight.sum()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("ndf", DENSITIES)
 def test_every_level_agrees_with_brute_force(ndf):
     light = environment()

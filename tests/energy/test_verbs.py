@@ -18,6 +18,7 @@ def test_bake_info_and_plot_work_together(tmp_path, capsys):
     assert (tmp_path / "t.png").stat().st_size > 1000
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "words",
     [
@@ -56,6 +57,7 @@ class Worn(go.Conductor):
 """
 
 
+@pytest.mark.slow
 def test_materials_of_ones_own_are_compared(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(OWN)

@@ -122,6 +122,7 @@ def test_names_are_taken_once(registered: dict[str, type]) -> None:
         integrators.Integrator.family.add(Another)
 
 
+@pytest.mark.slow
 def test_an_installed_package_brings_one_for_the_command_line(scene: Path, tmp_path: Path) -> None:
     package = tmp_path / "site"
     metadata = package / "occlusion-1.0.dist-info"

@@ -80,6 +80,7 @@ def expected(degrees: float, roll: float) -> np.ndarray:
     return found
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 135.0])
 @pytest.mark.parametrize("roll", [0.0, 25.0])
 def test_it_lets_through_what_fresnels_equations_leave_in_its_direction(

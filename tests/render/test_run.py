@@ -367,6 +367,7 @@ def endless(scene: Path) -> Path:
     return scene
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "SIGHUP")]
 )

@@ -78,6 +78,7 @@ def test_sound_materials_pass(material: go.BSDF) -> None:
     assert verify(material, quick=True, law="calls")["calls"].status == "pass"
 
 
+@pytest.mark.slow
 def test_a_plugin_in_a_file_is_judged_by_what_path_tracers_call(tmp_path: Path) -> None:
     for name, factor in (("calls_sound", "1.0"), ("calls_wrong", "2.0")):
         (tmp_path / f"{name}.py").write_text(PLUGIN.replace("NAME", name).replace("FACTOR", factor))

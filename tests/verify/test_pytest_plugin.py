@@ -68,6 +68,7 @@ def installed() -> bool:
     return any(point.value == "gonio.pytest_plugin" for point in entry_points(group="pytest11"))
 
 
+@pytest.mark.slow
 def test_the_fixture_fails_a_test_with_the_report(tmp_path: Path) -> None:
     code, out = foreign(tmp_path)
     assert code == 1 and "3 passed" in out and "1 failed" in out
@@ -82,6 +83,7 @@ def test_each_target_and_law_is_a_test(tmp_path: Path) -> None:
     assert "gonio matte.py:Matte::weight PASSED" in out and "gonio matte.py:Crash::weight FAILED" in out
 
 
+@pytest.mark.slow
 def test_a_target_that_does_not_exist_is_an_error_without_a_traceback(tmp_path: Path) -> None:
     code, out = foreign(tmp_path, "--gonio", "matte.py:Mate", "-k", "weight")
     assert code == 1 and "did you mean 'Matte'" in out and "Traceback" not in out

@@ -87,6 +87,7 @@ def test_a_file_that_cannot_be_used_is_an_error_with_code_2(
     assert code == 2 and words in err
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -112,6 +113,7 @@ def test_sampling_that_never_ends_fails_the_law(tmp_path: Path, monkeypatch: pyt
     assert "no end after 1 s" in found["weight"].why[0] and found["shader"].status == "does not apply"
 
 
+@pytest.mark.sample(9)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

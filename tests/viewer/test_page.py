@@ -98,6 +98,7 @@ def test_the_split_sum_is_the_albedo_of_white_by_each_masking(homework: dict[str
 # --------------------------------------------------------------------------- any models
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("name", [name for name in models() if not models()[name].stochastic])
 def test_every_model_makes_a_page(name: str) -> None:
     data = page.page_data(stage.of_targets([name]))

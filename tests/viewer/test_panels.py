@@ -87,6 +87,7 @@ def opened(tab: Any, messages: list[str]) -> Any:
     return output
 
 
+@pytest.mark.slow
 def test_an_installed_package_brings_a_panel_into_an_exported_page(package: Path, tmp_path: Path) -> None:
     file = tmp_path / "page.html"
     path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -131,6 +132,7 @@ def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: 
     assert messages == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("script", "said"),
     [

@@ -286,6 +286,7 @@ def test_a_failing_reference_is_told_and_the_thread_lives(monkeypatch: pytest.Mo
         assert final_frame(client, 2).any()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_cleanly_on_ctrl_c_with_a_page_connected(sign: signal.Signals, tmp_path: Path) -> None:
     program = tmp_path / "serve.py"
@@ -315,6 +316,7 @@ def test_it_ends_cleanly_on_ctrl_c_with_a_page_connected(sign: signal.Signals, t
         assert running_server.stderr.read() == ""
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_while_a_kernel_is_compiled_is_no_crash(tmp_path: Path) -> None:
     program = tmp_path / "serve.py"
     program.write_text(

@@ -109,6 +109,7 @@ def test_a_page_that_takes_no_frames_is_ended(monkeypatch: pytest.MonkeyPatch) -
         assert get(one)[0] == 200
 
 
+@pytest.mark.slow
 def test_a_page_that_sends_and_never_reads_is_let_go(one: server.Server, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session, "RATE", 1e9)  # else it takes the while until so many answers wait
     monkeypatch.setattr(session, "SHARE", 1e9)
@@ -215,6 +216,7 @@ def test_a_message_of_endless_fragments_is_cut_off(one: server.Server) -> None:
     wait_for(lambda: not one.application.sessions)
 
 
+@pytest.mark.slow
 def test_a_flood_of_pings_is_cut_off(one: server.Server, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "MOST_CONTROLS", 20)
     with speak(one) as client:

@@ -92,6 +92,7 @@ def live() -> Iterator[Live]:
             thread.join(20)
 
 
+@pytest.mark.slow
 def test_the_picture_is_the_path_traced_one(live: Live) -> None:
     live.wait("gonio.live.status.samples >= 256")
     raster, reference = live.pictures()

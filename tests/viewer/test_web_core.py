@@ -256,6 +256,7 @@ DROP = """async ([text, name]) => {
 }"""
 
 
+@pytest.mark.slow
 def test_dropped_picture_lights_the_balls_as_its_radiance_says(page: Page) -> None:
     """A picture of one value is a furnace: brute force, split sum and the albedo curve must agree on it."""
     page.set("s.lights = []; s.furnace = true")

@@ -119,6 +119,7 @@ def test_black_by_a_fault_is_told_from_black_by_nature(opened: Any) -> None:
     assert mirror.problems == []
 
 
+@pytest.mark.slow
 def test_a_page_says_that_it_compiles(opened: Any) -> None:
     page = opened(go.model("film-conductor")(), WATCHED)
     page.picture(4)
@@ -128,6 +129,7 @@ def test_a_page_says_that_it_compiles(opened: Any) -> None:
     assert page.problems == []
 
 
+@pytest.mark.slow
 def test_a_value_that_this_page_has_no_tables_for_stays(opened: Any) -> None:
     page = opened(go.model("coat")(base=go.Conductor(alpha=0.2)))  # type: ignore[call-arg]
     before = page.picture(4)
