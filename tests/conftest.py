@@ -52,23 +52,43 @@ SCENE = {
 }
 
 
+BROWSERS = {"chrome", "chromium", "page", "live", "homework_page"}  # fixtures that start one
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--cases N`: at most N cases of each test, evenly spaced; `make check` takes 2."""
+    parser.addoption("--cases", type=int, default=0, metavar="N", help="run at most N cases of each test")
+
+
 @pytest.hookimpl(tryfirst=True)  # before `-m` selects
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark `shared` every test that asks for the folder of data, and `slow` what is beyond a family's sample."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark tests by what they need and, of families of cases, those beyond the sample `slow`.
+
+    shared   every test that asks for the folder of data: `-m shared` selects these and only these
+    browser  every test that starts one
+    slow     cases beyond `sample(n)` or `--cases n`
+    """
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if "shared" in getattr(item, "fixturenames", ()):
+        fixtures = {*getattr(item, "fixturenames", ())}
+        if "shared" in fixtures:
             item.add_marker("shared")
-        if item.get_closest_marker("sample"):
+        if fixtures & BROWSERS:
+            item.add_marker("browser")
+        if not item.get_closest_marker("slow"):
             families.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    for family in families.values():
-        mark = family[0].get_closest_marker("sample")
-        count = mark.args[0] if mark else len(family)
-        cases = [item for item in family if not item.get_closest_marker("slow")]
-        chosen = {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(min(count, len(cases)))}
-        for index, item in enumerate(cases):
-            if index not in chosen:
-                item.add_marker("slow")
+    for cases in families.values():
+        sample = cases[0].get_closest_marker("sample")
+        limits = [sample.args[0] if sample else len(cases), config.getoption("--cases") or len(cases)]
+        for item in set(cases) - set(_spread(cases, min(limits))):
+            item.add_marker("slow")
+
+
+def _spread(cases: list[pytest.Item], count: int) -> list[pytest.Item]:
+    """`count` of the cases, evenly spaced, the first and the last among them."""
+    if count >= len(cases):
+        return cases
+    return [cases[round(k * (len(cases) - 1) / max(count - 1, 1))] for k in range(count)]
 
 
 @pytest.fixture(scope="session")

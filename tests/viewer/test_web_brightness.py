@@ -19,7 +19,7 @@ from test_web_picture import python_picture
 from web_page import COARSE, PIXELS, WIDE, Page, decoded
 
 MODELS = [name for name in models() if not models()[name].stochastic]
-SAMPLES = 256
+SAMPLES = 64
 FEW = 32  # the light of a whole ball is a mean over hundreds of pixels
 
 
