@@ -238,8 +238,8 @@ def words(found: dict[str, Floats]) -> str:
     near = {form: e[:, :, thin].mean() for form, e in found.items()}
     far = {form: e[:, :, ~thin].mean() for form, e in found.items()}
     return (
-        f"`local` is within 2 in {share['local']:.0%} of the cases, `belcour-barla` in "
-        f"{share['belcour-barla']:.0%}. Up to 800 nm\ntheir means are {near['local']:.1f} and "
+        f"`local` is within 2 in {100 * share['local']:.0f} % of the cases, `belcour-barla` in "
+        f"{100 * share['belcour-barla']:.0f} %. Up to 800 nm\ntheir means are {near['local']:.1f} and "
         f"{near['belcour-barla']:.1f}, beyond {far['local']:.1f} and {far['belcour-barla']:.1f}."
     )
 
