@@ -395,6 +395,7 @@ def test_a_second_ctrl_c_ends_at_once_and_leaves_no_file(endless: Path, tmp_path
     time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=5)
-    assert process.returncode == 128 + signal.SIGINT
+    # Python's own end where the second came before Gonio's handler stood again
+    assert process.returncode in (128 + signal.SIGINT, -signal.SIGINT)
     # Where the pass ended between the two, the picture is kept, and whole; never is a part of it left.
     assert [entry.name for entry in output.parent.iterdir() if "checkpoint" not in entry.name] in ([], ["a.exr"])
