@@ -30,7 +30,7 @@ from ..material.user_code import (
     with_imports,
 )
 from ..ops import ForbiddenOperator, RecordingError
-from ..owner import alone
+from ..owner import exclusive
 
 __all__ = [
     "PREFIX", "adopt", "check_operators", "files_in", "forget", "is_outside", "load", "member", "module_of",
@@ -104,7 +104,7 @@ def _forward(inner: object, name: str) -> Callable[..., object]:
 # --------------------------------------------------------------------------- trying a material
 
 
-@alone
+@exclusive
 def probe(material: BSDF) -> BSDF:
     """The material itself, after its formulas were tried on two directions. InputError, with file and line, where one
     raises, uses Python's `if` on a value, or returns what it must not: better than a failure deep inside a render."""
@@ -113,7 +113,7 @@ def probe(material: BSDF) -> BSDF:
     return material
 
 
-@alone
+@exclusive
 def check_operators(material: BSDF) -> BSDF:
     """The material itself; InputError, with file and line, where a formula of the user's has `**` on a value.
 

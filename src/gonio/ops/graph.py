@@ -26,7 +26,7 @@ from typing import Protocol, TypeAlias, TypeGuard
 import numpy as np
 
 from ..errors import GonioError
-from ..owner import alone
+from ..owner import exclusive
 from .table import fetch_in_numpy, read_in_numpy
 from .types import Value
 
@@ -439,7 +439,7 @@ def recording(values: tuple) -> bool:
     return bool(_stack) and any(True for value in values for _ in _flatten(value, ""))
 
 
-@alone
+@exclusive
 def record(
     python_function: Callable,
     *,
