@@ -89,7 +89,7 @@ def test_mixing_vectors_of_different_sizes_is_refused() -> None:
 
 
 def test_array_inside_recorded_code_is_refused() -> None:
-    with pytest.raises(RecordingError, match="ndarray inside recorded code"):
+    with pytest.raises(RecordingError, match="ndarray in recorded code"):
         record(lambda a: a + np.ones(3), a="float")
 
 

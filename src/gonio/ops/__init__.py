@@ -172,7 +172,7 @@ def fma(a: Scalar | float, b: V, c: V | Scalar | float) -> V: ...
 @overload
 def fma(a: Scalar | float, b: Scalar | float, c: V) -> V: ...
 def fma(a: Value, b: Value, c: Value) -> Value:
-    """a b + c: in float32 one fused operation, rounded once; in float64, the oracle, both steps are rounded as in NumPy."""
+    """a b + c: in float32 fused and rounded once; in float64, the oracle, product and sum are rounded as in NumPy."""
     return drjit().fma(a, b, c) if is_single(a) or is_single(b) or is_single(c) else a * b + c
 
 
