@@ -186,7 +186,7 @@ class Function:
     parameters         name -> type, in order; "self.alpha" is the field `alpha` of the model
     arguments          name -> the argument: nodes, objects and tuples of nodes
     nodes              every value, in order of evaluation
-    result             the returned nodes, in the structure in which Python returned them (a tuple, a NamedTuple, a node)
+    result             the returned nodes in their structure (a tuple, a NamedTuple, a node)
     """
 
     def __init__(self, name: str, doc: str, source: str) -> None:
