@@ -94,7 +94,7 @@ def presets(model_name: str) -> dict[str, Preset]:
 @lru_cache(maxsize=1)
 def published() -> dict[str, Fit]:
     """Every fit by FILE/FIT, the default first."""
-    found: dict[str, Fit] = {}
+    fits: dict[str, Fit] = {}
     for file in FILES:
         data = json.loads((_FOLDER / f"{file}.json").read_text())
         for name, one in data["fits"].items():
@@ -104,20 +104,20 @@ def published() -> dict[str, Fit]:
             for key, numbers in one["materials"].items():
                 figures = _unpacked(numbers, shapes)
                 of_material[key] = {"diffuse": figures["diffuse"], **translate(figures)}
-            found[f"{file}/{name}"] = Fit(f"{file}/{name}", model_name, data["source"], of_material)
-    return found
+            fits[f"{file}/{name}"] = Fit(f"{file}/{name}", model_name, data["source"], of_material)
+    return fits
 
 
 def _unpacked(numbers: list[float], shapes: Mapping[str, tuple[int, ...]]) -> Figures:
     """The flat list of a material's figures, by parameter: numbers, colours, pairs of colours."""
-    found: Figures = {}
+    figures: Figures = {}
     at = 0
     for name, shape in shapes.items():
         size = math.prod(shape)
         part = np.reshape(numbers[at : at + size], shape)
-        found[name] = float(part) if not shape else _tuples(part)
+        figures[name] = float(part) if not shape else _tuples(part)
         at += size
-    return found
+    return figures
 
 
 def _tuples(array: np.ndarray) -> Value:

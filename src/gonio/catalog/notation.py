@@ -85,15 +85,15 @@ def several(texts: Sequence[str], assignments: Sequence[str]) -> list[Settings]:
 def shared(named: Sequence[Settings], assignments: Sequence[str]) -> list[dict[str, str]]:
     """Of settings, "name=value" each, those that each material has; InputError for one that none has."""
     wanted = dict(map(assignment, assignments))
-    found, known = [], set()
+    assigned, known = [], set()
     for cls, own in named:
         fits = [name for name in wanted if _has(cls, {**wanted, **own}, name)]
-        found.append({name: wanted[name] for name in fits})
+        assigned.append({name: wanted[name] for name in fits})
         known |= {*fits, *cls.parameters(), *(["preset"] if cls.presets() else [])}
     for name in wanted:
         if name not in known:
             raise InputError(f"unknown parameter '{name}'", f"--param {name}", did_you_mean(name, sorted(known)))
-    return found
+    return assigned
 
 
 def build(named: Settings) -> BSDF:
@@ -225,26 +225,26 @@ def as_json(material: BSDF) -> dict[str, object]:
 
     Raises InputError for a class that no file holds, and for values that JSON has no word for.
     """
-    found: dict[str, object] = {"type": spelled(type(material))}
-    if found["type"] != type(material).name and ":" not in str(found["type"]):
+    notation: dict[str, object] = {"type": spelled(type(material))}
+    if notation["type"] != type(material).name and ":" not in str(notation["type"]):
         what = f"the class {type(material).__name__} is known to this program alone"
         raise InputError(what, "material", "put it into a file, and name it FILE.py:CLASS")
     for name, value in settings(material).items():
         if isinstance(value, BSDF):
-            found[name] = as_json(value)
+            notation[name] = as_json(value)
         elif material.parameters()[name].kind == "file":
-            found[name] = os.path.abspath(os.path.expanduser(value))
+            notation[name] = os.path.abspath(os.path.expanduser(value))
         elif isinstance(value, bool | str):
             parameter = material.parameters()[name]
-            found[name] = parameter.spelled(str(value)) if isinstance(parameter, ChoiceParameter) else value
+            notation[name] = parameter.spelled(str(value)) if isinstance(parameter, ChoiceParameter) else value
         elif isinstance(value, DispersiveIndex):
-            found[name] = value.constants.name
+            notation[name] = value.constants.name
         else:
             try:
-                found[name] = np.asarray(value, float).tolist()
+                notation[name] = np.asarray(value, float).tolist()
             except (TypeError, ValueError):
                 raise InputError(f"{name} = {value!r} is no number", "material", "give numbers") from None
-    return found
+    return notation
 
 
 def for_files(material: BSDF) -> dict[str, object] | None:
@@ -263,12 +263,12 @@ def from_json(described: Mapping[str, object]) -> BSDF:
 
 def settings(material: BSDF) -> dict[str, Value]:
     """The parameters that are not the default, by name."""
-    found = {}
+    values = {}
     for name, parameter in material.parameters().items():
         value = getattr(material, name)
         if parameter.required or not _same(value, parameter.default):
-            found[name] = value
-    return found
+            values[name] = value
+    return values
 
 
 def _same(a: object, b: object) -> bool:

@@ -66,15 +66,15 @@ def kind_of(word: str | os.PathLike[str], accepted: Collection[Kind], where: str
     Raises InputError, with what it is and what is expected, where it names nothing of these kinds.
     """
     text = os.fspath(word)
-    found = readings(text)
-    kind = next((one for one in found if one in accepted), None)
+    kinds = readings(text)
+    kind = next((one for one in kinds if one in accepted), None)
     if kind is not None:
         return kind
     shown = _shortened(text)
-    what, hint = f"'{shown}' is {found[0].value}, {_expected(accepted)} expected", _TAKEN.get(found[0], "")
-    if Kind.SCENE in found and (reason := _broken(Path(text))):
+    what, hint = f"'{shown}' is {kinds[0].value}, {_expected(accepted)} expected", _TAKEN.get(kinds[0], "")
+    if Kind.SCENE in kinds and (reason := _broken(Path(text))):
         what, where, hint = reason, text, "mend the file"
-    elif not _exists(Path(text)) and found[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
+    elif not _exists(Path(text)) and kinds[0] not in (Kind.NAME, Kind.PLUGIN, Kind.DISTRIBUTION):
         what, hint = f"no file or folder '{shown}'; {_expected(accepted)} expected", "check the path"
     raise InputError(what, where, hint)
 
@@ -85,19 +85,19 @@ def _shortened(text: str) -> str:
 
 def _expected(accepted: Collection[Kind]) -> str:
     """The kinds in words."""
-    whole = set(accepted) >= MATERIALS
-    named = [kind.value for kind in Kind if kind in accepted and not (whole and kind in MATERIALS)]
-    *others, last = ["a material", *named] if whole else named
+    any_material = set(accepted) >= MATERIALS
+    named = [kind.value for kind in Kind if kind in accepted and not (any_material and kind in MATERIALS)]
+    *others, last = ["a material", *named] if any_material else named
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def is_material(word: str) -> bool:
     """Whether a word names a material that there is: a known name, a file, or a class that is one."""
-    found = readings(word)
-    if found[0] is Kind.CODE:
+    kinds = readings(word)
+    if kinds[0] is Kind.CODE:
         cls = outside.thing(texts.split(word)[0], where="MODEL")
         return (isinstance(cls, type) and issubclass(cls, BSDF)) or callable(getattr(cls, "eval", None))
-    return found[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in found)
+    return kinds[0] in (Kind.TABLE, Kind.DOCUMENT) or (bool(_names(texts.split(word)[0])) and Kind.NAME in kinds)
 
 
 def readings(text: str) -> list[Kind]:
@@ -142,10 +142,10 @@ def _described(name: str, kind: Kind) -> list[Kind]:
 
 def _type_of(text: str) -> str:
     try:
-        found = json.loads(text)
+        content = json.loads(text)
     except (ValueError, RecursionError):
         return ""
-    return str(found.get("type", "")) if isinstance(found, dict) else ""
+    return str(content.get("type", "")) if isinstance(content, dict) else ""
 
 
 def _type_of_file(text: str) -> str:
@@ -159,8 +159,8 @@ def _type_of_file(text: str) -> str:
 
 def _names(name: str) -> list[Kind]:
     """What a name alone may stand for."""
-    found = [Kind.NAME] if is_model(name) or library.knows(name) else []
-    return [Kind.DISTRIBUTION, *found] if name in distributions() else found
+    kinds = [Kind.NAME] if is_model(name) or library.knows(name) else []
+    return [Kind.DISTRIBUTION, *kinds] if name in distributions() else kinds
 
 
 def _resembles(name: str) -> bool:
@@ -174,8 +174,8 @@ def _resembles(name: str) -> bool:
 def _in_folder(path: Path, names: list[Kind]) -> list[Kind]:
     """By the files that a folder holds; one that holds none of them is left to what the verb says of it."""
     marks = {"scene.json": Kind.SCENE, "tables.npz": Kind.TABLES, CALIBRATION: Kind.CALIBRATION}
-    found = [kind for name, kind in marks.items() if _exists(path / name)]
-    return [*found, Kind.FOLDER, *names] if found else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
+    kinds = [kind for name, kind in marks.items() if _exists(path / name)]
+    return [*kinds, Kind.FOLDER, *names] if kinds else [Kind.FOLDER, *names, Kind.SCENE, Kind.TABLES]
 
 
 def _of_file(path: Path) -> list[Kind]:
@@ -205,10 +205,10 @@ def _of_archive(path: Path) -> list[Kind]:
 def _lists_photographs(path: Path) -> bool:
     """Whether a .json is a calibration."""
     try:
-        found = json.loads(path.read_bytes()) if path.stat().st_size <= _LARGEST_CALIBRATION else None
+        content = json.loads(path.read_bytes()) if path.stat().st_size <= _LARGEST_CALIBRATION else None
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(found, dict) and "scene" not in found and ("photographs" in found or "lights" in found)
+    return isinstance(content, dict) and "scene" not in content and ("photographs" in content or "lights" in content)
 
 
 def _broken(path: Path) -> str:

@@ -78,14 +78,14 @@ def adopt(cls: type, where: str = "") -> type[BSDF]:
         inner = cls()
     except Exception as error:
         raise InputError(f"{cls.__name__}() fails: {type(error).__name__}: {error}", where, "give defaults") from None
-    kept: dict[str, object] = {}
+    members: dict[str, object] = {}
     for name in ("eval", "pdf", "sample"):
         if callable(getattr(cls, name, None)):
-            kept[name] = _forward(inner, name)
+            members[name] = _forward(inner, name)
     for name in ("transmits", "isotropic", "delta", "stochastic", "known_violations", "lossless_tolerance"):
         if hasattr(cls, name):
-            kept[name] = getattr(inner, name)
-    namespace = {**kept, "__doc__": cls.__doc__, "__module__": cls.__module__, "__annotations__": {}}
+            members[name] = getattr(inner, name)
+    namespace = {**members, "__doc__": cls.__doc__, "__module__": cls.__module__, "__annotations__": {}}
     return type(cls.__name__, (BSDF,), namespace)
 
 

@@ -111,8 +111,8 @@ def origin(*names: str) -> tuple[str, ...]:
 
 def _hash_of(cls: type) -> str:
     try:
-        found = with_imports(Path(inspect.getsourcefile(cls) or ""))
-        return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(found))).hexdigest()
+        files = with_imports(Path(inspect.getsourcefile(cls) or ""))
+        return hashlib.sha256(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()
     except (OSError, TypeError):  # typed at a prompt
         return f"{cls.__qualname__} {id(cls)} {_PROCESS}"
 

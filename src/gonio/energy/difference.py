@@ -145,8 +145,8 @@ def difference(
     albedos = np.stack([np.broadcast_to(albedo(one, mu).value, (len(mu), 3)) for one in (a, b)], axis=1)
     rng = np.random.default_rng([seed, 95])
     specular = any(one.delta != "never" for one in (a, b))
-    found = [_view(a, b, theta, of, known, pairs, rng) for theta, of in zip(views, albedos, strict=True)]
-    return Difference(tuple(found), known, specular, metric, tolerance)
+    per_view = [_view(a, b, theta, of, known, pairs, rng) for theta, of in zip(views, albedos, strict=True)]
+    return Difference(tuple(per_view), known, specular, metric, tolerance)
 
 
 def _view(
@@ -156,8 +156,8 @@ def _view(
     phi = np.repeat(2.0 * np.pi * np.arange(turns) / turns, -(-pairs // turns))
     wo = direction(np.full(len(phi), np.cos(np.radians(theta))), phi)
     wi, density = _directions(a, b, wo, rng)
-    kept = (density > 0.0) & (np.abs(wi[:, 2]) > GRAZING) & known.holds(wo, wi)
-    wo, wi, density = wo[kept], wi[kept], density[kept]
+    usable = (density > 0.0) & (np.abs(wi[:, 2]) > GRAZING) & known.holds(wo, wi)
+    wo, wi, density = wo[usable], wi[usable], density[usable]
     values = [np.asarray(one.eval(wo, wi, precision="float64"), float).mean(axis=1) for one in (a, b)]
     off, of_b = np.abs(values[0] - values[1]), np.abs(values[1])
     total = float((of_b / density).sum())

@@ -35,8 +35,8 @@ def names_table(text: str) -> bool:
     Of a format whose files hold several materials, only with one of them: a .npz alone may be anything.
     """
     path, item = parted(text)
-    found = by_suffix(path)
-    return bool(found) and (bool(item) or not found[0].several)
+    formats = by_suffix(path)
+    return bool(formats) and (bool(item) or not formats[0].several)
 
 
 def format_of(path: Path, data: bytes | None = None) -> Format:
@@ -44,11 +44,11 @@ def format_of(path: Path, data: bytes | None = None) -> Format:
 
     data  None: the file is to be written
     """
-    found = by_suffix(path)
-    if not found:
+    formats = by_suffix(path)
+    if not formats:
         hint = did_you_mean(path.suffix, suffixes())
         raise InputError(f"'{path.suffix}' is no format of measurements", str(path), hint)
-    return next((one for one in found if data is not None and one.fits(data)), found[0])
+    return next((one for one in formats if data is not None and one.fits(data)), formats[0])
 
 
 def read(file: str | os.PathLike[str]) -> Measurement:

@@ -29,13 +29,13 @@ def difference(table: Measurement, other: Measurement, pairs: int = PAIRS, seed:
     standard error is under `SURE` of it, or `ROUNDS` are done: a spike that no density follows takes many.
     """
     rng = np.random.default_rng([seed, 83])
-    sums, squares, whole = 0.0, 0.0, 0.0
+    sums, squares, total = 0.0, 0.0, 0.0
     for _ in range(ROUNDS):
         off, size = _round(table, other, pairs, rng)
-        sums, squares, whole = sums + float(off.sum()), squares + float((off * off).sum()), whole + float(size.sum())
+        sums, squares, total = sums + float(off.sum()), squares + float((off * off).sum()), total + float(size.sum())
         if squares <= (SURE * sums) ** 2 or not np.isfinite(sums):
             break
-    return sums / whole if whole > 0.0 else 0.0
+    return sums / total if total > 0.0 else 0.0
 
 
 def _round(
@@ -53,8 +53,8 @@ def _round(
     for index, one in enumerate((table, other), 1):
         drawn, _ = one.draw(*(backend.vector_of(v[third == index], 3, types) for v in (wo, u)))
         wi[third == index] = backend.to_numpy(drawn, int((third == index).sum()))
-    kept = wi[:, 2] > 1e-6
-    wo, wi = wo[kept], wi[kept]
+    upper = wi[:, 2] > 1e-6
+    wo, wi = wo[upper], wi[upper]
     density = wi[:, 2] / np.pi
     for one in (table, other):
         density = density + backend.to_numpy(

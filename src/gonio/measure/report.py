@@ -69,7 +69,7 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
     nm = about["wavelengths"]
     channels = "red, green, blue" if nm is None else f"{len(nm)} wavelengths, {nm[0]:g} to {nm[-1]:g} nm"
     low, high = about["range"]
-    found = [
+    rows = [
         ("format", f"{about['format']}, a table of kind {about['kind']}"),
         ("title", about["title"]),
         ("dimensions", " x ".join(f"{count} {axis}" for axis, count in about["dimensions"].items())),
@@ -79,16 +79,16 @@ def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
         ("measured", str(AngularRange(*map(tuple, about["known"].values())))),
     ]
     if about["error"] is not None:
-        found.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
+        rows.append(("error", f"{100.0 * about['error']:.3g} % in the median, a standard error for each value"))
     for flaw, share in about["flaws"].items():
-        found.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
+        rows.append((flaw, f"{100.0 * share:.3g} % of the values, kept as they are" if share else "none"))
     low, high = about["known"]["view"]
     for angle, row in zip(about["albedo"]["angles"], about["albedo"]["rgb"], strict=True):
         if low <= angle <= high:
-            found.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
+            rows.append((f"albedo at {angle:g}", "  ".join(f"{x:.4f}" for x in row)))
     highest = about["albedo"]["highest"]
-    found.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
-    found.append(
+    rows.append(("energy", f"gives back {highest:.4g} of the light at most" + (": a gain" if highest > 1.0 else "")))
+    rows.append(
         ("reciprocity", f"exchanging both directions changes f by {100.0 * about['reciprocity']:.3g} % on average")
     )
-    return [(what, text) for what, text in found if text]
+    return [(what, text) for what, text in rows if text]

@@ -132,13 +132,13 @@ class Warp:
 
 def search(below: Callable[[Scalar], Scalar], count: int, wanted: Scalar) -> Scalar:
     """The last of nodes 0 .. count - 2 at which a sum that never falls is <= `wanted`, by halving."""
-    found = wanted * 0.0
+    index = wanted * 0.0
     step = 1 << max((count - 2).bit_length() - 1, 0)
     while step and count > 2:
-        at = found + float(step)
-        found = where((at <= count - 2.0) & (below(ops.minimum(at, count - 2.0)) <= wanted), at, found)
+        at = index + float(step)
+        index = where((at <= count - 2.0) & (below(ops.minimum(at, count - 2.0)) <= wanted), at, index)
         step >>= 1
-    return found
+    return index
 
 
 @function

@@ -119,18 +119,18 @@ def read(document: Document, path: Path, name: str = "") -> Described:
 
 def described(text: str) -> dict[str, Notation]:
     """The notation of every material of FILE, or of FILE:MATERIAL, by its name."""
-    found = parted(text)
-    assert found is not None, "asked before"
-    document, path, name = found
+    parts = parted(text)
+    assert parts is not None, "asked before"
+    document, path, name = parts
     names = [name] if name or not path.is_file() else document.materials(path)
     return {one: read(document, path, one).notation for one in names}
 
 
 def without_pictures(text: str) -> Notation:
     """The notation of FILE or FILE:MATERIAL with numbers alone; GonioWarning for what is left out."""
-    found = parted(text)
-    assert found is not None, "asked before"
-    described = read(*found)
+    parts = parted(text)
+    assert parts is not None, "asked before"
+    described = read(*parts)
     lost: list[str] = []
     notation = _plain(described.notation, lost)
     if lost:
@@ -147,10 +147,10 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     source  FILE or FILE:MATERIAL
     output  .json, or a document's suffix
     """
-    found = parted(source)
-    if found is None:
+    parts = parted(source)
+    if parts is None:
         raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
-    described = read(*found)
+    described = read(*parts)
     if output.suffix.lower() == ".json":
         text = json.dumps(for_scenes(described.notation), indent=2) + "\n"
         files.write_whole(output, text.encode())
@@ -181,22 +181,22 @@ def from_scenes(notation: Mapping[str, object]) -> Notation:
 
 
 def _with_types(notation: Mapping[str, object], change: Callable[[str], str]) -> Notation:
-    found: Notation = {}
+    changed: Notation = {}
     for key, value in notation.items():
         if isinstance(value, Mapping):
-            found[key] = _with_types(value, change)
+            changed[key] = _with_types(value, change)
         else:
-            found[key] = change(value) if key == "type" and isinstance(value, str) else value
-    return found
+            changed[key] = change(value) if key == "type" and isinstance(value, str) else value
+    return changed
 
 
 def _plain(notation: Mapping[str, object], lost: list[str]) -> Notation:
-    found: Notation = {}
+    plain: Notation = {}
     for key, value in notation.items():
         if isinstance(value, dict) and value.get("type") == "imageTex":
             lost.append(key)
             if "factor" in value:
-                found[key] = value["factor"]
+                plain[key] = value["factor"]
         else:
-            found[key] = _plain(value, lost) if isinstance(value, dict) else value
-    return {key: value for key, value in found.items() if key != "normalmap"}
+            plain[key] = _plain(value, lost) if isinstance(value, dict) else value
+    return {key: value for key, value in plain.items() if key != "normalmap"}

@@ -185,7 +185,7 @@ class _Material:
         info = file.member(of, key, at)
         texture = file.items("textures")[file.index(info, "index", "textures", at)]
         transform = file.member(info, "extensions", at).get("KHR_texture_transform")
-        if file.whole(info, "texCoord", at, 0):
+        if file.integer(info, "texCoord", at, 0):
             self.notices.append(f"{key} lies over a second set of coordinates, and is left out")
             return None
         if transform:
@@ -195,19 +195,19 @@ class _Material:
             return None
         number = file.index(texture, "source", "images", at)
         image = file.items("images")[number]
-        found: Notation = {"type": "imageTex", "file": self._picture(image, number)}
+        image_notation: Notation = {"type": "imageTex", "file": self._picture(image, number)}
         if srgb:
-            found["colorSpace"] = "srgb"
+            image_notation["colorSpace"] = "srgb"
         if "sampler" in texture:
             sampler = file.items("samplers")[file.index(texture, "sampler", "samplers", at)]
             if sampler.get("magFilter") == 9728:
-                found["filter"] = "nearest"
+                image_notation["filter"] = "nearest"
             if sampler.get("wrapS", 10497) != sampler.get("wrapT", 10497):
                 self.notices.append(f"{key} is wrapped along v as along u")
-            wrap = {33071: "clamp", 33648: "mirror"}.get(file.whole(sampler, "wrapS", at, 10497))
+            wrap = {33071: "clamp", 33648: "mirror"}.get(file.integer(sampler, "wrapS", at, 10497))
             if wrap:
-                found["wrap"] = wrap
-        return found
+                image_notation["wrap"] = wrap
+        return image_notation
 
     def _picture(self, image: Json, number: int) -> str:
         """A picture's file, from where the glTF lies; FILE#NUMBER where it is inside."""
@@ -220,7 +220,7 @@ class _Material:
         if uri.startswith("data:"):
             self.file.data(uri, f"{at}/uri")
             return f"{self.file.path.name}#{number}"
-        return self.file.beside(uri, f"{at}/uri").relative_to(self.file.path.parent.resolve()).as_posix()
+        return self.file.local_file(uri, f"{at}/uri").relative_to(self.file.path.parent.resolve()).as_posix()
 
     # ------------------------------------------------------------------ values
 
@@ -242,8 +242,8 @@ class _Material:
         if not self.anisotropy or not anisotropic:
             return {"alpha": alpha}
         along = alpha + (1.0 - alpha) * self.anisotropy**2
-        turned = {"rotation": math.remainder(self.turn, math.tau)} if self.turn else {}
-        return {"alpha": [along, alpha], **turned}
+        rotation = {"rotation": math.remainder(self.turn, math.tau)} if self.turn else {}
+        return {"alpha": [along, alpha], **rotation}
 
     def say(self, notice: str) -> None:
         if notice not in self.notices:
@@ -254,13 +254,13 @@ class _Material:
     def described(self) -> Described:
         if "KHR_materials_unlit" in self.extensions:
             self.say("it is unlit, shown as painted whatever the light: here it is a matt surface of that colour")
-            found: Notation = {"type": "lambert", "albedo": self.base}
+            notation: Notation = {"type": "lambert", "albedo": self.base}
         else:
-            found = self._coated(self._sheened(self._body()))
-        found = self._holed(found)
+            notation = self._coated(self._sheened(self._body()))
+        notation = self._holed(notation)
         if self.normal is not None:
-            found["normalmap"] = self.normal
-        return Described(found, tuple(self.notices))
+            notation["normalmap"] = self.normal
+        return Described(notation, tuple(self.notices))
 
     def _body(self) -> Notation:
         metallic, through = self.metallic, self.transmission
@@ -364,8 +364,8 @@ class _Material:
         if alpha < ALBEDOS[0][0]:
             alpha = ALBEDOS[0][0]
             self.say(f"the sheen's roughness is held at {math.sqrt(alpha):.2g}, where its model starts to keep energy")
-        kept = 1.0 - max(self.sheen) * float(np.interp(alpha, *ALBEDOS))
-        below = _mixed({"type": "lambert", "albedo": 0.0}, body, kept)
+        transmitted = 1.0 - max(self.sheen) * float(np.interp(alpha, *ALBEDOS))
+        below = _mixed({"type": "lambert", "albedo": 0.0}, body, transmitted)
         return {"type": "sum", "a": {"type": "sheen-charlie", "albedo": list(self.sheen), "alpha": alpha}, "b": below}
 
     def _coated(self, body: Notation) -> Notation:
@@ -378,9 +378,9 @@ class _Material:
         coated: Notation = {"type": "coat", "base": body, "index": 1.5, "alpha": alpha, "bounces": "white"}
         return coated if self.clearcoat == 1.0 else _mixed(body, coated, self.clearcoat)
 
-    def _holed(self, found: Notation) -> Notation:
+    def _holed(self, body: Notation) -> Notation:
         if self.mode == "OPAQUE":
-            return found
+            return body
         opacity: object = self.alpha_factor
         if self.base_texture is not None:
             opacity = {**self.base_texture, "colorSpace": "raw", "channel": "a", "factor": self.alpha_factor}
@@ -389,8 +389,8 @@ class _Material:
         elif self.mode == "MASK":
             opacity = 1.0 if self.alpha_factor >= self.cutoff else 0.0
         if opacity == 1.0:
-            return found
-        both = found if self.transmission != 0.0 else {"type": "two-sided", "base": found}
+            return body
+        both = body if self.transmission != 0.0 else {"type": "two-sided", "base": body}
         return {"type": "opacity", "base": both, "opacity": opacity}
 
 

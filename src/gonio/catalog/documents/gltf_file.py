@@ -56,55 +56,55 @@ class GltfFile:
     def items(self, key: str) -> list[Json]:
         """A list of objects at the top level, empty where there is none."""
         if key not in self._lists:
-            found = self.root.get(key, [])
-            if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+            items = self.root.get(key, [])
+            if not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
                 self.fail("a list of objects expected", f"/{key}")
-            self._lists[key] = found
+            self._lists[key] = items
         return self._lists[key]
 
     def member(self, of: Mapping[str, object], key: str, at: str) -> Json:
         """A member that is an object, empty where there is none."""
-        found = of.get(key, {})
-        if not isinstance(found, dict):
+        member = of.get(key, {})
+        if not isinstance(member, dict):
             self.fail("an object expected", f"{at}/{key}")
-        return found
+        return member
 
     def number(self, of: Mapping[str, object], key: str, default: float, at: str, low: float, high: float) -> float:
         """A member that is a number from low to high."""
-        found = of.get(key, default)
-        if isinstance(found, bool) or not isinstance(found, int | float):
+        number = of.get(key, default)
+        if isinstance(number, bool) or not isinstance(number, int | float):
             self.fail("a number expected", f"{at}/{key}")
-        if not low <= found <= high:  # a number of a thousand digits can be compared, and not be written
-            self.fail(f"{str(found)[:20]} is out of range: {low:g} to {high:g} expected", f"{at}/{key}")
-        return float(found)
+        if not low <= number <= high:  # a number of a thousand digits can be compared, and not be written
+            self.fail(f"{str(number)[:20]} is out of range: {low:g} to {high:g} expected", f"{at}/{key}")
+        return float(number)
 
     def colour(
         self, of: Mapping[str, object], key: str, default: tuple[float, ...], at: str, high: float = 1.0
     ) -> tuple[float, ...]:
         """A member that is a list of as many numbers as the default, from 0 to `high`."""
-        found = of.get(key, list(default))
-        if not isinstance(found, list) or len(found) != len(default):
+        color = of.get(key, list(default))
+        if not isinstance(color, list) or len(color) != len(default):
             self.fail(f"a list of {len(default)} numbers expected", f"{at}/{key}")
-        return tuple(self.number({str(i): part}, str(i), 0.0, f"{at}/{key}", 0.0, high) for i, part in enumerate(found))
+        return tuple(self.number({str(i): part}, str(i), 0.0, f"{at}/{key}", 0.0, high) for i, part in enumerate(color))
 
-    def whole(
+    def integer(
         self, of: Mapping[str, object], key: str, at: str, default: int | None = None, high: int = 1 << 40
     ) -> int:
         """A member that is a whole number from 0 to `high`; an error where it is missing and has no default."""
-        found = of.get(key, default)
-        if isinstance(found, bool) or not isinstance(found, int) or found < 0:
+        number = of.get(key, default)
+        if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             self.fail("a whole number of 0 or more expected", f"{at}/{key}")
-        if found > high:
-            self.fail(f"{str(found)[:20]} given, at most {high} expected", f"{at}/{key}")
-        return found
+        if number > high:
+            self.fail(f"{str(number)[:20]} given, at most {high} expected", f"{at}/{key}")
+        return number
 
     def index(self, of: Mapping[str, object], key: str, into: str, at: str) -> int:
         """A member that is an index into a list at the top level."""
         count = len(self.items(into))
-        found = self.whole(of, key, at)
-        if found >= count:
-            self.fail(f"there is no {into} {found}, of {count}", f"{at}/{key}")
-        return found
+        number = self.integer(of, key, at)
+        if number >= count:
+            self.fail(f"there is no {into} {number}, of {count}", f"{at}/{key}")
+        return number
 
     # ------------------------------------------------------------------ bytes
 
@@ -113,25 +113,25 @@ class GltfFile:
         view = self.items("bufferViews")[index]
         at = f"/bufferViews/{index}"
         data = self._buffer(self.index(view, "buffer", "buffers", at))
-        start = self.whole(view, "byteOffset", at, 0)
-        return data[start : start + self.whole(view, "byteLength", at)]
+        start = self.integer(view, "byteOffset", at, 0)
+        return data[start : start + self.integer(view, "byteLength", at)]
 
-    def beside(self, uri: str, at: str) -> Path:
+    def local_file(self, uri: str, at: str) -> Path:
         """The file of a relative address. InputError where it lies outside the folder, or there is none."""
         hint = "give a file beside it, or put the data into the file"
         if ":" in uri.split("/")[0] or uri.startswith(("//", "\\")):
             self.fail(f"'{uri[:60]}' is no file beside it", at, hint)
         try:
             folder = self.path.parent.resolve()
-            found = (folder / unquote(uri)).resolve()
-            inside, there = found.is_relative_to(folder), found.is_file()
+            path = (folder / unquote(uri)).resolve()
+            inside, there = path.is_relative_to(folder), path.is_file()
         except (OSError, ValueError, RuntimeError) as error:  # too long, a zero byte, links in a circle
             self.fail(f"no usable file name: {error}", at, hint)
         if not inside:
             self.fail(f"'{uri[:60]}' lies outside its folder", at, hint)
         if not there:
             self.fail(f"'{uri[:60]}' does not exist", at, "keep a .gltf together with its files, or use .glb")
-        return found
+        return path
 
     def data(self, uri: str, at: str) -> bytes:
         """What a data: address holds."""
@@ -152,13 +152,15 @@ class GltfFile:
             return self._chunk
         if not isinstance(uri, str):
             self.fail("a text expected", f"{at}/uri")
-        return self.data(uri, f"{at}/uri") if uri.startswith("data:") else self._bytes_of(self.beside(uri, f"{at}/uri"))
+        if uri.startswith("data:"):
+            return self.data(uri, f"{at}/uri")
+        return self._bytes_of(self.local_file(uri, f"{at}/uri"))
 
     def _size(self, index: int) -> int:
         """How many bytes a buffer really has; a file beside it is not read for that."""
         uri = self.items("buffers")[index].get("uri")
         if isinstance(uri, str) and not uri.startswith("data:"):
-            return self.beside(uri, f"/buffers/{index}/uri").stat().st_size
+            return self.local_file(uri, f"/buffers/{index}/uri").stat().st_size
         return len(self._buffer(index))
 
     def _bytes_of(self, path: Path) -> bytes:
@@ -179,7 +181,7 @@ class GltfFile:
             self.fail(f"version {version} of .glb, 2 expected", hint="save it as glTF 2.0")
         if length != len(data):
             self.fail(f"it says that it has {length} bytes, and has {len(data)}", hint="it is cut off or damaged")
-        found: dict[int, bytes] = {}
+        chunks: dict[int, bytes] = {}
         at = 12
         while at < length:
             if at + 8 > length:
@@ -187,11 +189,11 @@ class GltfFile:
             size, kind = struct.unpack_from("<II", data, at)
             if size > length - at - 8:
                 self.fail(f"a chunk of {size} bytes at byte {at}, where {length - at - 8} are left")
-            found.setdefault(kind, data[at + 8 : at + 8 + size])
+            chunks.setdefault(kind, data[at + 8 : at + 8 + size])
             at += 8 + size
-        if _JSON not in found:
+        if _JSON not in chunks:
             self.fail("a .glb without JSON")
-        return found[_JSON], found.get(_BIN)
+        return chunks[_JSON], chunks.get(_BIN)
 
     # ------------------------------------------------------------------ checks
 
@@ -203,14 +205,14 @@ class GltfFile:
             raise ValueError(f"{name} is no number")
 
         try:
-            found = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
+            root = json.loads(text.decode("utf-8-sig"), parse_constant=no_number)
         except RecursionError:
             self.fail("JSON that is nested too deep")
         except ValueError as error:  # no UTF-8 too, and an integer of more digits than Python converts
             self.fail(f"no JSON: {str(error)[:200]}", hint="it is cut off or damaged")
-        if not isinstance(found, dict):
+        if not isinstance(root, dict):
             self.fail("an object expected", "/")
-        return found
+        return root
 
     def _check(self) -> None:
         version = self.member(self.root, "asset", "").get("version")
@@ -223,7 +225,7 @@ class GltfFile:
         sizes = self._buffers()
         for index, view in enumerate(self.items("bufferViews")):
             at = f"/bufferViews/{index}"
-            end = self.whole(view, "byteOffset", at, 0) + self.whole(view, "byteLength", at)
+            end = self.integer(view, "byteOffset", at, 0) + self.integer(view, "byteLength", at)
             size = sizes[self.index(view, "buffer", "buffers", at)]
             if end > size:
                 self.fail(f"it ends at byte {end} of a buffer of {size}", at, "it is cut off or damaged")
@@ -234,7 +236,7 @@ class GltfFile:
     def _buffers(self) -> list[int]:
         sizes = []
         for index, buffer in enumerate(self.items("buffers")):
-            claimed, size = self.whole(buffer, "byteLength", f"/buffers/{index}"), self._size(index)
+            claimed, size = self.integer(buffer, "byteLength", f"/buffers/{index}"), self._size(index)
             if claimed > size:
                 what = f"a buffer of {claimed} bytes, and there are {size}"
                 self.fail(what, f"/buffers/{index}/byteLength", "it is cut off or damaged")
@@ -242,17 +244,17 @@ class GltfFile:
         return sizes
 
     def _accessor(self, accessor: Json, at: str) -> None:
-        size, parts = _SIZES.get(self.whole(accessor, "componentType", at)), _PARTS.get(str(accessor.get("type")))
+        size, parts = _SIZES.get(self.integer(accessor, "componentType", at)), _PARTS.get(str(accessor.get("type")))
         if size is None or parts is None:
             self.fail("unknown componentType or type", at)
-        count = self.whole(accessor, "count", at)
+        count = self.integer(accessor, "count", at)
         if "bufferView" not in accessor:
             return
         view = self.items("bufferViews")[self.index(accessor, "bufferView", "bufferViews", at)]
         element = size * parts
-        stride = self.whole(view, "byteStride", at, 0, 252) or element
-        end = self.whole(accessor, "byteOffset", at, 0) + (stride * (count - 1) + element if count else 0)
-        if end > self.whole(view, "byteLength", at):
+        stride = self.integer(view, "byteStride", at, 0, 252) or element
+        end = self.integer(accessor, "byteOffset", at, 0) + (stride * (count - 1) + element if count else 0)
+        if end > self.integer(view, "byteLength", at):
             self.fail(f"{count} entries end at byte {end} of a view of {view['byteLength']}", at)
 
     def _nodes(self) -> None:

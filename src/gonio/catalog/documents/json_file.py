@@ -61,23 +61,23 @@ def _entries(path: Path) -> dict[str, Json] | None:
             return _read[path][1]
         if not path.is_file() or about.st_size > LARGEST:
             return None
-        found = dict(_found(json.loads(path.read_bytes())))
+        entries = dict(_materials_in(json.loads(path.read_bytes())))
     except (OSError, ValueError, RecursionError):
         return None
     while len(_read) >= KEPT:
         _read.pop(next(iter(_read)))
-    _read[path] = stamp, found or None
-    return found or None
+    _read[path] = stamp, entries or None
+    return entries or None
 
 
-def _found(content: Json) -> Iterator[tuple[str, Json]]:
+def _materials_in(content: Json) -> Iterator[tuple[str, Json]]:
     """Name and description of each material; nothing where the content is something else, such as a scene."""
     if isinstance(content, list):
         rows = [row for row in content if isinstance(row, dict)]
         names = [str(row.get("file") or row.get("path")) for row in rows]
         short = [Path(name).name for name in names]
         for name, row in zip(names if len(set(short)) < len(short) else short, rows, strict=True):
-            for _, entry in [*_found(row)][:1]:
+            for _, entry in [*_materials_in(row)][:1]:
                 yield name, entry
         return
     if not isinstance(content, dict):
@@ -104,14 +104,14 @@ def _located(notation: Mapping[str, object], folder: Path, where: str, depth: in
     for more materials inside each other than a material may have."""
     if depth > tree.MAX_MATERIALS:
         raise InputError(f"more than {tree.MAX_MATERIALS} materials inside each other", where, "mix fewer materials")
-    found: Notation = {}
+    located: Notation = {}
     for key, value in notation.items():
         if isinstance(value, dict):
-            found[key] = _located(value, folder, where, depth + 1)
+            located[key] = _located(value, folder, where, depth + 1)
         elif key == "type" and from_scenes({key: value})[key] in Document.family.all():
             raise InputError(f"a material of type '{value}' in it, which is in another file", where, "name that file")
         elif isinstance(value, str) and (key == "file" or outside.names_code(value)):
-            found[key] = str(folder / Path(value).expanduser())
+            located[key] = str(folder / Path(value).expanduser())
         else:
-            found[key] = value
-    return found
+            located[key] = value
+    return located

@@ -55,9 +55,9 @@ class MaterialX(Document):
         notices: list[str] = []
         if surface.getCategory() == STANDARD:
             definition = surface.getNodeDef()  # of its version
-            whole = {**_defaults(definition.getName() if definition else f"ND_{STANDARD}_surfaceshader"), **given}
-            notices = [f"{key} is left out" for key, without in LEFT.items() if whole[key] != without]
-            given = to_open_pbr(whole)
+            inputs = {**_defaults(definition.getName() if definition else f"ND_{STANDARD}_surfaceshader"), **given}
+            notices = [f"{key} is left out" for key, without in LEFT.items() if inputs[key] != without]
+            given = to_open_pbr(inputs)
         values = {key: list(value) if isinstance(value, tuple) else value for key, value in given.items()}
         return Described({"type": "openpbr", **values}, tuple(notices))
 
@@ -164,13 +164,13 @@ def _library() -> Node:
 @lru_cache(maxsize=4)
 def _types(category: str) -> dict[str, str]:
     """The type of each input of a surface that is a value."""
-    found = _library().getNodeDef(f"ND_{category}_surfaceshader").getActiveInputs()
-    return {one.getName(): one.getType() for one in found if one.getName() not in FRAMES}
+    inputs = _library().getNodeDef(f"ND_{category}_surfaceshader").getActiveInputs()
+    return {one.getName(): one.getType() for one in inputs if one.getName() not in FRAMES}
 
 
 def _defaults(definition: str) -> Inputs:
-    found = _library().getNodeDef(definition).getActiveInputs()
-    return {one.getName(): _plain(one.getValue()) for one in found if one.getName() not in FRAMES | {"tangent"}}
+    inputs = _library().getNodeDef(definition).getActiveInputs()
+    return {one.getName(): _plain(one.getValue()) for one in inputs if one.getName() not in FRAMES | {"tangent"}}
 
 
 def _plain(value: Node) -> Number:
@@ -199,15 +199,15 @@ def _document(path: Path) -> Node:
 
 def _surfaces(document: Node) -> dict[str, Node]:
     """The surface of each material by the material's name, and surfaces without one by their own."""
-    found: dict[str, Node] = {}
+    surfaces: dict[str, Node] = {}
     loose = {node.getName(): node for node in document.getNodes() if node.getType() == "surfaceshader"}
     for material in document.getNodes():
         link = material.getInput("surfaceshader") if material.getType() == "material" else None
         name = link.getNodeName() if link is not None else ""
         if name in loose:
-            found[material.getName()] = loose[name]
-    worn = {node.getName() for node in found.values()}
-    return {**found, **{name: node for name, node in loose.items() if name not in worn}}
+            surfaces[material.getName()] = loose[name]
+    worn = {node.getName() for node in surfaces.values()}
+    return {**surfaces, **{name: node for name, node in loose.items() if name not in worn}}
 
 
 def _inputs(surface: Node, where: str) -> Inputs:
@@ -215,7 +215,7 @@ def _inputs(surface: Node, where: str) -> Inputs:
     category = surface.getCategory()
     if category not in (OPEN_PBR, STANDARD):
         raise InputError(f"unknown node '{category[:60]}'", where, f"{OPEN_PBR} and {STANDARD} are read")
-    known, found = _types(category), {}
+    known, inputs = _types(category), {}
     for one in surface.getInputs():
         name = one.getName()
         linked = [key for key in ("nodename", "nodegraph", "interfacename", "output") if one.hasAttribute(key)]
@@ -227,8 +227,8 @@ def _inputs(surface: Node, where: str) -> Inputs:
         if one.getType() != known[name]:
             what = f"{name} is of type {one.getType()[:40]}, {known[name]} expected"
             raise InputError(what, where)
-        found[name] = _value(one, where)
-    return found
+        inputs[name] = _value(one, where)
+    return inputs
 
 
 def _value(one: Node, where: str) -> Number:

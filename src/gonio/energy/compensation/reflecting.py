@@ -106,22 +106,22 @@ def reflecting(base: BSDF, surface: Microsurface, average: str) -> Reflecting:
     *c, mean = curves.coefficients(*names, width)
     mean = maximum(mean, 0.0)
     F_avg: Array = base.mean_reflectance(average)
-    two_widths, true_mean = None, mean
+    anisotropic, true_mean = None, mean
     if two:
         larger, smaller = maximum(alpha.x, alpha.y), minimum(alpha.x, alpha.y)
         place = inset(sqrt(smaller / larger), curves.ASPECTS), inset(sqrt(larger), curves.ASPECT_ROWS)
         *channels, of_both = lookup(curves.anisotropic(*names), *place)
-        two_widths, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
+        anisotropic, true_mean = TwoWidths(tuple(channels), alpha, surface.rotation), maximum(of_both, 0.0)
     return Reflecting(
         c=tuple(c),
         bend=knee(form_of(*names), surface.masking, width),
         scale=(scale := lobe.over_pi(mean)),
-        true_scale=scale if two_widths is None else lobe.over_pi(true_mean),
+        true_scale=scale if anisotropic is None else lobe.over_pi(true_mean),
         average=true_mean,
         F_avg=F_avg,
         factor=surface.albedo,
         row=inset(sqrt(width), curves.ROWS),
-        two=two_widths,
+        two=anisotropic,
         ndf=surface.ndf,
         masking=surface.masking,
     )

@@ -63,11 +63,11 @@ class NormalMap(BSDF):
 
     # ------------------------------------------------------------------ facets
 
-    def _leans(self) -> tuple[Scalar, Scalar]:
+    def _slopes(self) -> tuple[Scalar, Scalar]:
         return self.lean_x, self.lean_y
 
     def _normal(self) -> Direction:
-        x, y = self._leans()
+        x, y = self._slopes()
         over = ops.rsqrt(1.0 + sqr(x) + sqr(y))
         n_x, n_y = x * over, y * over
         return vec3(n_x, n_y, over)
@@ -89,7 +89,7 @@ class NormalMap(BSDF):
         value = self.base.eval(o, i, mode)
         if self.base.transmits:
             return where(valid & (i.z * wi.z > 0.0), value, 0.0)
-        value = value + self.base.eval(o, frame.local(_turned(wi)), mode)
+        value = value + self.base.eval(o, frame.local(_flipped(wi)), mode)
         return where((wo.z > 0.0) & (wi.z > 0.0), value, 0.0)
 
     @method
@@ -100,7 +100,7 @@ class NormalMap(BSDF):
         density = self.base.pdf(o, i)
         if self.base.transmits:
             return where(valid & (i.z * wi.z > 0.0), density, 0.0)
-        density = density + self.base.pdf(o, frame.local(_turned(wi)))
+        density = density + self.base.pdf(o, frame.local(_flipped(wi)))
         return where((wo.z > 0.0) & (wi.z > 0.0), density, 0.0)
 
     @method
@@ -113,7 +113,7 @@ class NormalMap(BSDF):
         if self.base.transmits:
             drawn = drawn & (wi.z * s.wi.z > 0.0)
             return Sample(wi, where(drawn, s.weight, 0.0), where(drawn, s.pdf, 0.0), s.delta & drawn, s.eta)
-        wi = where(wi.z < 0.0, _turned(wi), wi)
+        wi = where(wi.z < 0.0, _flipped(wi), wi)
         drawn = drawn & (wo.z > 0.0)
         density = self.pdf(wo, wi)
         smooth = self.eval(wo, wi, mode) * safe_div(1.0, density)
@@ -166,7 +166,7 @@ class NormalMap(BSDF):
         return self.base.ambient
 
 
-def _turned(w: Direction) -> Direction:
+def _flipped(w: Direction) -> Direction:
     """Up where it points down."""
     return vec3(w.x, w.y, -w.z)
 
@@ -184,7 +184,7 @@ class Bump(NormalMap):
 
     reads_surface: ClassVar[bool] = True
 
-    def _leans(self) -> tuple[Scalar, Scalar]:
+    def _slopes(self) -> tuple[Scalar, Scalar]:
         if self.surface is None:
             return ops.clamp(-self.lean_x, -STEEPEST, STEEPEST), ops.clamp(-self.lean_y, -STEEPEST, STEEPEST)
         length, sheared, across = self.surface

@@ -67,7 +67,7 @@ def _of_width(material: BSDF, alpha: float) -> BSDF:
     return tree.replace(material, {"alpha": alpha}) if "alpha" in material.parameters() else material
 
 
-def _taken(method: Method, base: BSDF) -> BSDF | None:
+def _model_of(method: Method, base: BSDF) -> BSDF | None:
     """The base under a method, None where the method does not take it."""
     try:
         return method(base)
@@ -102,7 +102,7 @@ def compare(
             rows: list[Any] = []
             for r in roughness:
                 base = base_of(r * r)
-                model = _taken(under, base)
+                model = _model_of(under, base)
                 if model is not None and method == "random walk":
                     rows.append([walk.albedo(base, float(m), walks, seed)[0] for m in mu])
                 elif model is not None:

@@ -71,7 +71,7 @@ class Eon(BSDF):
         return 1.0 / (1.0 + GRAZING * self.roughness)
 
     @function
-    def _again(self) -> Spectrum:
+    def _interreflected(self) -> Spectrum:
         """rho_ms, the color of multiple scattering."""
         E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
         return sqr(self.albedo) * E_avg / (1.0 - self.albedo * (1.0 - E_avg))
@@ -83,7 +83,7 @@ class Eon(BSDF):
         s = wo.x * wi.x + wo.y * wi.y
         t = where(s > 0.0, maximum(maximum(wo.z, wi.z), 1e-7), 1.0)  # both vanish only where this is masked
         once = self.albedo * (A * (1.0 + r * s / t))
-        multiple = self._again() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
+        multiple = self._interreflected() * (A * r * self._lost(wo) * self._lost(wi) / (GRAZING - AVERAGE))
         return (once + multiple) * where((wo.z > 0.0) & (wi.z > 0.0), wi.z * inv_pi, 0.0)
 
     @method
@@ -110,7 +110,7 @@ class Eon(BSDF):
     def tint(self, wo: Direction) -> Spectrum:
         """rho E_avg + rho_ms (1 - E_avg), the mean albedo."""
         E_avg = self._single() * (1.0 + AVERAGE * self.roughness)
-        return self.albedo * E_avg + self._again() * (1.0 - E_avg)
+        return self.albedo * E_avg + self._interreflected() * (1.0 - E_avg)
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
@@ -163,7 +163,7 @@ class _Clipped:
     def __init__(self, a: Scalar, b: Scalar, c: Scalar, d: Scalar) -> None:
         self.a, self.b, self.c, self.d = a, b, c, d
 
-    def _kept(self) -> Scalar:
+    def _acceptance(self) -> Scalar:
         """The share of the disk that is kept."""
         return 0.5 * (1.0 + ops.rsqrt(self.d * self.d + 1.0))
 
@@ -172,7 +172,7 @@ class _Clipped:
         radius = ops.sqrt(u1)
         sin, cos = ops.sincos((2.0 * ops.pi) * u2)
         y = radius * sin
-        share = self._kept()
+        share = self._acceptance()
         x = -(ops.safe_sqrt(1.0 - y * y) * (1.0 - share) + radius * cos * share)
         z = ops.safe_sqrt(1.0 - (x * x + y * y))
         return ops.normalize(vec3(self.a * x + self.b * z, self.c * y, self.d * x + z))
@@ -183,4 +183,4 @@ class _Clipped:
         height = self.c * (self.a * w.z - self.d * w.x)
         h = vec3(self.c * (w.x - self.b * w.z), across * w.y, height)
         size = self.c * across
-        return sqr(size / maximum(dot(h, h), frame.TINY)) * maximum(height, 0.0) * inv_pi / self._kept()
+        return sqr(size / maximum(dot(h, h), frame.TINY)) * maximum(height, 0.0) * inv_pi / self._acceptance()

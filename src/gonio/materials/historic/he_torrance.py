@@ -80,7 +80,7 @@ class HeTorrance(_Glossy):
         return 1.0 / sqr(1.0 + 4.0 * sqr(self._width()))
 
     @function
-    def _seen(self, v: Direction) -> Scalar:
+    def _shadowing(self, v: Direction) -> Scalar:
         """S of one direction (He1991, eq. 24 and 25, with the exponential)."""
         width = self._width()
         return distribution("beckmann").G1(v, vec2(width, width)) * (0.5 + 0.5 * erf(_cot(v) / width))
@@ -126,7 +126,7 @@ class HeTorrance(_Glossy):
         correlation = sqr(waves * (ops.pi * self.tau))
         spread = correlation * (sqr(wo.x + wi.x) + sqr(wo.y + wi.y))
         d = correlation * 0.25 * self._series(g, spread)
-        geometry = sqr(2.0 * cos / h.z) * self._seen(wo) * self._seen(wi)
+        geometry = sqr(2.0 * cos / h.z) * self._shadowing(wo) * self._shadowing(wi)
         return self.specular * d * (self.reflectance(cos) * geometry * inv_pi / wo.z)
 
     @function

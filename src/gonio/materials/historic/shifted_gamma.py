@@ -75,7 +75,7 @@ class ShiftedGamma(_Glossy):
         return schlick(cos_theta, self.f0) - self.f1 * cos_theta
 
     @function
-    def _seen(self, v: Direction) -> Spectrum:
+    def _shadowing(self, v: Direction) -> Spectrum:
         """G1 = 1 + Lambda (1 - exp(t^k)) (Bagher2012, eq. 11)."""
         theta = atan2(sqrt(maximum(frame.sin2(v), 1e-20)), v.z)
         t = maximum(theta - self.theta0, 1e-6) / self.reach
@@ -94,7 +94,7 @@ class ShiftedGamma(_Glossy):
     def _lobe(self, wo: Direction, wi: Direction) -> Spectrum:
         """specular F D G / (pi cos theta_o)."""
         h, cos = facet(wo, wi)
-        facets = self._density(h) * self._seen(wo) * self._seen(wi) * (inv_pi / wo.z)
+        facets = self._density(h) * self._shadowing(wo) * self._shadowing(wi) * (inv_pi / wo.z)
         return self.specular * self.reflectance(cos) * facets
 
     @function
@@ -117,7 +117,7 @@ class ShiftedGamma(_Glossy):
 
     def _lobe_albedo(self, wo: Direction) -> Spectrum:
         """4 / pi specular F G, G at the mirrored direction: of a narrow lobe."""
-        return self.specular * self.reflectance(wo.z) * sqr(self._seen(wo)) * (4.0 * inv_pi)
+        return self.specular * self.reflectance(wo.z) * sqr(self._shadowing(wo)) * (4.0 * inv_pi)
 
 
 @function

@@ -181,7 +181,7 @@ class DisneyBSDF(BSDF):
         """Find the tables, before a loop is recorded."""
         self._kind().prepare()
 
-    def _turned(self, w: Direction) -> Direction:
+    def _in_tangent_frame(self, w: Direction) -> Direction:
         return frame.rotate(w, self.rotation)
 
     # ------------------------------------------------------------------ values
@@ -189,17 +189,17 @@ class DisneyBSDF(BSDF):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """That of the slabs, along the axes of the anisotropy."""
-        return self._slabs().eval(self._turned(wo), self._turned(wi), mode)
+        return self._slabs().eval(self._in_tangent_frame(wo), self._in_tangent_frame(wi), mode)
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The density of the slabs, along the axes of the anisotropy."""
-        return self._slabs().pdf(self._turned(wo), self._turned(wi))
+        return self._slabs().pdf(self._in_tangent_frame(wo), self._in_tangent_frame(wi))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """A sample of the slabs, turned back to the surface."""
-        drawn = self._slabs().sample(self._turned(wo), u, mode)
+        drawn = self._slabs().sample(self._in_tangent_frame(wo), u, mode)
         return drawn._replace(wi=frame.rotate_back(drawn.wi, self.rotation))
 
     # ------------------------------------------------------------------ facts

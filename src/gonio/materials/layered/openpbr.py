@@ -42,7 +42,7 @@ class OpenPBR(_OpenPBR):
         """Widths and indices, means over the hemisphere, and what facets scatter twice."""
         return derived.derive(self)
 
-    def _settled(self) -> Self:
+    def _with_derived(self) -> Self:
         """A copy that holds what is derived, where that differs from ray to ray: it is asked for in many places."""
         if self._derived is not None:
             return self
@@ -56,18 +56,18 @@ class OpenPBR(_OpenPBR):
     @method
     def eval(self, wo: Direction, wi: Direction, mode: Mode = "radiance") -> Spectrum:
         """The sum of all lobes times |cos theta_i|; mirrors and the light that goes straight on are delta lobes."""
-        return self.times_opacity(lobes.surface(self._settled(), wo, wi, mode))
+        return self.times_opacity(lobes.surface(self._with_derived(), wo, wi, mode))
 
     @method
     def pdf(self, wo: Direction, wi: Direction) -> Scalar:
         """The mixture of the lobes' densities."""
-        model = self._settled()
+        model = self._with_derived()
         return self.times_opacity(sampling.density_of(model, sampling.shares_at(model, wo), wo, wi))
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
         """u1 picks the lobe."""
-        return sampling.drawn(self._settled(), wo, u, mode)
+        return sampling.drawn(self._with_derived(), wo, u, mode)
 
     known_violations: ClassVar[Mapping[str, KnownViolation]] = {
         "reciprocity": KnownViolation(

@@ -77,11 +77,11 @@ def compress(
     seconds = (time.perf_counter() - start) / len(made)
     own = Own()
     data = own.write(made[0]) if len(made) == 1 else own.write_several(dict(zip(tables, made, strict=True)))
-    found = []
+    results = []
     for name, table in tables.items():
         item = name if len(made) > 1 else ""
         new = own.read(data, str(path), item)
-        found.append(
+        results.append(
             Compressed(
                 f"{output}:{item}" if item else str(output), new.name, method, round(len(data) / len(made)),
                 sum(array.nbytes for array in table.arrays().values()), difference(table, new),
@@ -89,7 +89,7 @@ def compress(
             )
         )  # fmt: skip
     files.write_whole(path, data)
-    return found
+    return results
 
 
 def _name(file: str | os.PathLike[str]) -> str:

@@ -13,7 +13,7 @@ from ..formats.own import Own
 from ..tables.adaptive import Adaptive
 from ..tables.base import Floats, Measurement, in_rgb
 from ..tables.half_difference import HalfDifference
-from ..tables.log_adaptive import LogAdaptive, turned
+from ..tables.log_adaptive import LogAdaptive, log_values
 from ..tables.log_table import COLOURS, LogTable, Shape, above, from_cosines, packed, to_cosines
 from ..tables.low_rank import LowRank
 from ..tables.rebuilt import Rebuilt, rebuilding
@@ -35,22 +35,22 @@ class Log(Method):
     name: ClassVar[str] = "log"
 
     def compress(self, tables: Sequence[Measurement], size: int) -> list[Measurement]:
-        found: list[Measurement] = []
+        compressed: list[Measurement] = []
         for table in tables:
             if isinstance(table, Adaptive) and table.wavelengths is None and table.jacobian:
-                found.append(_adaptive(table, size))
+                compressed.append(_adaptive(table, size))
                 continue
             logs = Logs(over_half_vectors(table))
-            found.append(coded(LogTable, logs, to_cosines(logs.values), {}, size))
-        return found
+            compressed.append(coded(LogTable, logs, to_cosines(logs.values), {}, size))
+        return compressed
 
 
 def _adaptive(table: Adaptive, size: int) -> Measurement:
     """An adaptive table stays one: its lobes would be lost on another grid."""
     offset = float(np.float32(OFFSET * max(float(np.median(np.abs(table.values))), 1e-9)))
-    numbers = to_cosines(turned(table.values, offset))
-    kept = Rebuilt({**table.arrays(), **rebuilding(table)}).arrays()
-    stored = {name: array for name, array in kept.items() if name not in ("luminance", "values")}
+    numbers = to_cosines(log_values(table.values, offset))
+    arrays = Rebuilt({**table.arrays(), **rebuilding(table)}).arrays()
+    stored = {name: array for name, array in arrays.items() if name not in ("luminance", "values")}
     stored["cells"] = np.array(numbers.shape[:3], np.int32)
     return rounded(LogAdaptive, table, numbers, stored, (1.0, offset), size)
 
@@ -62,9 +62,9 @@ class Logs:
         self.table = table
         n, m, count = table.values.shape[:3]
         self.shape: Shape = (n, m, count)
-        kept = in_rgb(table.values, table.wavelengths)
-        self.offset = float(np.float32(OFFSET * max(float(np.median(kept[table.valid])), 1e-9)))
-        held = table._held(kept) if not table.valid.all() else kept
+        rgb = in_rgb(table.values, table.wavelengths)
+        self.offset = float(np.float32(OFFSET * max(float(np.median(rgb[table.valid])), 1e-9)))
+        held = table._held(rgb) if not table.valid.all() else rgb
         self.values = np.log(np.maximum(held, 0.0) + self.offset) @ COLOURS.T
         if not table.valid.all():
             # what coarse cosines say of the others is what costs least
@@ -104,11 +104,11 @@ def rounded(
     def codes(step: float) -> NDArray[np.uint8]:
         return packed(np.round(numbers / step).astype(np.int64))
 
-    taken = len(own.file_of(cls, with_codes(1.0, np.zeros(0, np.uint8)), about)) - shared
+    header = len(own.file_of(cls, with_codes(1.0, np.zeros(0, np.uint8)), about)) - shared
     finest = max(STEPS[0], float(np.abs(numbers).max()) / 2.0**22)  # what three bytes hold
-    step = least(lambda x: taken + len(codes(x)) <= size, finest, STEPS[1])
+    step = least(lambda x: header + len(codes(x)) <= size, finest, STEPS[1])
     if step is None:
-        what = f"{size} bytes, a table takes {taken + len(codes(STEPS[1]))} at least"
+        what = f"{size} bytes, a table takes {header + len(codes(STEPS[1]))} at least"
         raise InputError(what, "bytes", "allow more")
     return cls(with_codes(step, codes(step)), title=source.title, source=source.source)
 

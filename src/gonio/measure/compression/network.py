@@ -68,10 +68,10 @@ class Data:
         flip = np.where(side < 0.0, -1.0, 1.0)  # a whole turn is learnt as one half: exchanging changes nothing
         both = np.stack([np.sin(h), 0.0 * h, np.cos(h), along * flip, side * flip, np.cos(d)]).astype(np.float32)
         lowest = np.cos(d) * np.cos(h) - np.abs(np.sin(h) * along)
-        kept = table.valid.ravel() & (lowest > LOWEST)
-        f = in_rgb(table.values, table.wavelengths).reshape(-1, 3)[kept]
+        usable = table.valid.ravel() & (lowest > LOWEST)
+        f = in_rgb(table.values, table.wavelengths).reshape(-1, 3)[usable]
         offset = OFFSET * max(float(np.median(f)), 1e-6)
-        return cls(both[:, kept], np.log(np.maximum(f, 0.0) + offset).T.astype(np.float32), offset)
+        return cls(both[:, usable], np.log(np.maximum(f, 0.0) + offset).T.astype(np.float32), offset)
 
 
 Weights = dict[str, Floats32]
@@ -79,16 +79,16 @@ Weights = dict[str, Floats32]
 
 def _started(data: Data, rng: np.random.Generator) -> Weights:
     """Uniform numbers (Glorot2010), and the median colour."""
-    found: Weights = {}
+    weights: Weights = {}
     for name, shape in SHAPES.items():
         if name.startswith("kernel"):
             reach = np.sqrt(6.0 / sum(shape))
-            found[name] = rng.uniform(-reach, reach, shape[::-1]).astype(np.float32)
+            weights[name] = rng.uniform(-reach, reach, shape[::-1]).astype(np.float32)
         else:
-            found[name] = np.zeros((*shape, 1), np.float32)
+            weights[name] = np.zeros((*shape, 1), np.float32)
     median = np.exp(np.median(data.logs, axis=1)) - data.offset
-    found["bias2"] = np.log1p(np.maximum(median, 0.0))[:, None].astype(np.float32)
-    return found
+    weights["bias2"] = np.log1p(np.maximum(median, 0.0))[:, None].astype(np.float32)
+    return weights
 
 
 def _descended(weights: Weights, data: Data, rng: np.random.Generator) -> Weights:

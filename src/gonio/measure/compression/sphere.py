@@ -40,12 +40,12 @@ def picture(rgb: Rgb) -> Floats:
     """The pixels of the sphere's disc, (P, 3), of f cos theta_i (wo, wi) -> (N, 3)."""
     n, t, b = frame()
     wo = np.stack([t[:, 2], b[:, 2], n[:, 2]], -1)  # the view, (0, 0, 1), in each pixel's frame
-    found = np.zeros_like(n)
+    radiance = np.zeros_like(n)
     for light, irradiance in zip(*lights(), strict=True):
         wi = np.stack([t @ light, b @ light, n @ light], -1)
         lit = wi[:, 2] > 0.0
-        found[lit] += irradiance * rgb(wo[lit], wi[lit])
-    return found
+        radiance[lit] += irradiance * rgb(wo[lit], wi[lit])
+    return radiance
 
 
 def error(old: Floats, new: Floats) -> float:

@@ -91,11 +91,11 @@ def _plain(name: str) -> str:
 
 def _wavelengths(names: list[str], where: str) -> Floats | None:
     """What columns named "550nm" stand for; None where none is named so."""
-    found = [re.fullmatch(r"([0-9.eE+]+) *nm", name.strip()) for name in names]
-    if not any(found):
+    matches = [re.fullmatch(r"([0-9.eE+]+) *nm", name.strip()) for name in names]
+    if not any(matches):
         return None
     try:
-        nm = np.array([float(one[1]) if one else np.nan for one in found])
+        nm = np.array([float(one[1]) if one else np.nan for one in matches])
     except ValueError:
         nm = np.full(1, np.nan)
     if not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0.0):
@@ -106,20 +106,17 @@ def _wavelengths(names: list[str], where: str) -> Floats | None:
 def _grid(rows: Floats, where: str, title: str, source: dict[str, str], nm: Floats | None) -> Angles | None:
     """The rows as a table, where they are a whole grid with |phi| from 0 to pi."""
     between = np.abs((rows[:, 3] - rows[:, 1] + np.pi) % (2.0 * np.pi) - np.pi)
-    found = [np.unique(column) for column in (rows[:, 0], rows[:, 2], between)]
-    count = np.prod([len(nodes) for nodes in found])
-    if count != len(rows) or min(map(len, found)) < 2:
+    axes = [np.unique(column) for column in (rows[:, 0], rows[:, 2], between)]
+    count = np.prod([len(nodes) for nodes in axes])
+    if count != len(rows) or min(map(len, axes)) < 2:
         return None
     place = np.ravel_multi_index(
-        [
-            np.searchsorted(nodes, column)
-            for nodes, column in zip(found, (rows[:, 0], rows[:, 2], between), strict=True)
-        ],
-        tuple(map(len, found)),
+        [np.searchsorted(nodes, column) for nodes, column in zip(axes, (rows[:, 0], rows[:, 2], between), strict=True)],
+        tuple(map(len, axes)),
     )
     if len(np.unique(place)) != count:
         return None
-    theta_i, theta_r, phi = found
+    theta_i, theta_r, phi = axes
     values = np.empty((int(count), rows.shape[1] - 4))
     values[place] = rows[:, 4:]
-    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, found), -1), where, title, source, nm)
+    return Angles(theta_i, theta_r, phi, values.reshape(*map(len, axes), -1), where, title, source, nm)

@@ -60,8 +60,8 @@ Format.family = Family("format", "gonio.formats", ["gonio.measure.formats"], ins
 def by_suffix(path: str | Path) -> list[Format]:
     """The formats of a file's suffix, the one whose own it is first."""
     suffix = Path(path).suffix.lower()
-    found = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
-    return sorted(found, key=lambda one: one.suffixes.index(suffix))
+    formats = [one for one in Format.family.all().values() if suffix and suffix in one.suffixes]
+    return sorted(formats, key=lambda one: one.suffixes.index(suffix))
 
 
 def contents(path: Path, where: str = "") -> bytes:

@@ -42,10 +42,10 @@ class Networks(Format):
             what = f"no material '{item}' in it" if item else f"{len(names)} materials in it, one expected"
             hint = did_you_mean(item, names) if item else f"give {where}:{names[0]}, or another of " + ", ".join(names)
             raise InputError(what, where, hint)
-        found = arrays(data, where)
+        stored = arrays(data, where)
         weights = {}
         for part, shape in SHAPES.items():
-            array = found.get(f"{item}/{part}")
+            array = stored.get(f"{item}/{part}")
             if array is None or array.shape != shape or array.dtype.kind != "f":
                 given = "is missing" if array is None else f"has shape {array.shape} of {array.dtype}"
                 raise InputError(f"{item}/{part} {given}, {shape} of floats expected", where)

@@ -31,21 +31,21 @@ def arrays(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
             if sum(one.file_size for one in members) > limit:
                 size = sum(one.file_size for one in members)
                 raise InputError(f"{len(data)} bytes claim to hold {size}", where, "such a file is not unpacked")
-            found: dict[str, NDArray[np.generic]] = {}
+            entries: dict[str, NDArray[np.generic]] = {}
             total = 0
             for member in members:
                 name = member.filename.removesuffix(".npy")
                 if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or member.flag_bits & 1:
                     raise InputError(f"'{name[:80]}' is packed in an unusual way", where, "numpy.savez writes others")
-                if name in found:
+                if name in entries:
                     raise InputError(f"'{name[:80]}' stands twice", where)
                 with file.open(member) as part:
                     content = part.read(member.file_size + 1)  # what unpacks to more than it claims is refused
                 total += len(content)
                 if len(content) != member.file_size or total > limit:
                     raise InputError(f"'{name[:80]}' is longer than it claims", where)
-                found[name] = _array(content, name, where)
-            return found
+                entries[name] = _array(content, name, where)
+            return entries
     except InputError:
         raise
     except Exception as error:  # zipfile and zlib each have their own ways to fail on a file of any content

@@ -63,7 +63,7 @@ class Own(Format):
             raise _no_manifest(where) from None
         cls = Measurement.family.get(kind, where)
         nm = parts.pop("wavelengths", None)
-        beside = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
+        extra = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
         try:
             about = {"where": where, "title": title, "source": source, "wavelengths": nm}
             table = cls.from_arrays(parts, **about)
@@ -73,10 +73,10 @@ class Own(Format):
             what = f"its arrays are not those of a {kind} table: {type(error).__name__}: {str(error)[:100]}"
             raise InputError(what, where, "the file is damaged") from None
         shape = tuple(table.shape.values())
-        for name, array in beside.items():
+        for name, array in extra.items():
             if array.shape != shape:
                 raise InputError(f"{name} has shape {array.shape}, the values have {shape}", where)
-        table.beside.update(beside)
+        table.beside.update(extra)
         return table
 
     def _parts(self, data: bytes, where: str) -> tuple[dict[str, NDArray[np.generic]], dict[str, Any]]:
@@ -99,13 +99,13 @@ class Own(Format):
         if version not in (VERSION, SEVERAL):
             what = f"version {version} of Gonio's tables, {VERSION} or {SEVERAL} expected"
             raise InputError(what, where, "is Gonio up to date?")
-        found: dict[str, Any] = manifest
-        return found
+        checked: dict[str, Any] = manifest
+        return checked
 
     def write(self, table: Measurement) -> bytes:
         about = {"title": table.title, "source": table.source, "wavelengths": table.wavelengths}
-        beside = {name: np.asarray(array, np.float32) for name, array in table.beside.items()}
-        return self.file_of(type(table), {**table.arrays(), **beside}, about)
+        extra = {name: np.asarray(array, np.float32) for name, array in table.beside.items()}
+        return self.file_of(type(table), {**table.arrays(), **extra}, about)
 
     def file_of(self, kind: type[Measurement], parts: Arrays, about: Mapping[str, Any]) -> bytes:
         """The file of a table of a kind, by its arrays and what is known of it: title, source, wavelengths."""

@@ -93,16 +93,16 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
         size = struct.calcsize(form)
         if place + size > len(data):
             raise InputError(f"the list of fields ends at byte {len(data)}", where, "the file is truncated")
-        found = struct.unpack_from(form, data, place)
+        fields = struct.unpack_from(form, data, place)
         place += size
-        return found
+        return fields
 
     major, minor, count = take("<BBI")
     if (major, minor) != (1, 0):
         raise InputError(f"version {major}.{minor} of tensor files, 1.0 expected", where)
     if not 0 < count <= FIELDS:
         raise InputError(f"{count} fields, 1 to {FIELDS} expected", where, "the file is damaged")
-    found: dict[str, NDArray[np.generic]] = {}
+    fields: dict[str, NDArray[np.generic]] = {}
     end = 0
     for _ in range(count):
         (length,) = take("<H")
@@ -121,13 +121,13 @@ def tensors(data: bytes, where: str) -> dict[str, NDArray[np.generic]]:
         if size == 0 or offset + size > len(data):
             what = f"the field '{name}' claims {' x '.join(map(str, shape))} values at byte {offset}"
             raise InputError(f"{what}, the file has {len(data)} bytes", where, "the file is truncated or damaged")
-        if name in found:
+        if name in fields:
             raise InputError(f"the field '{name}' stands twice", where, "the file is damaged")
-        found[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
+        fields[name] = np.frombuffer(data, dtype, size // dtype.itemsize, offset).reshape(shape)
         end = max(end, offset + size)
     if len(data) > end + ALIGNED or data[end:].strip(b"\0"):
         raise InputError(f"{len(data)} bytes, the fields end at {end}", where, "the file is longer than its fields")
-    return found
+    return fields
 
 
 def written(fields: Mapping[str, NDArray[np.generic]]) -> bytes:

@@ -20,15 +20,15 @@ def lines(data: bytes, where: str) -> list[str]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")  # comments of an older age; numbers are the same
-    found = text.splitlines()
-    if any(len(line) > LONGEST for line in found):
+    rows = text.splitlines()
+    if any(len(line) > LONGEST for line in rows):
         raise InputError(f"a line of more than {LONGEST} letters", where)
-    return found
+    return rows
 
 
 def numbers(words: list[str], where: str, line: int) -> list[float]:
     """Words as finite numbers."""
-    found = []
+    values = []
     for word in words:
         try:
             number = float(word)
@@ -36,8 +36,8 @@ def numbers(words: list[str], where: str, line: int) -> list[float]:
             raise InputError(f"'{word[:40]}' given, a number expected", f"{where}:{line}") from None
         if not math.isfinite(number):
             raise InputError(f"'{word[:40]}' given, a finite number expected", f"{where}:{line}")
-        found.append(number)
-    return found
+        values.append(number)
+    return values
 
 
 def table(rows: list[tuple[int, list[str]]], width: int, where: str) -> NDArray[np.float64]:

@@ -39,10 +39,10 @@ class Zemax(Format):
         rest = iter([(n, line) for n, line in rows if line and not line.startswith("#")])
 
         def following(what: str) -> tuple[int, str]:
-            found = next(rest, None)
-            if found is None:
+            line = next(rest, None)
+            if line is None:
                 raise InputError(f"the file ends where {what} is expected", where, "the file is truncated")
-            return found
+            return line
 
         head: dict[str, str] = {}
         axes: dict[str, Floats] = {}
@@ -88,20 +88,20 @@ class Zemax(Format):
                 if line.split()[0].upper() != "TIS":
                     raise InputError(f"'{line[:40]}' where 'TIS' is expected", f"{where}:{number}")
                 numbers(line.split()[1:2], where, number)
-                found = [following(f"{a} rows of azimuth") for _ in range(a)]
-                values.append(table([(n, line.split()) for n, line in found], r, where))
+                rows = [following(f"{a} rows of azimuth") for _ in range(a)]
+                values.append(table([(n, line.split()) for n, line in rows], r, where))
             number, line = following("'DataEnd'")
             if line.lower() != "dataend":
                 raise InputError(f"'{line[:40]}' where 'DataEnd' is expected", f"{where}:{number}", "too many rows?")
             channels.append(np.stack(values))
         if (left := next(rest, None)) is not None:
             raise InputError(f"'{left[1][:40]}' after the end of the data", f"{where}:{left[0]}")
-        whole = np.stack(channels, -1)
+        values_rgb = np.stack(channels, -1)
         if len(channels) == 3:
-            whole = whole @ colours.XYZ_TO_RGB.T
+            values_rgb = values_rgb @ colours.XYZ_TO_RGB.T
         title = next((text.partition(":")[2].strip() for text in comments if text.lower().startswith("model")), "")
         return Specular(
-            axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"], whole, where,
+            axes["AngleOfIncidence"], axes["ScatterAzimuth"], axes["ScatterRadial"], values_rgb, where,
             title or (comments[0] if comments else ""), {"format": self.name, **head},
         )  # fmt: skip
 
@@ -135,8 +135,8 @@ def scattered(table: Specular) -> list[float]:
     rng = np.random.default_rng(1)
     u, v = (np.arange(4096) + 0.5) / 4096, rng.random(4096)
     wo = np.stack([np.sqrt(u) * np.cos(2 * np.pi * v), np.sqrt(u) * np.sin(2 * np.pi * v), np.sqrt(1.0 - u)], -1)
-    found = []
+    fractions = []
     for angle in np.minimum(table.theta_i, np.radians(89.9)):
         wi = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], wo.shape)
-        found.append(float(np.mean(table.rgb(wo, wi) @ colours.LUMINANCE) * np.pi / np.cos(angle)))
-    return found
+        fractions.append(float(np.mean(table.rgb(wo, wi) @ colours.LUMINANCE) * np.pi / np.cos(angle)))
+    return fractions

@@ -34,12 +34,12 @@ def adapted(source: Measurement) -> Adaptive:
         along = np.sin(angle)[:, None, None] * np.sin(theta_m) * np.cos(phi_m)[:, None]
         return np.maximum(along + np.cos(angle)[:, None, None] * np.cos(theta_m), 0.0)
 
-    around = np.full(NORMALS, 1.0 / (NORMALS - 1))
-    around[[0, -1]] *= 0.5
+    azimuth_weights = np.full(NORMALS, 1.0 / (NORMALS - 1))
+    azimuth_weights[[0, -1]] *= 0.5
 
     def area(angle: Floats) -> Floats:
         """The projected area of the facets, int D max(0, wo.m) dm."""
-        return np.einsum("vpt,p,t->v", cosines(angle), around, ndf * weight * mean)
+        return np.einsum("vpt,p,t->v", cosines(angle), azimuth_weights, ndf * weight * mean)
 
     ndf = ndf / float(area(np.zeros(1))[0])  # seen from above, facets are as large as the surface
     sigma = area(theta_m)
@@ -58,10 +58,10 @@ def _filled(source: Measurement, warp: dict[str, Floats]) -> Adaptive:
     lit = (wi[..., 2] > 1e-6) & (wo[..., 2] > 0.0) & (factor > 0.0)
     values = np.zeros((*lit.shape, 3))
     values[lit] = source.rgb(wo[lit], wi[lit]) / factor[lit][:, None]
-    for one, seen in zip(values, lit, strict=True):  # below the horizon the nearest, so that none above turns dark
-        if seen.any():
-            one[:] = one[tuple(distance_transform_edt(~seen, return_distances=False, return_indices=True))]
+    for one, valid in zip(values, lit, strict=True):  # below the horizon the nearest, so that none above turns dark
+        if valid.any():
+            one[:] = one[tuple(distance_transform_edt(~valid, return_distances=False, return_indices=True))]
     luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
     least = 0.02 * luminance.mean(axis=(1, 2), keepdims=True)  # what is black at a node need not be beside it
-    found = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
-    return Adaptive({**warp, **found}, title=source.title, source=source.source)
+    arrays = {"luminance": (luminance + least)[None], "values": np.moveaxis(values, -1, 1)[None]}
+    return Adaptive({**warp, **arrays}, title=source.title, source=source.source)

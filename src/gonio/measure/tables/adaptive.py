@@ -177,11 +177,11 @@ class Adaptive(Measurement):
         folded, _ = self._folded(wo, wo)
         slices, phi = self._slices(folded)
         bright = self._bright.sample(slices, u.y, u.z)
-        seen = self._visible.sample(slices, bright.x, bright.y)
-        turn = (2.0 * seen.y - 1.0) * ops.pi
-        m = direction(seen.x * seen.x * (0.5 * ops.pi), turn + phi if self.isotropic else turn)
+        visible = self._visible.sample(slices, bright.x, bright.y)
+        turn = (2.0 * visible.y - 1.0) * ops.pi
+        m = direction(visible.x * visible.x * (0.5 * ops.pi), turn + phi if self.isotropic else turn)
         mirrored = reflect(folded, m)
-        pdf = seen.pdf * bright.pdf / _jacobian(seen.x, m, mirrored)
+        pdf = visible.pdf * bright.pdf / _jacobian(visible.x, m, mirrored)
         _, wi = self._folded(wo, mirrored)  # mirroring is its own inverse
         return wi, where(dot(folded, m) > 0.0, pdf, 0.0)
 
@@ -194,9 +194,9 @@ class Adaptive(Measurement):
         view, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, shape), indexing="ij"))
         row, at_x, at_y = (backend.float_of(a, types) for a in (view, x / (shape[2] - 1), y / (shape[1] - 1)))
         wo = direction(backend.float_of(self.theta[view], types), row * 0.0)
-        seen = self._visible.sample([(row, 1.0 + 0.0 * row)], at_x, at_y)
-        m = direction(seen.x * seen.x * (0.5 * ops.pi), (2.0 * seen.y - 1.0) * ops.pi)
-        factor = self._factor(wo, seen.x, seen.y, 0.0 * row)
+        visible = self._visible.sample([(row, 1.0 + 0.0 * row)], at_x, at_y)
+        m = direction(visible.x * visible.x * (0.5 * ops.pi), (2.0 * visible.y - 1.0) * ops.pi)
+        factor = self._factor(wo, visible.x, visible.y, 0.0 * row)
         o, i = (backend.to_numpy(w, len(view)).reshape(*shape, 3) for w in (wo, reflect(wo, m)))
         return o, i, backend.to_numpy(factor, len(view)).reshape(shape)
 
@@ -251,8 +251,8 @@ def bilinear(table: ops.Table, x: Scalar, y: Scalar, slices: Slices | None = Non
     column, row = ops.minimum(floor(at_x), columns - 2.0), ops.minimum(floor(at_y), rows - 2.0)
     tx, ty = at_x - column, at_y - row
     total: list[ops.Value] = [0.0] * table.channels
-    whole: list[tuple[Scalar | None, ops.Value]] = [(None, 1.0)]
-    for one, weight in slices or whole:
+    unsliced: list[tuple[Scalar | None, ops.Value]] = [(None, 1.0)]
+    for one, weight in slices or unsliced:
         for dy, wy in ((0.0, 1.0 - ty), (1.0, ty)):
             for dx, wx in ((0.0, 1.0 - tx), (1.0, tx)):
                 place = (row + dy, column + dx) if one is None else (one, row + dy, column + dx)

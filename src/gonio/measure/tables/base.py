@@ -119,13 +119,13 @@ class Measurement:
     def rgb(self, wo: Floats, wi: Floats) -> Floats:
         """f cos theta_i of pairs, (N, 3), in float64; 0 below the surface."""
         types = backend.types("float64")
-        found = np.empty((len(wo), 3))
+        rgb = np.empty((len(wo), 3))
         for start in range(0, len(wo), CHUNK):
             part = slice(start, start + CHUNK)
             o, i = (backend.vector_of(w[part], 3, types) for w in (wo, wi))
             above = (o.z > 0.0) & (i.z > 0.0)
-            found[part] = backend.to_numpy(ops.where(above, self.value(o, i), 0.0), len(wo[part]))
-        return found
+            rgb[part] = backend.to_numpy(ops.where(above, self.value(o, i), 0.0), len(wo[part]))
+        return rgb
 
 
 ANGLES = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0, 85.0, 88.0])  # degrees
@@ -136,14 +136,14 @@ def albedo(table: Measurement, theta: Floats) -> Floats:
     """int f cos theta_i d omega_i at angles of view, (N, 3), by the table's own draws of a lattice."""
     types = backend.types("float64")
     lattice = r_sequence(POINTS, 3, shift=0.5)
-    found = []
+    albedos = []
     for angle in theta:
         wo = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], (POINTS, 3))
         drawn = table.draw(backend.vector_of(wo, 3, types), backend.vector_of(lattice, 3, types))
         wi, pdf = (backend.to_numpy(part, POINTS) for part in drawn)
-        kept = (pdf > 0.0) & (wi[:, 2] > 0.0)
-        found.append((table.rgb(wo[kept], wi[kept]) / pdf[kept, None]).sum(axis=0) / POINTS)
-    return np.array(found)
+        upper = (pdf > 0.0) & (wi[:, 2] > 0.0)
+        albedos.append((table.rgb(wo[upper], wi[upper]) / pdf[upper, None]).sum(axis=0) / POINTS)
+    return np.array(albedos)
 
 
 CHUNK = 1 << 19  # pairs at a time, so that memory stays flat

@@ -100,8 +100,8 @@ class HalfDifference(Guided, Measurement):
         if last.min() < 0:
             from scipy.ndimage import distance_transform_edt  # here: a render that needs none of it starts faster
 
-            found = last >= 0
-            nearest = distance_transform_edt(~found, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
+            has_values = last >= 0
+            nearest = distance_transform_edt(~has_values, (4.0, 1.0, 1.0), return_distances=False, return_indices=True)
             held = held[tuple(nearest)]
         return held
 
@@ -113,7 +113,7 @@ class HalfDifference(Guided, Measurement):
         x = clamp(sqrt(maximum(theta_h * (2.0 / ops.pi), 0.0)) * n - 0.5, 0.0, n - 1.0)
         y = clamp(theta_d * (2.0 / ops.pi) * m - 0.5, 0.0, m - 1.0)
         i, j = minimum(floor(x), max(n - 2.0, 0.0)), minimum(floor(y), max(m - 2.0, 0.0))
-        (first, second), tz = self._around(phi_d * (count / self.turn), count)
+        (first, second), tz = self._azimuth_cell(phi_d * (count / self.turn), count)
         tx, ty = x - i, y - j
         total: ops.Value = 0.0
         for di, wx in ((0.0, 1.0 - tx), (1.0, tx)):
@@ -122,7 +122,7 @@ class HalfDifference(Guided, Measurement):
                     total = total + of_channels(ops.fetch(self._table, i + di, j + dj, cell)) * (wx * wy * wz)
         return total * wi.z
 
-    def _around(self, at: Scalar, count: float) -> tuple[tuple[Scalar, Scalar], Scalar]:
+    def _azimuth_cell(self, at: Scalar, count: float) -> tuple[tuple[Scalar, Scalar], Scalar]:
         """The cells on both sides of a phi_d counted in cells, and the way from one middle to the other."""
         if self._folded:
             at = at - floor(at * (1.0 / count)) * count
@@ -153,8 +153,8 @@ class HalfDifference(Guided, Measurement):
 
     @property
     def range(self) -> tuple[float, float]:
-        kept = self.values[self.valid]
-        return float(kept.min()), float(kept.max())
+        valid = self.values[self.valid]
+        return float(valid.min()), float(valid.max())
 
 
 def centres(shape: tuple[int, int, int], turn: float = np.pi) -> tuple[Floats, Floats]:
@@ -187,8 +187,8 @@ def sampled(
     lowest = np.minimum(wo[:, 2], wi[:, 2])
     values = np.full((len(wo), 3), -1.0)
     lit = lowest > 1e-9
-    found = value(wo[lit], wi[lit]) / wi[lit, 2:]
+    sampled_values = value(wo[lit], wi[lit]) / wi[lit, 2:]
     if turn < 4.0:
-        found = 0.5 * (found + value(wi[lit], wo[lit]) / wo[lit, 2:])
-    values[lit] = np.maximum(found, 0.0)
+        sampled_values = 0.5 * (sampled_values + value(wi[lit], wo[lit]) / wo[lit, 2:])
+    values[lit] = np.maximum(sampled_values, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)

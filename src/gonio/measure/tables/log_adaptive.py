@@ -39,9 +39,9 @@ class LogAdaptive(Rebuilt):
         views = np.size(stored["phi_i"]), np.size(stored["theta_i"])
         if views[0] * views[1] != shape[0]:
             raise InputError(f"{shape[0]} views, {views[0]} x {views[1]} expected", where, "the file is damaged")
-        turned = from_cosines(unpacked(stored["codes"], shape, where) * step) @ COLOURS
+        logs = from_cosines(unpacked(stored["codes"], shape, where) * step) @ COLOURS
         with np.errstate(over="ignore"):
-            values = (offset * np.sinh(turned)).reshape(*views, *shape[1:], 3)
+            values = (offset * np.sinh(logs)).reshape(*views, *shape[1:], 3)
         luminance = np.maximum(values @ colours.LUMINANCE, 0.0)
         luminance = luminance + LEAST * luminance.mean(axis=(2, 3), keepdims=True) + 1e-12
         super().__init__({**stored, "luminance": luminance, "values": np.moveaxis(values, -1, 2)}, where, **about)
@@ -50,7 +50,7 @@ class LogAdaptive(Rebuilt):
         return dict(self.stored)
 
 
-def turned(values: Floats, offset: float) -> Floats:
+def log_values(values: Floats, offset: float) -> Floats:
     """asinh(value / offset) in brightness and two differences, (view, y, x, 3), of (phi_i, theta_i, 3, y, x)."""
     last = np.moveaxis(values, 2, -1)
     return np.arcsinh(last.reshape(-1, *last.shape[2:]) / offset) @ COLOURS.T

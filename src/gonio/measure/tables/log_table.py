@@ -84,16 +84,16 @@ def to_cosines(logs: Floats) -> Floats:
     """The discrete cosine transform over the first three axes, orthonormal."""
     from scipy.fft import dctn
 
-    found: Floats = dctn(logs, axes=(0, 1, 2), norm="ortho", workers=2)
-    return found
+    transformed: Floats = dctn(logs, axes=(0, 1, 2), norm="ortho", workers=2)
+    return transformed
 
 
 def from_cosines(numbers: Floats) -> Floats:
     """The inverse of `to_cosines`."""
     from scipy.fft import idctn
 
-    found: Floats = idctn(numbers, axes=(0, 1, 2), norm="ortho", workers=2)
-    return found
+    transformed: Floats = idctn(numbers, axes=(0, 1, 2), norm="ortho", workers=2)
+    return transformed
 
 
 @lru_cache(maxsize=4)

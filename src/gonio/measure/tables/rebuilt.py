@@ -42,12 +42,12 @@ class Rebuilt(Adaptive):
         super().__init__(own, bool(arrays["jacobian"].ravel()[0]), where=where, **about)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        kept = {name: array for name, array in super().arrays().items() if name != "vndf"}
-        found: dict[str, NDArray[np.generic]] = {
-            name: array.astype(np.float32) if array.dtype.kind == "f" else array for name, array in kept.items()
+        own = {name: array for name, array in super().arrays().items() if name != "vndf"}
+        arrays: dict[str, NDArray[np.generic]] = {
+            name: array.astype(np.float32) if array.dtype.kind == "f" else array for name, array in own.items()
         }
         shape = np.array(self.vndf.shape[2:], np.int32)
-        return {**found, "normals": self.normals.astype(np.float32), "shape": shape}
+        return {**arrays, "normals": self.normals.astype(np.float32), "shape": shape}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.generic]], **about: ops.Value) -> Rebuilt:
@@ -88,9 +88,9 @@ def normals_of(table: Adaptive) -> Floats:
     normals = np.stack([np.interp(_places(rows), _places(len(normals)), column) for column in normals.T], axis=1)
     normals = normals.mean(axis=0) if table.isotropic else normals
     for _ in range(ROUNDS):
-        seen = cosines * normals
-        below = (seen * seen).sum(axis=(2, 3), keepdims=True)
-        weight = cosines * (seen * wanted).sum(axis=(2, 3), keepdims=True) / np.where(below > 0.0, below, 1.0)
+        projected = cosines * normals
+        below = (projected * projected).sum(axis=(2, 3), keepdims=True)
+        weight = cosines * (projected * wanted).sum(axis=(2, 3), keepdims=True) / np.where(below > 0.0, below, 1.0)
         below = (weight * weight).sum(axis=over)
         normals = np.where(below > 0.0, (weight * wanted).sum(axis=over) / np.where(below > 0.0, below, 1.0), normals)
     return np.maximum(normals, 0.0)

@@ -93,10 +93,10 @@ class Samples(Guided, Measurement):
         lit = np.minimum(wo[:, 2], wi[:, 2]) > 1e-9
         at = _features(wo[lit], wi[lit])
         count = min(NEIGHBOURS, len(rgb))
-        found = RBFInterpolator(features, np.log(rgb + dark), kernel="linear", degree=0, neighbors=count)(at)
+        logs = RBFInterpolator(features, np.log(rgb + dark), kernel="linear", degree=0, neighbors=count)(at)
         low, high = np.log(rgb.min(axis=0) + dark), np.log(rgb.max(axis=0) + dark)
         values = np.full((len(wo), 3), -1.0)
-        values[lit] = np.maximum(np.exp(np.clip(found, low, high)) - dark, 0.0)
+        values[lit] = np.maximum(np.exp(np.clip(logs, low, high)) - dark, 0.0)
         return HalfDifference(values.reshape(*CELLS, 3), title=self.title, source=self.source)
 
     def prepare(self) -> None:
@@ -154,9 +154,9 @@ def plan() -> Floats:
     # and the mirror direction of each, finely: there lobes are
     steps = np.radians(np.arange(-8.0, 9.0, 1.0))
     near_i, step = (a.ravel() for a in np.meshgrid(theta_i, steps, indexing="ij"))
-    around = np.stack([near_i, 0.0 * near_i, np.abs(near_i + step), np.full(near_i.shape, np.pi)], -1)
-    whole = np.concatenate([np.stack([i, 0.0 * i, r, p], -1), around])
-    return whole[whole[:, 2] <= np.radians(85.0)]
+    near_mirror = np.stack([near_i, 0.0 * near_i, np.abs(near_i + step), np.full(near_i.shape, np.pi)], -1)
+    rows = np.concatenate([np.stack([i, 0.0 * i, r, p], -1), near_mirror])
+    return rows[rows[:, 2] <= np.radians(85.0)]
 
 
 def sampled(value: ops.Value, directions: Floats | None = None, **about: ops.Value) -> Samples:

@@ -114,7 +114,7 @@ class Specular(Guided, Measurement):
 
 
 @ops.function
-def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Scalar]:
+def about_mirror(wo: Direction, wi: Direction, full: bool) -> tuple[Scalar, Scalar]:
     """Azimuth and radial angle of wo about the mirror direction of wi; the azimuth in [0, pi], or [0, 2 pi) if `whole`.
 
     With the light above x, the mirror direction is s = (-sin, 0, cos), the way to the normal (cos, 0, sin), and y
@@ -128,8 +128,8 @@ def about_mirror(wo: Direction, wi: Direction, whole: bool) -> tuple[Scalar, Sca
     up = wi.z * x + sin * wo.z
     along = wi.z * wo.z - sin * x
     none = (up == 0.0) & (y == 0.0)
-    turn = where(none, 0.0, ops.atan2(y if whole else ops.abs(y), where(none, 1.0, up)))
-    if whole:
+    turn = where(none, 0.0, ops.atan2(y if full else ops.abs(y), where(none, 1.0, up)))
+    if full:
         turn = where(turn < 0.0, turn + 2.0 * ops.pi, turn)
     return turn, ops.atan2(ops.safe_sqrt(up * up + y * y), along)
 
