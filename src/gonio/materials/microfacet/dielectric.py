@@ -24,7 +24,7 @@ from .microfacet import Terms
 
 
 class _Facet(NamedTuple):
-    """What joins a pair of directions.
+    """The facet that joins a pair of directions.
 
     wo, wi        the pair, in the frame of the widths
     m             normal of the facet, m.z >= 0
@@ -50,13 +50,13 @@ class Dielectric(microfacet._Microfacet):
     """Rough glass: reflection F D G / (4 (n.o)(n.i)) and refraction by Walter2007, eq. 21.
 
     With eta = eta_i / eta_o (indices on the wi and wo sides) and the facet's normal m along +-(wo + eta wi):
-    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form that carries radiance: it holds the
-    factor 1 / eta^2 by which radiance shrinks; mode "importance" leaves it out. alpha below 1e-4 is smooth glass, and
-    eta = 1 is no surface at all. `transmission=False` keeps the reflection only.
+    f_t = albedo |o.m| |i.m| (1 - F) D G / (|o.n| |i.n| (o.m + eta i.m)^2), the form for radiance, which includes the
+    factor 1 / eta^2 by which radiance shrinks; mode "importance" omits it. alpha below 1e-4 is smooth glass, and
+    eta = 1 is no surface. `transmission=False` leaves only the reflection.
 
-    What light loses on its way through (`absorption`, by Beer and Lambert exp(-absorption length)) and which of several
-    media that overlap is there (`priority`, Schmidt2002) are matters of paths: Gonio's integrators apply them, no value
-    of the surface depends on them.
+    Absorption inside (`absorption`, by Beer and Lambert exp(-absorption length)) and the choice among overlapping media
+    (`priority`, Schmidt2002) are properties of paths: Gonio's integrators apply them, and no value of the surface
+    depends on them.
     """
 
     eta: Index = index(default=1.5, doc="index inside over index outside; or a substance", low=0.2, high=5.0)
@@ -66,13 +66,13 @@ class Dielectric(microfacet._Microfacet):
     masking: Member = microfacet.masking_choice()
     fresnel: Member = microfacet.fresnel_choice()
     albedo: Colour = microfacet.albedo_factor("factor on everything reflected or transmitted")
-    transmission: bool = flag(default=True, doc="whether refracted light goes on, or is lost")
+    transmission: bool = flag(default=True, doc="whether refracted light is transmitted, or lost")
     sampling: str = microfacet.sampling_choice()
     absorption: Colour = spectrum(
-        default=0.0, doc="light lost inside, per unit length", low=0.0, unit="1/length", inside=True
+        default=0.0, doc="absorption coefficient inside", low=0.0, unit="1/length", inside=True
     )
     priority: Number = number(
-        default=0.0, doc="of media that overlap the highest counts", low=-1e6, high=1e6, inside=True
+        default=0.0, doc="among overlapping media the highest counts", low=-1e6, high=1e6, inside=True
     )
 
     preset_kind: ClassVar[str] = "medium"
@@ -85,7 +85,7 @@ class Dielectric(microfacet._Microfacet):
 
     @function
     def reflectance(self, cos_o: Scalar, cos_t: Scalar, eta: Scalar) -> Scalar:
-        """F by name at a facet seen under cos_o, with transmitted cosine cos_t (0: total reflection)."""
+        """F, by name, at a facet seen at cos_o, with transmitted cosine cos_t (0: total reflection)."""
         return fresnel.kind(self.fresnel).dielectric(cos_o, cos_t, eta)
 
     @function
@@ -95,14 +95,15 @@ class Dielectric(microfacet._Microfacet):
 
     @function
     def _normal(self, wo: Direction, wi: Direction, eta: Scalar) -> Direction:
-        """Normal of the facet that sends wo to wi, reflected or refracted (Walter2007, eq. 13, 16), m.z >= 0."""
+        """Normal of the facet that reflects or refracts wo into wi (Walter2007, eq. 13, 16), m.z >= 0."""
         ratio = where(wo.z * wi.z > 0.0, 1.0, eta)
         h = fma(wi, ratio, wo)
         h = h * rsqrt(maximum(dot(h, h), frame.TINY))
         return where(h.z < 0.0, -h, h)
 
     def _facet(self, wo: Direction, wi: Direction, eta: Scalar) -> _Facet:
-        """The facet that joins a pair of directions, along the axes of the anisotropy; turned last, see `Conductor`."""
+        """The facet that joins a pair of directions, along the axes of the anisotropy; rotated last, see
+        `Conductor`."""
         m = self._normal(wo, wi, eta)
         wo, wi, m = (frame.rotate(w, self.rotation) for w in (wo, wi, m))
         alpha, smooth = self._widths()
@@ -110,10 +111,10 @@ class Dielectric(microfacet._Microfacet):
         reflects = wo.z * wi.z > 0.0
         spread = 0.25 + zeros_like(dot_o)
         if self.transmission:
-            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which keeps its digits where eta is near 1
+            # by Snell's law |o.m + eta i.m| is |1 - eta^2| over the sum, which is accurate near eta = 1
             thinned = sqr((abs(dot_o) + eta * abs(dot_i)) / ((eta - 1.0) * (eta + 1.0)))
             spread = where(reflects, spread, abs(dot_i * dot_o) * thinned)
-        # a facet seen from its back, or one that would refract into the wrong side, is never sampled
+        # a facet seen from its back, or one that would refract to the wrong side, is never sampled
         lit = (dot_o * wo.z > 0.0) & (dot_i * wi.z > 0.0) & ~smooth
         if not self.transmission:
             lit = lit & reflects
@@ -146,7 +147,7 @@ class Dielectric(microfacet._Microfacet):
         return where(facet.lit, density * facet.spread * self._squeeze(facet.reflects, eta), 0.0)
 
     def _squeeze(self, reflects: Mask, eta: Scalar) -> Scalar:
-        """eta^2 for refraction: by how much solid angle shrinks on its way in, and radiance grows."""
+        """eta^2 for refraction: by how much solid angle shrinks on the way in, and radiance grows."""
         return where(reflects, 1.0, sqr(eta))
 
     def _share(self, f: Scalar) -> Scalar:
