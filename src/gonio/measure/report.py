@@ -1,4 +1,4 @@
-"""What is known of a file of measurements: `gonio info`."""
+"""A description of a measurement file: `gonio info`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .tables.base import ANGLES, Measurement
 
 
 def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a file holds: format, kind, dimensions, range of the values, angles that were measured ("known"), flaws,
-    albedo over the angle of view, reciprocity.
+    """The content of a file: format, kind, dimensions, range of the values, measured angles ("known"), flaws, albedo
+    over the angle of view, reciprocity.
 
-    Of a file with several materials, none of which is named, their names alone ("items").
+    For a file with several materials, none of which is named, only their names ("items").
     Raises InputError as `read` does.
     """
     text, item = parted(os.fspath(file))
@@ -55,7 +55,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _typical_error(table: Measurement) -> float | None:
-    """The median of the standard errors, as shares of their values; None where none are known."""
+    """The median of the standard errors relative to their values; None if there are none."""
     error, values = table.beside.get("error"), vars(table).get("values")
     if error is None or values is None or not np.any(values > 0.0):
         return None
@@ -63,7 +63,7 @@ def _typical_error(table: Measurement) -> float | None:
 
 
 def lines(about: dict[str, Any]) -> list[tuple[str, str]]:
-    """The same in words, (what, value) each."""
+    """The description as text, (what, value) each."""
     if "items" in about:
         return [("format", about["format"]), ("holds", ", ".join(about["items"]))]
     nm = about["wavelengths"]

@@ -55,13 +55,13 @@ class Pieces(NamedTuple):
 
 
 class Disney(BSDF):
-    """Disney's principled BRDF: eleven parameters, each from 0 to 1 (Burley2012, with the formulas of its published code).
+    """Disney's principled BRDF: eleven parameters, each from 0 to 1 (Burley2012, with its published code).
 
     f = (1 - metallic) (base / pi mix(f_d, f_ss, subsurface) + f_sheen) + F D G / (4 (n.o)(n.i)) + clearcoat / 4 f_r
     f_d = (1 + (F_D90 - 1) (1 - n.i)^5) (1 + (F_D90 - 1) (1 - n.o)^5),  F_D90 = 1/2 + 2 roughness (i.h)^2
     D is GTR2 (GGX) of alpha = roughness^2, stretched by 1 / aspect, aspect^2 = 1 - 0.9 anisotropic; G is Smith's; F is
-    Schlick's of 0.08 specular, tinted, or of the base color for metal. f_r is a second lobe, GTR1 of width 0.1 to 0.001,
-    F0 = 0.04. Tints are the base color over the mean of its channels (in the paper over its luminance).
+    Schlick's of 0.08 specular, tinted, or of the base color for metal. f_r is a second lobe, GTR1 of width 0.1 to
+    0.001, F0 = 0.04. Tints are the base color over the mean of its channels (in the paper over its luminance).
 
     The lobes are simply added, as artists preferred: at grazing views, and with several large parameters, it reflects
     more than it receives, and rough metal loses multiply scattered light. Reciprocal.

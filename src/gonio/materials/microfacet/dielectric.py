@@ -178,7 +178,8 @@ class Dielectric(microfacet._Microfacet):
 
     @method
     def sample(self, wo: Direction, u: Direction, mode: Mode = "radiance") -> Sample:
-        """A normal first, then u1 chooses reflection with probability F; a direction on the wrong side is a failure."""
+        """A normal first, then u1 selects reflection with probability F; a direction on the wrong side is a failed
+        sample."""
         wo_local = frame.rotate(wo, self.rotation)
         alpha, smooth = self._widths()
         eta = self._relative_eta(wo)
@@ -193,7 +194,7 @@ class Dielectric(microfacet._Microfacet):
         wi = frame.rotate_back(wi, self.rotation)
         sides = wo.z * wi.z
         right_side = where(reflects, sides > 0.0, sides < 0.0)
-        # m anew from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
+        # m recomputed from the rounded wi: the weight is eval / pdf to the last digits, however narrow the lobe
         facet = self._facet(wo, wi, eta)
         squeeze = self._squeeze(reflects, eta)
         value = where(smooth, 1.0 / squeeze, self._value(facet))
@@ -206,10 +207,10 @@ class Dielectric(microfacet._Microfacet):
         return Sample(wi, tinted, pdf, smooth & right_side, where(reflects, 1.0, eta))
 
     def polarized(self, wo: Direction, wi: Direction, delta: Mask, mode: Mode = "radiance") -> tuple[Polarized, ...]:
-        """All of it, by the exact equations; the kind of Fresnel says only how much there is."""
+        """All of the light, by the exact equations; the Fresnel kind affects only its amount."""
         eta = self._relative_eta(wo)
         m = self._normal(wo, wi, eta)
-        m = where(delta, frame.normal_like(wo), m)  # equal indices send light straight on, at no normal of their own
+        m = where(delta, frame.normal_like(wo), m)  # equal indices pass light straight through, without a normal
         cos_o, cos_i = abs(dot(wo, m)), abs(dot(wi, m))
         reflects = wo.z * wi.z > 0.0
         f = self.reflectance(cos_o, where(reflects, fresnel.cos_transmitted(cos_o, eta), cos_i), eta)
@@ -223,7 +224,7 @@ class Dielectric(microfacet._Microfacet):
     def _polarization(
         self, cos_o: Scalar, cos_i: Scalar, eta: Scalar
     ) -> tuple[Diattenuation[Scalar], Diattenuation[Scalar]]:
-        """What a facet does to the polarization of what it reflects, and of what it lets through."""
+        """Polarization of the light that a facet reflects, and of the light that it transmits."""
         return reflected_by_glass(cos_o, eta), refracted(cos_o, cos_i, eta)
 
     @method
@@ -235,7 +236,7 @@ class Dielectric(microfacet._Microfacet):
         return Terms(distribution(self.ndf).D(facet.m, facet.alpha), self._masking(facet), f)
 
     def _widths(self) -> tuple[Pair, Mask]:
-        """Widths, and whether the surface is smooth; where both indices are equal light goes straight on."""
+        """Widths, and whether the surface is smooth; if both indices are equal light passes straight through."""
         alpha, smooth = widths(self.alpha)
         if self.transmission:
             smooth = smooth | (abs(self.eta - 1.0) < MATCHED)
@@ -271,13 +272,13 @@ class Dielectric(microfacet._Microfacet):
         return self.reflectance(one, one, self.eta) * self.albedo
 
     def mean_reflectance(self, average: str = "exact") -> Scalar:
-        """From the side of the less dense medium."""
+        """F_avg from the side of the less dense medium."""
         return fresnel.kind(self.fresnel).dielectric_average(self.eta)
 
     def known_albedo(
         self, mu: NDArray[np.float64], phi: NDArray[np.float64], inner: InnerAlbedo, nodes: int | None
     ) -> NDArray[np.float64] | None:
-        """Of smooth glass, which keeps nothing; without transmission, F."""
+        """For smooth glass, which absorbs nothing; without transmission F."""
         if self.delta != "always":
             return None
         albedo = np.broadcast_to(np.asarray(self.albedo, float), (len(mu), 3))
@@ -290,6 +291,6 @@ class Dielectric(microfacet._Microfacet):
         return albedo * backend.to_numpy(f, len(mu))[:, None]
 
 
-# Refraction turns light by about (eta - 1) tan: below this difference of indices that is lost in the rounding of a
-# float32 direction (6e-8), and the normal that joins two directions can no longer be told.
+# Refraction deflects light by about (eta - 1) tan: below this difference of indices the deflection is lost in the
+# rounding of a float32 direction (6e-8), and the normal that joins two directions cannot be determined.
 MATCHED = 1e-6

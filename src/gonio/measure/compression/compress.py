@@ -1,4 +1,4 @@
-"""Files of measurements in fewer bytes, and how far off that is: `gonio compress`."""
+"""Compression of measurement files, with the resulting error: `gonio compress`."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from ..formats.own import Own
 from . import sphere
 from .base import Method
 
-SIZE = 16384  # bytes a material
+SIZE = 16384  # bytes per material
 LEAST = 1024
 
 
 @dataclass(frozen=True)
 class Compressed:
-    """A material in fewer bytes.
+    """A compressed material.
 
-    path     the file, with the material's name behind a colon where it holds several
-    kind     of table in it
-    method   by which
-    size     bytes a material: of a file with several the mean
-    before   bytes of its numbers as they were
-    error    E |new - old| / E |old| of f cos, as `gonio convert` says it
+    path     the file, followed by the material's name if it holds several
+    kind     of the table in it
+    method   of compression
+    size     bytes per material: the mean, for a file with several
+    before   bytes of its original numbers
+    error    E |new - old| / E |old| of f cos, as reported by `gonio convert`
     sphere   mean relative error of a sphere's pixels under a lamp and a sky
-    seconds  that it took, a material
+    seconds  computing time per material
     """
 
     path: str
@@ -53,12 +53,12 @@ def compress(
     method: str = "log",
     bytes: int = SIZE,
 ) -> list[Compressed]:
-    """Write measured materials into a `.gonio` file of fewer bytes; the errors are measured on the file as written.
+    """Compress measured materials into a `.gonio` file; the errors are measured on the written file.
 
-    source  a file or several, as `go.Measured` takes them; several make one file, whose materials are OUT.gonio:NAME
-    method  log (quantised logarithms), lowrank (factors that all share), rgl (without `vndf`), network (675 weights)
-    bytes   a material, for log and lowrank
-    Raises InputError where a file cannot be read, or the method cannot be used for it.
+    source  a file or several, as for `go.Measured`; several make one file, with materials OUT.gonio:NAME
+    method  log (quantized logarithms), lowrank (shared factors), rgl (without `vndf`), network (675 weights)
+    bytes   per material, for log and lowrank
+    Raises InputError if a file cannot be read, or the method does not apply to it.
     """
     one = Method.family.get(method, "method")
     if not isinstance(bytes, int) or bytes < LEAST:

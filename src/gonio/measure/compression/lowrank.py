@@ -14,11 +14,11 @@ from ..tables.low_rank import BASES, LowRank, projected
 from .base import Method, over_half_vectors
 from .log import Logs, coded
 
-RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # tried, alike along all axes
+RANKS = (3, 4, 6, 9, 13, 18, 24, 32, 44)  # candidates, equal along all axes
 
 
 class Lowrank(Method):
-    """lowrank: bases of the slices along each axis, found by singular values for all materials together, and a core."""
+    """lowrank: bases of the slices along each axis, from singular vectors of all materials together, and a core."""
 
     name: ClassVar[str] = "lowrank"
     shared: ClassVar[bool] = True

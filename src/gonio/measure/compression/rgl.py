@@ -1,4 +1,4 @@
-"""RGL tables without what follows from the rest."""
+"""RGL tables without redundant arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sphere under a lamp and a sky, computed pair by pair: what an error of a table does to a picture."""
+"""A sphere under a lamp and a sky, computed pair by pair: the effect of a table's error on a picture."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from ..tables.base import Floats
 
 SIZE = 64  # pixels across
-LAMP = np.array([-0.5, 0.6, 0.62])  # toward it; as bright as all of the sky
-SKY = 256  # directions that the sky is made of, evenly spread
-DARK = 0.01  # of the picture's mean: what a pixel's difference is at least held against
+LAMP = np.array([-0.5, 0.6, 0.62])  # direction toward it; as bright as the whole sky
+SKY = 256  # evenly spread directions of the sky
+DARK = 0.01  # of the picture's mean: lower limit of the denominator of relative differences
 
 Rgb = Callable[[Floats, Floats], Floats]
 
