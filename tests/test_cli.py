@@ -145,7 +145,7 @@ def test_a_broken_package_costs_a_warning(package: Path) -> None:
     done = _in_another_process(package, "--version")
     assert done.returncode == 0 and "no_such_thing" not in done.stderr
     done = _in_another_process(package, "--help")
-    assert done.returncode == 0 and "sheen_package:sheen is left out: ModuleNotFoundError" in done.stderr
+    assert done.returncode == 0 and "sheen_package:sheen is ignored: ModuleNotFoundError" in done.stderr
 
 
 @pytest.mark.parametrize(

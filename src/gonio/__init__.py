@@ -5,8 +5,8 @@
     value = gold.eval(wo, wi)            # (N, 3) arrays in, (N, 3) out
     sample = gold.sample(wo, u)          # .wi .weight .pdf .delta
 
-Names load when first used; Dr.Jit and Mitsuba load when something is first computed. A libLLVM for them is chosen here,
-so that `import drjit` and `import mitsuba` work after this, and before it too.
+Names are loaded on first use; Dr.Jit and Mitsuba are loaded by the first computation. Importing Gonio chooses a libLLVM
+for Dr.Jit, so that `import drjit` and `import mitsuba` work before and after it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from . import llvm, moved
 from ._version import __version__ as __version__
 from .errors import MachineError
 
-# Before Dr.Jit looks for one. Where there is none, whoever computes on the CPU says so; a GPU does without.
+# Must run before Dr.Jit searches for a libLLVM. Without one the first CPU computation fails; a GPU needs none.
 with contextlib.suppress(MachineError):
     llvm.use()
 
@@ -35,7 +35,7 @@ _PLACES = {
     "optics.ndf": ("NDF", "Stretched"),
     "optics.masking": ("Masking",),
     "optics.fresnel": ("Fresnel", "Interface", "fresnel"),
-    # what a material of one's own is written with
+    # for user-defined materials
     "material": (
         *("Angle", "BSDF", "KnownViolation", "Colour", "Index", "Number", "Parameter", "Preset", "Sample", "Width"),
         *("angle", "bsdf", "choice", "file", "flag", "index", "method", "model", "models", "never", "number"),
@@ -132,13 +132,13 @@ if TYPE_CHECKING:
     from .work.cluster import Cluster
     from .work.cluster import Cluster as cluster
 
-    material = _notation.material  # after `from .material`, which type checkers take to bind the subpackage
+    material = _notation.material  # after `from .material`, which type checkers read as the subpackage
 
 
 if not TYPE_CHECKING:  # a type checker would accept every misspelt name
 
     class _Gonio(ModuleType):
-        """A module whose public functions stay what they are when a subpackage of the same name is imported."""
+        """A module whose public functions are not replaced when a subpackage of the same name is imported."""
 
         def __setattr__(self, name: str, value: object) -> None:
             if not (name in _FLAT and isinstance(value, ModuleType)):
@@ -158,7 +158,7 @@ if not TYPE_CHECKING:  # a type checker would accept every misspelt name
         class_name = _ALIASES.get(name, name)
         if class_name in _FLAT:
             return __getattr__(class_name)
-        if class_name.islower():  # a submodule that is being imported, no material
+        if class_name.islower():  # a submodule that is being imported, not a material
             raise AttributeError(f"module 'gonio' has no attribute '{name}'")
         for cls in __getattr__("models")().values():
             if cls.__name__ == class_name:

@@ -1,12 +1,12 @@
-"""What callers from Python hand over, held against what a function's annotations promise.
+"""Checks the arguments of public functions against their annotations.
 
     @checked
     def bake(target: str | Path, size: int = 128, aspect: float | None = None): ...
 
     bake("ggx", size="4")      # InputError: size: '4' given, a whole number expected
 
-Told by annotation, once for all: None, bool, int, float, str, Path, BSDF, ArrayLike, tuple, Sequence and Mapping of
-these. An annotation of another kind is left to the function. Whole numbers come out as `int`, be they NumPy's.
+The supported annotations are None, bool, int, float, str, Path, BSDF, ArrayLike, and tuple, Sequence and Mapping of
+these. Arguments with other annotations are not checked. Integers, NumPy's included, are converted to `int`.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from .errors import InputError
 
 P = ParamSpec("P")
 R = TypeVar("R")
-# gives the value as the function is to have it; ValueError where it is wrong
+# returns the converted value; raises ValueError if it is wrong
 Check: TypeAlias = Callable[[object], object]
 
-_SHOWN = 60  # letters of a wrong value
+_SHOWN = 60  # characters of a wrong value
 
 
 def checked(call: Callable[P, R]) -> Callable[P, R]:
-    """The function, which raises InputError where an argument is not what its annotation says."""
+    """Wrap a function so that it raises InputError for an argument that does not match its annotation."""
     signature = inspect.signature(call)
     kinds = {name: _check_of(str(p.annotation)) for name, p in signature.parameters.items()}
     several = {name for name, p in signature.parameters.items() if p.kind == p.VAR_POSITIONAL}
@@ -52,17 +52,17 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
 
 
 def shown(value: object) -> str:
-    """A value as an error shows it: short, and printable everywhere."""
+    """A value as error messages show it: short, and printable in every encoding."""
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
 
-# ---------------------------------------------------------------------- one kind each
+# ---------------------------------------------------------------------- checks of single values
 
 
-def whole(value: object) -> int:
-    """A whole number, Python's or NumPy's; True is none."""
-    import numpy as np  # here, as below: `gonio --help` loads this file, and has no use for NumPy
+def integer(value: object) -> int:
+    """A Python or NumPy integer as `int`; booleans are rejected."""
+    import numpy as np  # imported here, as below, because `gonio --help` loads this file and does not need NumPy
 
     if isinstance(value, bool | np.bool_):
         raise ValueError
@@ -73,7 +73,7 @@ def whole(value: object) -> int:
 
 
 def number(value: object) -> object:
-    """A number that is one: not NaN, no text."""
+    """A scalar number; NaN and text are rejected."""
     import numpy as np
 
     if isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
@@ -141,7 +141,7 @@ def _of_class(name: str) -> Check:
 _KINDS: dict[str, tuple[Check, str]] = {
     "None": (_nothing, ""),
     "bool": (_flag, "True or False"),
-    "int": (whole, "a whole number"),
+    "int": (integer, "a whole number"),
     "float": (number, "a number"),
     "str": (_text, "a text"),
     "Path": (_of_class("Path"), "a path"),
@@ -153,13 +153,13 @@ _KINDS: dict[str, tuple[Check, str]] = {
 
 @functools.cache
 def _check_of(annotation: str) -> Check | None:
-    """The check of an annotation; None for one that says nothing known."""
+    """The check of an annotation; None for an annotation that is not supported."""
     options = []
     for part in _alternatives(annotation):
-        found = _one(part)
-        if found is None:
+        option = _one(part)
+        if option is None:
             return None
-        options.append(found)
+        options.append(option)
     expected = " or ".join(words for _, words in options if words)
 
     def check(value: object) -> object:
@@ -174,7 +174,7 @@ def _check_of(annotation: str) -> Check | None:
 
 
 def _alternatives(annotation: str) -> list[str]:
-    """The types of an annotation, split at the bars outside of brackets."""
+    """The alternatives of an annotation: split at each `|` outside brackets."""
     parts, depth = [""], 0
     for letter in annotation:
         depth += (letter == "[") - (letter == "]")

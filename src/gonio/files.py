@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all."""
+"""Atomic writes of files and folders."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .errors import InputError, MachineError
 
 
 def check_file(path: str | Path) -> Path:
-    """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
+    """The file that `path` will become (links resolved); raises InputError before hours are spent on it."""
     target = Path(path).expanduser()
     try:
         if target.is_symlink():
             target = target.resolve()
-        looped = target.is_symlink()  # from Python 3.13 on; before, it raises
+        looped = target.is_symlink()  # Python 3.13 and later; earlier versions raise
     except (OSError, RuntimeError):
         looped = True
     if looped:
-        raise InputError("this is a loop of links", str(path), "remove it, or choose another name")
+        raise InputError("this symbolic link points to itself", str(path), "remove it, or choose another name")
     folder = target.parent
     if not folder.is_dir():
         hint = f"mkdir -p '{folder}', or choose another"
@@ -35,13 +35,13 @@ def check_file(path: str | Path) -> Path:
 
 
 def check_folder(folder: str | Path) -> Path:
-    """The folder, if it exists or can be made where it is named; InputError before anything is computed where not."""
+    """The folder, if it exists or can be created; otherwise raises InputError before anything is computed."""
     folder = Path(folder).expanduser()
     if not folder.is_dir():
         if folder.exists():
             raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
         check_file(folder)
-        try:  # a folder that claims to be writable need not be
+        try:  # a folder that is reported as writable may still refuse
             folder.mkdir()
             folder.rmdir()
         except OSError as error:
@@ -56,15 +56,15 @@ def check_folder(folder: str | Path) -> Path:
 def write_whole(
     path: str | Path, content: bytes | Callable[[Path], None], rescue: bool = True, durable: bool = True
 ) -> Path:
-    """Write a file so that at every moment `path` is the old one or the whole new one.
+    """Write a file atomically: at every moment `path` is either the old file or the complete new one.
 
-    content  the bytes, or a function that fills the file whose name it is given (it keeps the suffix)
-    durable  force it to the disk first, so that not even a power cut leaves half of it
-    rescue   where it cannot be written, write it to the temporary folder, so that hours of work are not lost
-    Raises MachineError where the disk is full, which says where the content is; nothing of it is left beside `path`.
+    content  the bytes, or a function that writes to the file name it is given (which has the same suffix)
+    durable  flush to the disk first, so that the file is complete even after a power failure
+    rescue   if the file cannot be written, write it to the temporary folder, so that hours of work are not lost
+    Raises MachineError if the disk is full; its text names the rescued file. No partial file remains next to `path`.
     """
     target = check_file(path)
-    # In the same folder, hence on the same file system, where a rename is one step.
+    # In the same folder and hence on the same file system, where renaming is atomic.
     temporary = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
         if callable(content):
@@ -77,21 +77,22 @@ def write_whole(
                 file.write(content)
                 file.flush()
                 if durable:
-                    os.fsync(file.fileno())  # a full disk can show itself as late as here
+                    os.fsync(file.fileno())  # a full disk may be reported only here
         os.replace(temporary, target)
     except OSError as error:
         full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         what = "the disk is full" if full else f"cannot write: {error.strerror or error}"
-        kept = _rescued(target.name, content) if rescue else None
+        rescued = _rescued(target.name, content) if rescue else None
         hint = "free some space, or choose another folder with -o; nothing was written"
-        raise MachineError(what, str(path), f"it is kept as {kept}: move it from there" if kept else hint) from error
+        hint = f"it was saved as {rescued}: move it from there" if rescued else hint
+        raise MachineError(what, str(path), hint) from error
     finally:
         temporary.unlink(missing_ok=True)
     return target
 
 
 def _rescued(name: str, content: bytes | Callable[[Path], None]) -> Path | None:
-    """The file in a folder of its own among the temporary ones, None where there is no room either."""
+    """The content in a new temporary folder; None if it cannot be written there either."""
     folder = None
     try:
         folder = Path(tempfile.mkdtemp(prefix="gonio-"))
@@ -107,7 +108,7 @@ def _rescued(name: str, content: bytes | Callable[[Path], None]) -> Path | None:
 
 
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write to a folder beside, then move: a new folder appears whole, an old one keeps its other files."""
+    """Write all files to a temporary folder, then move them; existing files of the folder are preserved."""
     part = folder.absolute().with_name(f".{folder.name}.{os.getpid()}.part")
     try:
         part.mkdir()

@@ -260,13 +260,13 @@ def test_bad_options_are_refused_and_nothing_is_written(tmp_path, options, text)
 @pytest.mark.parametrize(
     ("target", "options", "text"),
     [
-        (go.Conductor(), {"masking": "smith-separable"}, "masking of a material"),
-        (go.Conductor(), {"aspect": 0.5}, "aspect of a material"),
+        (go.Conductor(), {"masking": "smith-separable"}, "masking given for a material"),
+        (go.Conductor(), {"aspect": 0.5}, "aspect given for a material"),
         (go.Conductor(), {"method": "ggx"}, "Conductor by 'ggx'"),
-        (go.Conductor(), {"lut": ["dfg"]}, "split sum of a material"),
-        (go.Conductor(), {"lut": ["glass"]}, "glass of a Conductor"),
+        (go.Conductor(), {"lut": ["dfg"]}, "split sum requested for a material"),
+        (go.Conductor(), {"lut": ["glass"]}, "glass requested for a Conductor"),
         (go.Conductor(), {"layout": "homework"}, "homework's layout"),
-        (go.Conductor(alpha=np.array([0.1, 0.2])), {}, "one value a ray"),
+        (go.Conductor(alpha=np.array([0.1, 0.2])), {}, "one value per ray"),
         (go.Conductor(alpha=(0.0, 0.2)), {}, "alpha_y / alpha_x = inf"),
         (go.Lambert(), {"layout": "stretched"}, "Lambert by quadrature, stretched"),
         (go.Lambert(), {"lut": ["glass"]}, "table 'glass' of Lambert"),

@@ -142,7 +142,7 @@ def test_mueller_matrices_do_to_stokes_vectors_what_amplitudes_do_to_fields() ->
         ((0.1, 1.5 + 1j), "give eta and k apart"),
         ((0.1, "glass"), "'glass' given, a number"),
         ((np.nan, 1.5), "not finite"),
-        (([0.1, 0.2], [1.0, 2.0, 3.0]), "do not go together"),
+        (([0.1, 0.2], [1.0, 2.0, 3.0]), "do not broadcast"),
     ],
 )
 def test_an_index_that_no_medium_has_is_an_error(arguments: tuple[Any, ...], text: str) -> None:

@@ -118,7 +118,7 @@ def test_names_are_taken_once(registered: dict[str, type]) -> None:
 
         name = "path"
 
-    with pytest.raises(InputError, match="the integrator 'path' is there already"):
+    with pytest.raises(InputError, match="the integrator 'path' already exists"):
         integrators.Integrator.family.add(Another)
 
 

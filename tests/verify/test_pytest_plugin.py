@@ -46,7 +46,7 @@ def test_a_crash(gonio_verify):
 def test_breaks(gonio_verify):
     gonio_verify("phong", law="reciprocity")
     gonio_verify("matte.py:Crash", law="weight", breaks=["weight"])
-    with pytest.raises(pytest.fail.Exception, match="isotropy is said to be broken, and holds"):
+    with pytest.raises(pytest.fail.Exception, match="isotropy is declared broken, but holds"):
         gonio_verify("matte.py:Matte", law="isotropy", breaks=["isotropy"])
 '''
 

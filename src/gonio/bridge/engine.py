@@ -11,7 +11,7 @@ from types import ModuleType
 
 from .. import llvm
 from ..errors import InputError, MachineError
-from ..owner import COMPUTING, alone
+from ..owner import COMPUTING, exclusive
 from . import plugin_search
 
 DEVICES = ("auto", "cpu", "cuda")
@@ -55,7 +55,7 @@ def polarized(variant: str) -> str:
     return "_".join([*variant.split("_")[:2], "spectral_polarized"])
 
 
-@alone
+@exclusive
 def load(device: str | None = None, spectral: bool = False, threads: int | None = None) -> ModuleType:
     """Mitsuba, with a variant set: the current one where `device` is None and one is set, else `variant_for`.
 

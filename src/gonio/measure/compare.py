@@ -1,4 +1,4 @@
-"""How far two tables lie apart, and a table in another format."""
+"""The difference between two tables, and conversion to another format."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from .tables.base import Floats, Measurement
 PAIRS = 1 << 16
 ROUNDS = 16
 SURE = 0.03
-GRAZING = 0.03  # least cosine of view: within 1.7 degrees of the horizon every format extrapolates
+GRAZING = 0.03  # smallest cosine of view: within 1.7 degrees of the horizon every format extrapolates
 
 
 def difference(table: Measurement, other: Measurement, pairs: int = PAIRS, seed: int = 1) -> float:
     """E |other - table| / E |table| of f cos theta_i, over views of even cosine and all light, mean of the channels.
 
-    The pairs are drawn by both tables' densities and by the cosine, a third each, so that narrow lobes count for what
-    they carry; each is weighed by the inverse of the mixture's density. Rounds of `pairs` go on until the figure's
-    standard error is under `SURE` of it, or `ROUNDS` are done: a spike that no density follows takes many.
+    The pairs are sampled by both tables' densities and by the cosine, a third each, so that narrow lobes count by their
+    energy; each is weighted by the inverse density of the mixture. Rounds of `pairs` continue until the standard error
+    of the result is below `SURE` of it, or `ROUNDS` are done: a spike outside every density requires many.
     """
     rng = np.random.default_rng([seed, 83])
-    sums, squares, whole = 0.0, 0.0, 0.0
+    sums, squares, total = 0.0, 0.0, 0.0
     for _ in range(ROUNDS):
         off, size = _round(table, other, pairs, rng)
-        sums, squares, whole = sums + float(off.sum()), squares + float((off * off).sum()), whole + float(size.sum())
+        sums, squares, total = sums + float(off.sum()), squares + float((off * off).sum()), total + float(size.sum())
         if squares <= (SURE * sums) ** 2 or not np.isfinite(sums):
             break
-    return sums / whole if whole > 0.0 else 0.0
+    return sums / total if total > 0.0 else 0.0
 
 
 def _round(
@@ -53,8 +53,8 @@ def _round(
     for index, one in enumerate((table, other), 1):
         drawn, _ = one.draw(*(backend.vector_of(v[third == index], 3, types) for v in (wo, u)))
         wi[third == index] = backend.to_numpy(drawn, int((third == index).sum()))
-    kept = wi[:, 2] > 1e-6
-    wo, wi = wo[kept], wi[kept]
+    upper = wi[:, 2] > 1e-6
+    wo, wi = wo[upper], wi[upper]
     density = wi[:, 2] / np.pi
     for one in (table, other):
         density = density + backend.to_numpy(
@@ -69,9 +69,9 @@ class Converted:
     """A table in another format.
 
     path       the file
-    kind       of table in it
-    resampled  whether its values were found by evaluating the other; else they are the same numbers
-    error      how far it lies from the source, see `difference`
+    kind       of the table in it
+    resampled  whether its values were computed by evaluating the source; otherwise the numbers are the same
+    error      its distance from the source, see `difference`
     size       bytes
     """
 
@@ -86,9 +86,9 @@ class Converted:
 
 
 def convert(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> Converted:
-    """Write a table in the format of another suffix; its error is measured on the file as it was written.
+    """Write a table in the format of another suffix; its error is measured on the written file.
 
-    Raises InputError where the source cannot be read, or the format cannot be written.
+    Raises InputError if the source cannot be read, or the format cannot be written.
     """
     table, path = read(source), Path(output)
     target = files.check_file(path)
@@ -96,8 +96,8 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> C
     if not kind.writes:
         raise InputError(f"{kind.name} files cannot be written", str(path), "choose another suffix, such as .gonio")
     if not table.isotropic and kind.writes not in (table.name, "any"):
-        hint = ".bsdf and .gonio keep what it is"
-        raise InputError(f"{kind.name} files hold isotropic materials, this one is not", str(path), hint)
+        hint = ".bsdf and .gonio preserve the anisotropy"
+        raise InputError(f"{kind.name} files hold isotropic materials, this one is anisotropic", str(path), hint)
     resampled = kind.resampled(table)
     data = kind.write(resampled)
     error = difference(table, kind.read(data, str(path)))
@@ -106,12 +106,12 @@ def convert(source: str | os.PathLike[str], output: str | os.PathLike[str]) -> C
 
 
 def _swapped(table: Measurement, wo: Floats, wi: Floats) -> tuple[Floats, Floats]:
-    """f of pairs, and of the same pairs exchanged."""
+    """f of pairs, and of the same pairs with directions exchanged."""
     return table.rgb(wo, wi) / wi[:, 2:], table.rgb(wi, wo) / wo[:, 2:]
 
 
 def asymmetry(table: Measurement, pairs: int = 1 << 14) -> float:
-    """E |f(wo, wi) - f(wi, wo)| / E f over pairs by the cosine: 0 where reciprocity holds."""
+    """E |f(wo, wi) - f(wi, wo)| / E f over pairs by the cosine: 0 if the table is reciprocal."""
     rng = np.random.default_rng([1, 84])
     u, v = rng.random((2, pairs)), rng.random((2, pairs)) * 2.0 * np.pi
     wo, wi = (

@@ -24,7 +24,7 @@ from ..bridge import engine
 from ..bridge.faults.exr_threads import file_threads
 from ..catalog.operands import PICTURE_SUFFIXES
 from ..errors import InputError, did_you_mean
-from ..owner import alone
+from ..owner import exclusive
 from . import exposures, formats
 
 Value = str | int | float
@@ -60,7 +60,7 @@ def check_writable(path: str | Path) -> Path:
     return files.check_file(target)
 
 
-@alone
+@exclusive
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format its suffix names, whole or not at all.
 
@@ -190,7 +190,7 @@ def _one_line(value: Value) -> str:
 ENCODINGS = ("srgb", "linear")
 
 
-@alone
+@exclusive
 def read(path: str | Path, encoding: str = "srgb") -> Picture:
     """A picture as linear RGB, with the settings that Gonio wrote into it.
 

@@ -21,7 +21,7 @@ from ..material import BSDF, tree
 from ..material.recording import switched_off
 from ..ops import graph
 from ..ops.types import Value
-from ..owner import alone
+from ..owner import exclusive
 from . import program as programs
 from .languages import Language
 from .layout import COLUMNS, INDENT, comment
@@ -71,7 +71,7 @@ class Bundle:
         return [folder / file for file in contents]
 
 
-@alone
+@exclusive
 def emit(
     model: BSDF | str,
     lang: str = "glsl",
@@ -95,7 +95,7 @@ def emit(
     return bundle(model, lang, functions, lean=lean).text
 
 
-@alone
+@exclusive
 def bundle(
     model: BSDF | str,
     lang: str = "glsl",

@@ -24,7 +24,7 @@ from ..energy.tables import bake
 from ..errors import InputError, MachineError, did_you_mean
 from ..material import BSDF, tree
 from ..material.recording import switched_off
-from ..owner import alone
+from ..owner import exclusive
 from ..shaders import bundle as written_for
 from . import panels, stage
 from .stage import PresetData, Stage, Value
@@ -98,7 +98,7 @@ TABLES = {
 }
 
 
-@alone
+@exclusive
 def page_data(what: Stage, socket: str | None = None, revision: int = 0) -> PageData:
     """The page's data, as JSON holds it.
 
@@ -199,7 +199,7 @@ def _choices_of(preset: PresetData) -> dict[str, Value]:
     return {path: value for path, value in preset["set"].items() if isinstance(value, str | bool)}
 
 
-@alone
+@exclusive
 def variant_data(
     bsdf: BSDF, choices: Mapping[str, Value], on: Collection[str] = (), fixed: Mapping[str, Value] | None = None
 ) -> VariantData:

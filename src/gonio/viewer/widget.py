@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..catalog import notation
 from ..errors import InputError, MachineError
 from ..material import BSDF, tree
-from ..owner import alone
+from ..owner import exclusive
 from . import page, stage
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ export default { render };
 """
 
 
-@alone
+@exclusive
 def view(*models: BSDF | str, height: int = 640) -> AnyWidget:
     """The page of `gonio view` in a notebook cell: balls, sliders, plots.
 
