@@ -47,7 +47,7 @@ def picture(
 
 
 # Mitsuba's `ray_test` tells a ball of 1 mm, three metres away, from what is beside it by float32: to a sixth.
-WAYS = [pytest.param(inline.MOST, r, id=f"kernel-{r}") for r in (0.001, 0.05, 1.0, 2.5)]
+WAYS = [pytest.param(inline.MAX_COST, r, id=f"kernel-{r}") for r in (0.001, 0.05, 1.0, 2.5)]
 WAYS += [pytest.param(0, r, id=f"embree-{r}") for r in (0.01, 1.0)]
 
 
@@ -78,7 +78,7 @@ def test_one_of_several_balls_does_too(kind: str) -> None:
     assert image.mean() == pytest.approx(GREY * expected, rel=2e-3)
 
 
-@pytest.mark.parametrize("most", [inline.MOST, 0], ids=["kernel", "embree"])
+@pytest.mark.parametrize("most", [inline.MAX_COST, 0], ids=["kernel", "embree"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_ball_does_not_light_itself(kind: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """However white it is. Toward a place on itself a sphere's cap is that place, in a direction made of rounding."""

@@ -115,8 +115,8 @@ class Subject:
 
     def around_sound(self) -> Subject:
         """The same with diffuse materials inside, which violate no law."""
-        if hasattr(self.model, "around_diffuse"):
-            return Subject(self.model.around_diffuse(), self.target, self.settings)
+        if hasattr(self.model, "with_diffuse_inside"):
+            return Subject(self.model.with_diffuse_inside(), self.target, self.settings)
         sound = models()["lambert"]()
         return Subject(tree.replace(self.model, dict.fromkeys(tree.children(self.model), sound)), self.target)
 
@@ -169,9 +169,9 @@ class Subject:
         changed = tree.replace(model, values) if isinstance(model, BSDF) else model.replace(**values)
         return Subject(changed, self.target, {**self.settings, **values})
 
-    def anew(self) -> Subject | None:
+    def rebuilt(self) -> Subject | None:
         """A new object of the same BSDF, which has not been called; None where it cannot be made."""
-        make = getattr(self.model, "anew", None)
+        make = getattr(self.model, "rebuilt", None)
         return None if make is None else Subject(make(), self.target, self.settings)
 
     def command(self, *more: str) -> str:

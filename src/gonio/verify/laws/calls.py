@@ -165,7 +165,7 @@ def _batches(subject: Subject, wo: np.ndarray, wi: np.ndarray, u: np.ndarray, pr
         yield twice._replace(wrong=f"{twice.wrong}: declare `stochastic = True` if its values are random")
         return
     yield twice
-    fresh = subject.anew()
+    fresh = subject.rebuilt()
     if fresh is not None:
         (new,) = _answers(fresh, wo, wi, u, precision)
         yield _unlike("a new object", first, new, wo, wi, same)
