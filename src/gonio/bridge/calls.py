@@ -247,9 +247,7 @@ class _Trial:
         if both.sum() < 20:
             return ""
         single, among = (weight * _rows(bs.pdf))[both], (self.weight * _rows(self.drawn.pdf))[both]
-        return self.unlike(
-            f"what the delta lobe of {name} carries", "what it carries among the others", single, among
-        )
+        return self.unlike(f"what the delta lobe of {name} carries", "what it carries among the others", single, among)
 
     def diffuse_reflectance(self) -> str:
         value = _rows(mi.unpolarized_spectrum(self.bsdf.eval_diffuse_reflectance(self.si)))

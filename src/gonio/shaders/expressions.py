@@ -122,8 +122,8 @@ class ExpressionWriter:
         """The text of a value on the right-hand side of a statement."""
         text = self.expression(value, root=True)[0]
         if self.language.templates and value.op in ("lt", "le", "and", "or") and "," not in text:
-            text = re.sub(r"(?<![\w!])\(([\w.]+ <=? [\w.]+)\)", r"\1", text)  # without a comma, this cannot be parsed
-            as a template
+            # without a comma, these comparisons cannot be parsed as a template
+            text = re.sub(r"(?<![\w!])\(([\w.]+ <=? [\w.]+)\)", r"\1", text)
         return text
 
     def part(self, value: Value, level: int, strict: bool = False) -> str:
