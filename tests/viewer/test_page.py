@@ -185,7 +185,7 @@ def test_other_values_than_tables_were_found_from_are_another_variant() -> None:
         (["conductor"], ["beta=1"], "unknown parameter 'beta'"),
         (["conductor"], ["alpha=-1"], "-1 given"),
         (["conductor(alpha=x)"], [], "'x' given"),
-        (["mitsuba:plastic"], [], "no model of Gonio"),
+        (["mitsuba:plastic"], [], "not a model of Gonio"),
     ],
 )
 def test_what_cannot_be_shown_is_one_clear_error(targets: list[str], parameters: list[str], what: str) -> None:

@@ -134,7 +134,7 @@ def test_a_registered_panel_works_on_the_live_page_under_its_policy(registered: 
 @pytest.mark.parametrize(
     ("script", "said"),
     [
-        ("gonio.addPanel({ id: 'lobe', title: 'Another', mount() {} })", "There is a panel 'lobe' already."),
+        ("gonio.addPanel({ id: 'lobe', title: 'Another', mount() {} })", "A panel 'lobe' already exists."),
         ("gonio.addPanel({ id: 'empty', title: 'Empty' })", "A panel needs an id, a title and mount(host, app)."),
         ("gonio.addPanel({ id: }", "Unexpected token"),
     ],

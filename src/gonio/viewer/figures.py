@@ -106,7 +106,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
 
 
 def parse_value(text: str) -> Any:
-    """A typed value: JSON if possible, with ".3" accepted for 0.3; otherwise the text itself."""
+    """A typed value: JSON if possible, where the leading zero is optional; otherwise the text itself."""
     stripped = text.strip()
     with_zeros = re.sub(r"(?<![\w.])\.(?=\d)", "0.", stripped)
     try:

@@ -134,7 +134,7 @@ def _balls(members: list[BSDF], title: str) -> tuple[Ball, ...]:
 
 
 def _text(value: float | list[float]) -> str:
-    return " ".join(f"{v:.3g}".removeprefix("0") or "0" for v in (value if isinstance(value, list) else [value]))
+    return " ".join(f"{v:.3g}" for v in (value if isinstance(value, list) else [value]))
 
 
 def _listed(value: ArrayLike) -> float | list[float]:
