@@ -341,7 +341,7 @@ def test_an_exposure_is_chosen_by_the_picture(scene: Path, capsys: pytest.Captur
 
 def test_what_clips_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("render", scene, "-o", "a.exr", "--exposure", "1") == 0
-    assert ".exr keeps radiance as it is" in capsys.readouterr().err
+    assert ".exr stores radiance" in capsys.readouterr().err
     for arguments in (["render", scene, "-o", "a.png"], ["convert", "a.exr", "a.png"]):
         assert gonio(*arguments, "--exposure", "9") == 0
         told = re.search(
@@ -372,7 +372,7 @@ def test_convert_keeps_the_picture_and_its_settings(
     before = Path("a.png").read_bytes()
     assert "unknown picture format '.jpg'" in failure(capsys, "convert", "a.exr", "a.jpg")
     assert "cannot read" in failure(capsys, "convert", "b.exr", "a.png")
-    assert "no exposure" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "bright")
+    assert "not an exposure" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "bright")
     assert "-100 to 100" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "nan")
     assert Path("a.png").read_bytes() == before
 

@@ -20,7 +20,7 @@ from gonio.bridge.faults.merged_mesh_bbox import compute_boxes
 from gonio.bridge.faults.shadow_ray_gap import shadow_ray_to
 from gonio.bridge.faults.textured_area_light import must_sample_by_area
 from gonio.bridge.faults.thin_lens_importance import camera_sample
-from gonio.bridge.faults.turned_sphere_normal import with_radial_normal
+from gonio.bridge.faults.rotated_sphere_normal import with_radial_normal
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)
@@ -65,7 +65,7 @@ def test_textured_area_lights_are_sampled_wrongly() -> None:
     assert means[0] != pytest.approx(means[1], rel=0.03)
 
 
-def test_a_turned_sphere_returns_the_normal_of_another() -> None:
+def test_a_rotated_sphere_returns_the_normal_of_another() -> None:
     sphere = mi.load_dict({"type": "sphere", "to_world": T().rotate([1, 0, 0], 90)})
     ps = sphere.sample_position(mi.Float(0), mi.Point2f(0.1, 0.2))
     assert abs(float(dr.dot(ps.n, ps.p)[0])) < 0.9

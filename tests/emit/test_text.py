@@ -145,20 +145,20 @@ def test_unknown_languages_functions_and_things_are_refused() -> None:
     with pytest.raises(go.InputError, match="did you mean 'conductor'"):
         go.emit("conducter")
     assert go.emit("kulla-conty(color=sheet)") == go.emit(go.KullaConty(go.Conductor(alpha=0.3), color="sheet"))
-    with pytest.raises(go.InputError, match="one value a ray given"):
+    with pytest.raises(go.InputError, match="one value per ray given"):
         go.emit(go.Lambert(np.full((5, 3), 0.5)))
 
 
 def test_what_cannot_be_a_shader_is_refused_with_one_clear_error() -> None:
     for refused, words in [
         (lambda: go.emit(GOLD, functions=3), "3 given, names of functions expected"),  # type: ignore[arg-type]
-        (lambda: go.emit(GOLD, functions=()), "no function named"),
-        (lambda: go.emit(GOLD, functions=" , "), "no function named"),
+        (lambda: go.emit(GOLD, functions=()), "no function given"),
+        (lambda: go.emit(GOLD, functions=" , "), "no function given"),
         (lambda: go.emit(GOLD, ["glsl"]), "unknown language"),  # type: ignore[arg-type]
         (lambda: go.emit(go.Lambert(), functions=["terms"]), "Lambert has no terms"),
-        (lambda: go.emit(go.Conductor(alpha=np.array([0.1, 0.2, 0.3]))), "one value a ray given"),
+        (lambda: go.emit(go.Conductor(alpha=np.array([0.1, 0.2, 0.3]))), "one value per ray given"),
         (lambda: go.emit(go.Conductor(eta=1e39)), r"1e\+39 given, at most 3\.4e38"),
-        (lambda: go.emit(go.KullaConty(go.OrenNayar())), "no shader code for it: .* found by sampling"),
+        (lambda: go.emit(go.KullaConty(go.OrenNayar())), "it cannot be written as shader code: .* found by sampling"),
     ]:
         with pytest.raises(go.InputError, match=words):
             refused()
@@ -234,7 +234,7 @@ def test_the_head_tells_how_to_call_it_and_structs_what_their_fields_are(lang: s
     head = text.partition("\n\n")[0]
     own = "material" if lang == "wgsl" else "self"
     assert f"// KullaConty_eval({own}, derived, wo, wi)   the BSDF times |cos theta_i|, RGB, 1/sr" in head
-    assert f"// KullaConty_derive({own})" in head and "KullaConty_terms" not in head and "will not do." in head
+    assert f"// KullaConty_derive({own})" in head and "KullaConty_terms" not in head and "not enough." in head
     assert re.search(r"base_k\b.*// imaginary part of the refractive index, over the outside's; >= 0", text)
     assert "// width of the microfacet distribution; along x, along y; >= 0 and <= 1" in text
     assert re.search(r"pdf\b.*// density of wi, 1/sr", text)

@@ -609,13 +609,13 @@ def message(data: bytes, folder: Path) -> object:
 ])  # fmt: skip
 def link(data: bytes, folder: Path) -> object:
     """The address of the page, and the headers by which the server tells its own page from a stranger's."""
-    from gonio.viewer.server import Door
+    from gonio.viewer.guards import AccessControl
     from starlette.datastructures import Headers
 
     query, _, rest = data.partition(b"|")
     host, _, origin = rest.partition(b"|")
     headers = Headers(raw=[(b"host", host), (b"origin", origin)])
-    return Door("127.0.0.1", "abc").refusal(headers, query, needs_origin=False)
+    return AccessControl("127.0.0.1", "abc").refusal(headers, query, needs_origin=False)
 
 
 @target("options", lambda: [

@@ -135,7 +135,7 @@ def test_a_polarizer_in_an_unpolarized_variant_is_an_error(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"integrator": {"type": "normal"}}, "integrator 'normal', which follows no polarized light"),
+        ({"integrator": {"type": "normal"}}, "integrator 'normal', which does not trace polarized light"),
         ({"integrator": {"type": "whitted"}}, "integrator 'whitted'"),
         ({"ambient": [0.1, 0.1, 0.1]}, "ambient light, which has no polarization"),
     ],

@@ -257,7 +257,7 @@ def test_what_the_examiners_named_is_named() -> None:
 
     for cls, law, words in (
         (ChoiceNumberAgain, "pdf", "u.x chooses a lobe"),
-        (GreyWeight, "weight", "the weight is grey"),
+        (GreyWeight, "weight", "the weight is gray"),
         (OneLobeDensity, "weight", "a missing lobe of a mixture"),
         (CertainOfItself, "delta", "the pdf of delta samples is 1"),
     ):

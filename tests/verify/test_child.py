@@ -121,7 +121,7 @@ def judged(file: Path, name: str, **more: object) -> Report:
         pytest.param("IsDeaf", "no end after 6 s", marks=pytest.mark.slow),
         ("LoopsInAKernel", "no end after 6 s"),
         ("Allocates", "more than 1 GB of memory"),
-        ("Aborts", "the process died: SIGABRT"),
+        ("Aborts", "the process crashed: SIGABRT"),
         ("Leaves", "the process ended itself with exit code 0"),
         ("Exits", "SystemExit in sample"),
         ("KillsItsThread", "KeyboardInterrupt in sample"),

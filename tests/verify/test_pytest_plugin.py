@@ -72,7 +72,7 @@ def installed() -> bool:
 def test_the_fixture_fails_a_test_with_the_report(tmp_path: Path) -> None:
     code, out = foreign(tmp_path)
     assert code == 1 and "3 passed" in out and "1 failed" in out
-    assert "FAILED test_mine.py::test_a_crash" in out and "the process died: SIGABRT (in sample)" in out
+    assert "FAILED test_mine.py::test_a_crash" in out and "the process crashed: SIGABRT (in sample)" in out
 
 
 def test_each_target_and_law_is_a_test(tmp_path: Path) -> None:

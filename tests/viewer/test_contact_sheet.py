@@ -8,7 +8,7 @@ import gonio as go
 import numpy as np
 import pytest
 from gonio.errors import InputError
-from gonio.viewer import contact_sheet, figures
+from gonio.viewer import contact_sheet, figures, sheet_layout
 from gonio.viewer.figures import Drawing
 from gonio.viewer.variations import Variation
 
@@ -101,11 +101,11 @@ def test_no_two_pictures_overlap_in_a_sheet_of_three_parameters(tmp_path: Path) 
 
 @pytest.mark.parametrize(("count", "columns"), [(3, 3), (4, 2), (6, 3), (5, 3), (7, 4)])
 def test_a_row_is_wrapped_to_the_shape_of_a_page(count: int, columns: int) -> None:
-    assert contact_sheet._columns_of_a_row(count, aspect=1.0) == columns
+    assert sheet_layout._columns_of_a_row(count, aspect=1.0) == columns
 
 
 def test_wide_pictures_are_stacked() -> None:
-    assert contact_sheet._columns_of_a_row(5, aspect=10 / 3) == 1
+    assert sheet_layout._columns_of_a_row(5, aspect=10 / 3) == 1
 
 
 @pytest.mark.parametrize("suffix", [".pdf", ".svg"])

@@ -52,13 +52,13 @@ def test_a_curve_is_the_materials_eval_in_the_plane_of_incidence() -> None:
     assert one.angles[0] == -90 and one.angles[-1] == 90
     assert one.mean == pytest.approx(0.5 / np.pi * np.cos(np.radians(one.angles)), abs=1e-6)
     assert one.pdf == pytest.approx(np.cos(np.radians(one.angles)) / np.pi, abs=1e-6)
-    assert one.grey and one.deltas == ()
+    assert one.gray and one.deltas == ()
 
 
 def test_a_highlight_stands_on_the_mirrors_side() -> None:
     one = curves.curve(go.Conductor.preset("Au", alpha=0.05), view=40)
     assert one.angles[one.mean.argmax()] == pytest.approx(40, abs=0.5)
-    assert not one.grey
+    assert not one.gray
 
 
 def test_smooth_glass_splits_its_power_in_two_delta_lobes() -> None:

@@ -82,7 +82,7 @@ def test_values_that_are_no_numbers_are_a_pattern_and_count_as_such(opened: Any,
     picture = page.picture(8)
     bad = np.isnan(picture[..., :3]).any(-1)
     assert 0.05 < bad.sum() / (picture[..., 3] > 0).sum() < 0.95
-    said = r"A 1: \d+ pixels hold no finite number"
+    said = r"A 1: \d+ pixels have no finite value"
     assert re.fullmatch(said + r" \(checkered\)", line(page))
     assert magenta(page) > 0.3 * bad.sum()
     assert page.problems and all(re.fullmatch(said, problem) for problem in page.problems)
@@ -135,7 +135,7 @@ def test_a_value_that_this_page_has_no_tables_for_stays(opened: Any) -> None:
     before = page.picture(4)
     page.control("roughness").first.locator("input[type=number]").fill("0.9")
     page.tab.keyboard.press("Enter")
-    assert "Row A stays as it is" in str(page.tab.locator(".toast").text_content())
+    assert "Row A is unchanged" in str(page.tab.locator(".toast").text_content())
     assert page.state("slots[0].values") == {}
     assert np.array_equal(page.picture(4), before)
     assert page.problems == []

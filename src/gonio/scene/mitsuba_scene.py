@@ -74,7 +74,7 @@ def load_bsdf(path: Path) -> MitsubaBSDF:
     try:
         loaded = instantiated(text, path.parent, mi)
     except Exception as error:
-        raise foreign.refused(error, path.name) from None
+        raise foreign.rejected(error, path.name) from None
     if isinstance(loaded, mi.BSDF):
         return MitsubaBSDF(loaded)
     if isinstance(loaded, mi.Scene):

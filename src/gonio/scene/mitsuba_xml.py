@@ -24,7 +24,7 @@ from ..bridge import plugin_search
 from ..catalog import outside
 from ..errors import InputError, did_you_mean
 from ..measure import SAMPLE, parted
-from ..pictures import formats
+from ..pictures import formats, scene_files
 from . import files, meshes
 
 MAX_BYTES = 64 << 20  # of all files together, and of what parameters add to them
@@ -96,7 +96,7 @@ def readable(name: str, path: Path, folder: Path, location: str, allow_outside: 
     """
     files.checked(path, name, folder, location, allow_outside)
     try:
-        formats.check_file(path)
+        scene_files.check_file(path)
         if path.suffix.lower() == ".ply" or meshes.is_ply(path):  # Mitsuba's reader believes counts and indices
             meshes.read_mesh(path, location, ".ply")
     except formats.Unreadable as error:

@@ -13,16 +13,16 @@ from ..bridge.types import Plugin, Scene
 from ..work import garbage
 from .passes import power_of_two
 
-# Samples in flight of Mitsuba's own integrators, which hold one in each lane: half a second or so on a CPU.
+# Samples in flight of Mitsuba's own integrators, which hold one per lane: about half a second on a CPU.
 WAVEFRONT = 1 << 21
 
 
 class MitsubaRender:
-    """A Mitsuba scene by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
+    """A Mitsuba scene rendered by one of Mitsuba's integrators, in passes of `pass_size` samples with a seed each.
 
-    The picture depends on the seed and the film, not on the clock, up to the last bit: Mitsuba's film adds up with
-    atomics, in an order of their own. A sampler that needs a square number of
-    samples (stratified, multijitter) rounds each pass up; `done` counts what was really taken.
+    The picture depends on the seed and the film, not on timing, except for the last bits: Mitsuba's film adds up with
+    atomics, in arbitrary order. A sampler that needs a square number of samples (stratified, multijitter) rounds each
+    pass up; `done` counts the samples actually taken.
     """
 
     def __init__(
@@ -44,22 +44,23 @@ class MitsubaRender:
         self.done = 0
 
     def advance(self, count: int) -> None:
-        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # apart from the passes of the next seeds
+        seed = (self._seed + self._passes * 0x9E3779B9) & 0xFFFFFFFF  # distinct from the passes of neighboring seeds
         picture = self._render(self._integrator, count, seed)
         samples = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * samples
-        self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
+        # A new array, since `state` has returned the old one.
+        self._sum = weighted if self._sum is None else self._sum + weighted
         self._passes += 1
         self.done += samples
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """The sum so far, and which passes it is of."""
+        """The sum so far, with the number and size of its passes."""
         assert self._sum is not None, "advance() comes first"
         return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError for another film."""
+        """Continue with the next pass: the same picture except for Mitsuba's last bits. ValueError for another film."""
         width, height = self._sensor.film().crop_size()
         if "sum" not in state or "passes" not in state or state["sum"].shape[:2] != (int(height), int(width)):
             raise ValueError("no sum of this film")
@@ -77,7 +78,7 @@ class MitsubaRender:
         return np.repeat(mean[..., :1], 3, axis=2) if mean.shape[2] < 3 else mean[..., :3]
 
     def aov(self) -> dict[str, NDArray[np.float32]]:
-        """Guides for the denoiser: 16 samples see every surface of a pixel that matters to an edge."""
+        """Guides for the denoiser: 16 samples per pixel cover every surface that matters for edges."""
         aovs = self._mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
         channels = self._render(aovs, 16, self._seed)[..., -6:]
         return {"albedo": channels[..., :3], "normal": channels[..., 3:]}

@@ -7,7 +7,7 @@ mitsuba:roughplastic     a plugin, Mitsuba's or one in a folder of GONIO_PLUGINS
 plastic.xml, .json       a Mitsuba description; also as text: '{"type": "plastic"}'
 leather.bsdf             a measured material in the RGL's format
 chest.gltf:Wood          a material of a glTF file
-gold.json                what a fit found, or a material in Gonio's notation
+gold.json                the result of a fit, or a material in Gonio's notation
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
 def resolve(target: str, settings: Sequence[str] = (), sweep: str = "") -> list[Subject]:
-    """The subjects that a target names, one for each value of the sweep.
+    """The subjects that a target names, one per value of the sweep.
 
     settings  "name=value" each
-    sweep     "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
+    sweep     "name=low..high" (5 values, geometric if the range spans a factor of ten or more), or "name=v1,v2,..."
     Raises InputError with the nearest known spelling.
     """
     given = dict(map(notation.assignment, settings))
@@ -79,9 +79,9 @@ def _build(target: str, given: dict[str, str]) -> Subject:
     bsdf = outside.check_operators(bsdf)
     if kind is Kind.NAME:
         return Subject(bsdf, cls.name, values)
-    # what a file describes stands there; what is set beside it is told
-    beside = {*(name.partition(".")[0] for name in given), *texts.assignments(notation.split(target)[1])}
-    return Subject(bsdf, head, {name: value for name, value in values.items() if name in beside})
+    # The file documents its own values; the title shows those that were assigned in addition.
+    assigned = {*(name.partition(".")[0] for name in given), *texts.assignments(notation.split(target)[1])}
+    return Subject(bsdf, head, {name: value for name, value in values.items() if name in assigned})
 
 
 # --------------------------------------------------------------------------- Mitsuba

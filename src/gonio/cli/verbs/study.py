@@ -31,7 +31,7 @@ def study(
     title: Annotated[str, Option(metavar="TEXT", help="Heading of the sheet.")] = "",
     as_json: Json = False,
 ) -> None:
-    """Compare parameters: render a scene with each value and lay the pictures on one labelled sheet.
+    """Compare parameters: render a scene with each value and lay the pictures on one labeled sheet.
 
     One --vary gives a row, two a grid (the first goes down, the second across), more give a grid each. A path leads
     into the scene; of a material it names a parameter, such as p or base.alpha. Several paths of one --vary change
