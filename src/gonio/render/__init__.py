@@ -157,7 +157,7 @@ def _picture(request: Request, level: int) -> RGB:
         notices += prepared.warnings
         beside = None if output is None else checkpoints.beside(output)
         stopped, keeper = execute(prepared, temporary=beside, tell=notices.append)
-        picture = finish.picture_of(prepared.render, request.denoise)
+        picture = finish.picture_of(prepared.render, request.denoise, output)
         error, unmet = finish.estimated(prepared)
         notices += filter(None, [unmet])
         if output is not None:

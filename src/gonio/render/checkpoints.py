@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import files
 from ..errors import GonioError, InputError
 from ..transport.passes import Progress, Renders
 from ..work import garbage, kept
@@ -154,7 +155,7 @@ class Keeper:
 
 def beside(output: Path) -> Path:
     """Where the checkpoint of a picture is that nobody asked for."""
-    return output.with_name(output.name + SUFFIX)
+    return files.with_ending(output, SUFFIX)
 
 
 def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]:

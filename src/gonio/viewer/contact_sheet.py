@@ -194,14 +194,14 @@ def render_sheet(
         last = prepared[-1]
         width, height = last.size
         report(len(cells), len(cells), "drawing")
-    exposure = exposures.stops(request.exposure, *pictures)
-    clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
-    notices |= dict.fromkeys(filter(None, [clipped]))
-    heading = title or _scene_name(request.scene)
-    subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
-    drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
-    if output is not None:
-        drawing = drawing.save(output)
+        exposure = exposures.stops(request.exposure, *pictures)
+        clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
+        notices |= dict.fromkeys(filter(None, [clipped]))
+        heading = title or _scene_name(request.scene)
+        subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
+        drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
+        if output is not None:  # in here: where it fails, the same command goes on from the pictures
+            drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
 

@@ -54,8 +54,8 @@ class Drawing:
 
     def save(self, path: str | Path) -> Drawing:
         """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
-        target = check_output(Path(path))
-        return replace(self, path=files.write_whole(target, lambda part: self._fill(part, target.suffix.lower()[1:])))
+        suffix = _suffix(Path(path))
+        return replace(self, path=files.write_whole(path, lambda part: self._fill(part, suffix[1:])))
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
@@ -72,11 +72,17 @@ class Drawing:
 
 def check_output(path: Path) -> Path:
     """Raise InputError where no figure can be written to `path`: before anything is computed."""
-    if path.suffix.lower() not in SUFFIXES:
-        hint = did_you_mean(path.suffix.lower(), SUFFIXES) if path.suffix else "add " + " or ".join(SUFFIXES)
-        raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
+    _suffix(path)
     files.check_file(path)
     return path
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
+        raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
+    return suffix
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:

@@ -151,6 +151,7 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     if found is None:
         raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
     described = read(*found)
+    files.check_file(output)
     if output.suffix.lower() == ".json":
         text = json.dumps(for_scenes(described.notation), indent=2) + "\n"
         files.write_whole(output, text.encode())

@@ -16,6 +16,7 @@ from ...errors import InputError
 from ...fitting.fit import Fit, moving_of
 from ...material import BSDF
 from ...measure import format_of
+from ...measure.formats.base import Format
 from ...owner import public
 from . import advice, fitting, geometry, pixels, planning
 from . import calibration as calibrations
@@ -88,12 +89,11 @@ class Capture:
 
     def save(self, path: str | Path) -> Path:
         """Write the samples as a table (.gonio, .binary, .astm, ...), or all that was found as .json."""
-        target = check_output(Path(path))
-        if target.suffix.lower() == ".json":
+        if Path(path).suffix.lower() == ".json":
             text = json.dumps(self.as_dict(), indent=1)
-            return files.write_whole(target, (text + "\n").encode())
-        form = format_of(target)
-        return files.write_whole(target, form.write(form.resampled(self.samples.table)))
+            return files.write_whole(path, (text + "\n").encode())
+        form = _table_format(Path(path))
+        return files.write_whole(path, form.write(form.resampled(self.samples.table)))
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -131,10 +131,16 @@ class Capture:
 def check_output(path: Path) -> Path:
     """Raise InputError where the result cannot be written, before anything is computed."""
     if path.suffix.lower() != ".json":
-        form = format_of(path)
-        if not form.writes:
-            raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
+        _table_format(path)
     return files.check_file(path)
+
+
+def _table_format(path: Path) -> Format:
+    """The format of tables that the suffix names. Raises InputError where it cannot be written."""
+    form = format_of(path)
+    if not form.writes:
+        raise InputError(f"{form.name} files cannot be written", str(path), "such as -o gold.gonio")
+    return form
 
 
 @public
