@@ -151,8 +151,8 @@ def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], els
 
 
 def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool = False) -> Path | None:
-    """The file or folder that `fill` made, of the target's name, in a new folder beside the target, in the current folder
-    or among the temporary files; None where there is no room in any.
+    """The file or folder that `fill` made, with the target's name, in a new folder: beside the target, in the current
+    folder or among the temporary files; None where there is no room in any.
 
     elsewhere  not beside the target: its disk is full
     """

@@ -120,7 +120,8 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None is the one that was asked for, if one was
+    output      file to write; None is the one that was asked for, if one was: in the checkpoint's folder, or under its
+                name beside the checkpoint, with a warning
     spp         samples per pixel in all; None is what was asked for
     allow_code  let it run Python files that its scene names
     Raises InputError where the checkpoint is damaged, and where anything that the picture depends on has changed.
@@ -136,10 +137,11 @@ def resume(
         timeout=timeout,
     )
     change.check()
-    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=5)
+    request, notice = checkpoints.asked_again(Path(checkpoint), change, allow_code)
+    return _picture(request, 5, notice)
 
 
-def _picture(request: Request, level: int) -> RGB:
+def _picture(request: Request, level: int, notice: str = "") -> RGB:
     """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
     import warnings
 
@@ -150,7 +152,7 @@ def _picture(request: Request, level: int) -> RGB:
     from .execute import execute
     from .prepare import prepare
 
-    notices: list[str] = []
+    notices = [notice] if notice else []
     output, exposure = request.output, request.exposure
     with engine.put_back():
         prepared = prepare(request)
