@@ -206,7 +206,7 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
 
 
 def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
-    """The request of a checkpoint, with what `gonio resume` was asked for: output, spp, timeout and threads; and what to
+    """The request of a checkpoint, with what `gonio resume` was asked for (output, spp, timeout, threads); and what to
     tell of where its picture is written.
 
     writes  the picture is written, under the name that the scene gives it where the render was asked for no other
