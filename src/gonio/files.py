@@ -18,12 +18,17 @@ MAX_NAME = 255  # bytes of a file's name, on nearly all file systems
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
+def check_current_folder() -> None:
+    """Raise InputError where the current folder has been deleted: libraries in C++ end the process then."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        raise InputError(f"no current folder: {_reason(error)}", "", "cd to a folder that exists") from None
+
+
 def check_file(path: str | Path) -> Path:
     """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
-    try:
-        target = Path(path).expanduser()
-    except RuntimeError as error:  # ~nobody
-        raise InputError(f"no such home folder: {error}", str(path), "write the folder out") from None
+    target = Path(os.path.expanduser(path))
     try:
         if target.is_symlink():
             target = target.resolve()
@@ -49,10 +54,7 @@ def check_file(path: str | Path) -> Path:
 
 def check_folder(folder: str | Path) -> Path:
     """The folder, if it exists or can be made where it is named; InputError before anything is computed where not."""
-    try:
-        folder = Path(folder).expanduser()
-    except RuntimeError as error:
-        raise InputError(f"no such home folder: {error}", str(folder), "write the folder out") from None
+    folder = Path(os.path.expanduser(folder))
     if not os.path.isdir(folder):
         if os.path.exists(folder):
             raise InputError(f"'{folder}' is a file", str(folder), "choose another folder with -o")
@@ -78,6 +80,8 @@ def with_ending(path: Path, ending: str, start: str = "") -> Path:
 
     A name that would be longer than file systems allow is cut, and has a sum of the whole name in its place.
     """
+    if not path.name:  # "." or "/"
+        return path / (start + ending)
     name, room = os.fsencode(path.name), MAX_NAME - len(os.fsencode(start + ending))
     if len(name) > room:
         name = name[: room - 9] + f"-{zlib.crc32(name):08x}".encode()

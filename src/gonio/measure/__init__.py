@@ -58,7 +58,7 @@ def read(file: str | os.PathLike[str]) -> Measurement:
     Raises InputError for what is missing, damaged, or of no known format.
     """
     text, item = parted(os.fspath(file))
-    path = Path(__file__).parent / "sample.gonio" if text == SAMPLE else Path(text).expanduser()
+    path = Path(__file__).parent / "sample.gonio" if text == SAMPLE else Path(os.path.expanduser(text))
     format_of(path)
     try:
         about = path.stat()

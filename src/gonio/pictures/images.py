@@ -8,6 +8,7 @@ of the Radiance header, or an array named `metadata` in an .npz.
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 import zlib
@@ -218,7 +219,7 @@ def read(path: str | Path, encoding: str = "srgb") -> Picture:
     """
     if encoding not in ENCODINGS:
         raise InputError(f"unknown encoding '{encoding}'", "--encoding", did_you_mean(encoding, ENCODINGS))
-    source = Path(path).expanduser()
+    source = Path(os.path.expanduser(path))
     suffix = source.suffix.lower()
     if suffix not in SUFFIXES:
         what = f"unknown picture format '{source.suffix}'"

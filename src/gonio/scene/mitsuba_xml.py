@@ -200,7 +200,7 @@ class _Reader:
     # ------------------------------------------------------------------ parameters
 
     def replaced(self, value: str, location: str) -> str:
-        """A value with the values of parameters in place of their names: of the longest name that stands behind each $."""
+        """A value with the values of parameters in place of their names: behind each $ the longest name counts."""
         if "$" not in value:
             return value
         first, *others = re.split(r"(?<!\\)\$", value)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..bridge import engine
 from ..catalog import notation, operands
 from ..catalog.operands import Kind
-from ..errors import GonioWarning, InputError
+from ..errors import GonioWarning, InputError, encodable
 from ..material import BSDF
 from ..owner import public
 from ..pictures import exposures, images
@@ -197,7 +197,7 @@ def render_sheet(
         exposure = exposures.stops(request.exposure, *pictures)
         clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
         notices |= dict.fromkeys(filter(None, [clipped]))
-        heading = title or _scene_name(request.scene)
+        heading = encodable(title or _scene_name(request.scene))
         subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
         drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
         if output is not None:  # in here: where it fails, the same command goes on from the pictures

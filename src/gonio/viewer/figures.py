@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .. import files
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, encodable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -64,10 +64,15 @@ class Drawing:
 
     def _fill(self, file: Path | BinaryIO, kind: str) -> None:
         import matplotlib
+        from matplotlib.text import Text
 
+        for text in self.figure.findobj(Text):  # names of files may be no text, which fonts refuse
+            text.set_text(encodable(text.get_text()))
         name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
         with matplotlib.rc_context(STYLE):
-            self.figure.savefig(file, format=kind, dpi=self.dpi, metadata={name: self.about}, facecolor="white")
+            self.figure.savefig(
+                file, format=kind, dpi=self.dpi, metadata={name: encodable(self.about)}, facecolor="white"
+            )
 
 
 def check_output(path: Path) -> Path:
@@ -150,5 +155,5 @@ def show_value(value: object, longest: int = 28) -> str:
     elif isinstance(value, dict):
         text = str(value.get("type", json.dumps(value)))
     else:
-        text = str(value)
+        text = encodable(str(value))
     return text if len(text) <= longest else text[: longest - 1] + "…"

@@ -11,6 +11,7 @@ are the modules of this package.
 from __future__ import annotations
 
 import json
+import os
 import re
 import warnings
 from collections.abc import Callable, Mapping
@@ -85,7 +86,7 @@ def parted(text: str) -> tuple[Document, Path, str] | None:
     for document in Document.family.all().values():
         for suffix in document.suffixes:
             match = re.fullmatch(rf"(.+?{re.escape(suffix)})(?::(.+))?", text, re.IGNORECASE | re.DOTALL)
-            if match and document.holds(path := Path(match[1]).expanduser()):
+            if match and document.holds(path := Path(os.path.expanduser(match[1]))):
                 return document, path, match[2] or ""
     return None
 
