@@ -397,3 +397,26 @@ def test_a_second_ctrl_c_ends_at_once_and_leaves_no_file(endless: Path, tmp_path
     assert process.returncode == 128 + signal.SIGINT
     # Where the pass ended between the two, the picture is kept, and whole; never is a part of it left.
     assert [entry.name for entry in output.parent.iterdir() if "checkpoint" not in entry.name] in ([], ["a.exr"])
+
+
+FAILS = {
+    '<integrator type="path"><integer name="samples_per_pass" value="3"/></integrator>': r"must be a multiple of",
+    '<integrator type="aov"><string name="aovs" value=""/></integrator>': "Mitsuba cannot render it",
+}
+BUMP = """<shape type="cube"><bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="diffuse"/></bsdf></shape>"""
+
+
+@pytest.mark.parametrize("element", FAILS)
+def test_what_mitsuba_cannot_render_is_an_error_of_the_scene(element: str, tmp_path: Path) -> None:
+    path = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
+    (tmp_path / "a.xml").write_text(XML.replace(path, element))
+    with pytest.raises(InputError, match=FAILS[element]) as caught:
+        render_to_file(Request(tmp_path / "a.xml", tmp_path / "a.exr", spp=4))
+    assert caught.value.where == str(tmp_path / "a.xml")
+
+
+@pytest.mark.parametrize("integrator", [None, "path"])
+def test_a_plugin_that_is_not_made_for_it_is_an_error_of_the_scene(integrator: str | None, tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text(XML.replace("<shape", f"{BUMP}<shape", 1))
+    with pytest.raises(InputError, match=r"Mitsuba cannot render it: \[Texture\] .*not implemented"):
+        render_to_file(Request(tmp_path / "a.xml", tmp_path / "a.exr", spp=4, integrator=integrator))

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..scene import mitsuba_scene
+from ..transport.mitsuba_render import MitsubaRender
 from ..transport.passes import Progress, run
 from ..work import crew
 from . import checkpoints
 from .checkpoints import Keeper
 from .prepare import Prepared
+
+
+def of_scene(prepared: Prepared) -> AbstractContextManager[None]:
+    """Inside, what the plugins of a Mitsuba scene cannot do is an error of the scene's."""
+    if not prepared.request.is_mitsuba:
+        return nullcontext()
+    return mitsuba_scene.rendering(prepared.request.scene, isinstance(prepared.render, MitsubaRender))
 
 
 def execute(
@@ -65,14 +75,15 @@ def execute(
             )
             gathered.give()
         else:
-            stopped = run(
-                prepared.render,
-                goal,
-                width * height,
-                timeout=request.timeout,
-                report=after,
-                interrupted=interrupted,
-            )
+            with of_scene(prepared):
+                stopped = run(
+                    prepared.render,
+                    goal,
+                    width * height,
+                    timeout=request.timeout,
+                    report=after,
+                    interrupted=interrupted,
+                )
         keeper.end(bool(stopped))
     finally:
         keeper.close()
