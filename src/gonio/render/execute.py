@@ -55,10 +55,10 @@ def execute(
     if isinstance(prepared.render, until.Until):
         drawing = prepared.render
         goal = lambda: drawing.goal  # noqa: E731
-        if crew.current().size > 1:
+        if crew.current().remote:
             what = "workers render parts of a picture, and its error is that of the whole"
             raise InputError(what, "--until-error", "leave --workers or the cluster out, or give --spp in its place")
-    elif crew.current().size > 1 and prepared.render.done < prepared.spp:
+    elif crew.current().remote and prepared.render.done < prepared.spp:
         tiles.travelling(prepared)  # what cannot travel is said before anything is written
         assert isinstance(prepared.render, integrators.Render)
         gathered = tiles.Gathered(prepared.render, prepared.spp)

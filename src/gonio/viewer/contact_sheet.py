@@ -182,7 +182,7 @@ def render_sheet(
     with passes.Interrupts() as interrupts, parts.job("study", *whole) as job:
         if job.found:
             tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
-        together = 1 if crew.current().size == 1 else 2 * crew.current().size  # of a crew each needs enough to do
+        together = 2 * crew.current().size if crew.current().remote else 1  # of a crew each needs enough to do
         for start in range(0, len(cells), together):
             some = cells[start : start + together]
             state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
@@ -229,7 +229,7 @@ def _pictures(prepared: Sequence[Prepared], job: parts.Parts, interrupts: passes
         found[key] = picture_of(one.render, one.request.denoise)
         job.put(key, {"picture": found[key]})
 
-    if crew.current().size > 1 and missing:
+    if crew.current().remote and missing:
         by_crew([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
         interrupts.check()
     else:
