@@ -62,7 +62,8 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
     threads  how many cores to use; None leaves Dr.Jit's default (all)
     Raises MachineError where no usable LLVM or no GPU is found, InputError where the current folder has been deleted.
     """
-    files.check_current_folder()  # without one, Mitsuba ends the process
+    if "mitsuba" not in sys.modules:
+        files.check_current_folder()  # without one, importing Mitsuba ends the process
     import mitsuba as mi
 
     _own(mi)
