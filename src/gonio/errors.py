@@ -17,8 +17,12 @@ def printable(text: str) -> str:
 
     Numbers with very many digits are shortened.
     """
-    readable = text.encode("utf-8", "backslashreplace").decode()
-    return _ENDLESS.sub(lambda number: f"{number[0][:20]}... ({len(number[0])} digits)", readable)
+    return _ENDLESS.sub(lambda number: f"{number[0][:20]}... ({len(number[0])} digits)", encodable(text))
+
+
+def encodable(text: str) -> str:
+    """The text with what no encoding has, such as bytes of a file's name that are no UTF-8, written as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 class GonioError(Exception):

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import gonio as go
 import numpy as np
 import pytest
@@ -161,3 +166,20 @@ def test_values_of_a_material_change_by_path() -> None:
     assert found == go.KullaConty(go.Conductor.preset("Au", alpha=(0.1, 0.2), ndf="beckmann"))
     with pytest.raises(InputError, match="no parameter 'alhpa'"):
         notation.changed(gold, {"base.alhpa": 0.1})
+
+
+def test_naming_a_material_finds_no_tables(tmp_path: Path) -> None:
+    """They take up to half a minute and hundreds of megabytes: they are found when a formula first asks."""
+    program = (
+        "import sys, gonio as go\n"
+        "from gonio.catalog import notation\n"
+        "for name in set(go.models()) - {'measured'}:  # that reads its file\n"
+        "    try: notation.named(name)\n"
+        "    except go.InputError: pass  # a required parameter is missing\n"
+        "notation.named('coat(base=kulla-conty(base=conductor),alpha=.3)')\n"
+        "assert 'drjit' not in sys.modules"
+    )
+    environment = {**os.environ, "GONIO_CACHE": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not list(tmp_path.rglob("*.np*"))

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from types import ModuleType
 
-from .. import llvm
+from .. import files, llvm
 from ..errors import InputError, MachineError
 from ..owner import COMPUTING, exclusive
 from . import plugin_search
@@ -60,8 +60,10 @@ def load(device: str | None = None, spectral: bool = False, threads: int | None 
     """Import Mitsuba and set a variant: the current one if `device` is None and one is set, else `variant_for`.
 
     threads  how many cores to use; None leaves Dr.Jit's default (all)
-    Raises MachineError if no usable LLVM or no GPU is found.
+    Raises MachineError where no usable LLVM or no GPU is found, InputError where the current folder has been deleted.
     """
+    if "mitsuba" not in sys.modules:
+        files.check_current_folder()  # without one, importing Mitsuba ends the process
     import mitsuba as mi
 
     _own(mi)

@@ -9,6 +9,7 @@ Numbers and albedos among the properties of a plugin become parameters of the ma
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -223,9 +224,9 @@ _registered: dict[Path, dict[str, object]] = {}  # registered plugins by the pat
 
 
 def plugin_in(target: str, properties: Mapping[str, object]) -> MitsubaBSDF | None:
-    """The plugin of FILE.py:NAME, where NAME is the name under which the file registers it or its class; None if the
-    file registers no such plugin."""
-    path = Path(target.rpartition(":")[0]).expanduser().resolve()
+    """The plugin that FILE.py:NAME names, by the name under which the file registers it or by its class; None where
+    the file registers none of that name."""
+    path = Path(os.path.expanduser(target.rpartition(":")[0])).resolve()
     name = target.rpartition(":")[2]
     if not path.is_file() or b"register_bsdf" not in path.read_bytes():
         return None

@@ -257,7 +257,9 @@ def for_files(material: BSDF) -> dict[str, object] | None:
 
 
 def from_json(described: Mapping[str, object]) -> BSDF:
-    """The material that `as_json` describes."""
+    """The material that `as_json` describes. Raises InputError for anything else."""
+    if not isinstance(described, Mapping) or "type" not in described:
+        raise InputError(f"{described!r:.60} describes no material", "material", 'such as {"type": "conductor"}')
     fields = dict(described)
     return made(class_named(str(fields.pop("type")), "material"), fields)[0]
 

@@ -150,8 +150,8 @@ def _type_of(text: str) -> str:
 
 
 def _type_of_file(text: str) -> str:
-    """The type of a description in a .json, "" for other documents."""
-    path = Path(text).expanduser()
+    """The type of a description in a .json, "" of other documents."""
+    path = Path(os.path.expanduser(text))
     try:
         return _type_of(path.read_text(encoding="utf-8")) if path.suffix.lower() == ".json" else ""
     except (OSError, ValueError):

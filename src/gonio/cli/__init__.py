@@ -23,8 +23,9 @@ def main(arguments: list[str] | None = None) -> None:
     """The `gonio` command."""
     import sys
 
-    from . import signals
+    from . import signals, streams
 
+    streams.prepare()
     with signals.at_once():
         from . import app
     with signals.as_exceptions() as ended:

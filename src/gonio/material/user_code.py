@@ -10,6 +10,7 @@ import ast
 import hashlib
 import importlib.util
 import inspect
+import os
 import re
 import sys
 import traceback
@@ -72,9 +73,9 @@ def thing(text: str, folder: Path | None = None, where: str = "MODEL") -> object
     if match is None:
         raise InputError(f"'{text}' names no class in a file", where, "FILE.py:CLASS, such as ward.py:Ward")
     try:
-        path = ((folder or Path()) / Path(match["file"]).expanduser()).resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # circular links, an unknown user, a zero byte
-        raise InputError(f"'{match['file']}' is not the path of a file: {error}", where, "FILE.py:CLASS") from None
+        path = ((folder or Path()) / Path(os.path.expanduser(match["file"]))).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # links in a circle, no such user, a zero byte
+        raise InputError(f"'{match['file']}' is no path of a file: {error}", where, "FILE.py:CLASS") from None
     module, name = module_of(path, where), match["name"]
     named = vars(module).get(name)
     if not isinstance(named, type) and not isinstance(getattr(named, "family", None), members.Family):

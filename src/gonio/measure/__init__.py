@@ -59,7 +59,7 @@ def read(file: str | os.PathLike[str]) -> Measurement:
     Raises InputError for files that are missing, damaged, or of unknown format.
     """
     text, item = parted(os.fspath(file))
-    path = Path(__file__).parent / "sample.gonio" if text == SAMPLE else Path(text).expanduser()
+    path = Path(__file__).parent / "sample.gonio" if text == SAMPLE else Path(os.path.expanduser(text))
     format_of(path)
     try:
         about = path.stat()

@@ -23,7 +23,7 @@ def describe(file: str | os.PathLike[str]) -> dict[str, Any]:
     Raises InputError as `read` does.
     """
     text, item = parted(os.fspath(file))
-    path = Path(text).expanduser()
+    path = Path(os.path.expanduser(text))
     if not item and text != SAMPLE:
         data = contents(path)
         items = format_of(path, data).items(data, str(path))

@@ -8,6 +8,7 @@ of the Radiance header, or an array named `metadata` in an .npz.
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 import zlib
@@ -23,7 +24,7 @@ from .. import archives, files
 from ..bridge import engine
 from ..bridge.faults.exr_threads import file_threads
 from ..catalog.operands import PICTURE_SUFFIXES
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, MachineError, did_you_mean, encodable, summary
 from ..owner import exclusive
 from . import exposures, formats
 
@@ -52,37 +53,54 @@ class Picture:
 
 
 def check_writable(path: str | Path) -> Path:
-    """The file that `path` will become (links followed), or an InputError before hours are spent on it."""
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        hint = did_you_mean(target.suffix.lower(), SUFFIXES) if target.suffix else "add " + " or ".join(SUFFIXES)
-        raise InputError(f"unknown picture format '{target.suffix}'", str(path), hint)
-    return files.check_file(target)
+    """The file `path` will become (links followed), or an InputError before hours are spent on it."""
+    _suffix(path)
+    return files.check_file(path)
+
+
+def _suffix(path: str | Path) -> str:
+    """The suffix of a picture's file, in lower case. Raises InputError for one that no picture has."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
+        raise InputError(f"unknown picture format '{Path(path).suffix}'", str(path), hint)
+    return suffix
 
 
 @exclusive
 def write(path: str | Path, pixels: RGB, metadata: Metadata | None = None, exposure: float = 0.0) -> Path:
     """Write a picture in the format of its suffix, completely or not at all.
 
-    exposure  stops; PNG only, since the other formats store radiance
+    exposure  stops; PNG only, since the other formats keep radiance as it is
+    Raises InputError for what is no picture, or no picture's name; InputError or MachineError where it cannot be
+    written, which says where the picture is instead.
     """
-    target = check_writable(path)
+    suffix = _suffix(path)
     if np.iscomplexobj(pixels):
         raise InputError("complex numbers given, an RGB picture expected", str(path))
     picture = np.ascontiguousarray(pixels, dtype=np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or picture.size == 0:
         raise InputError(f"expected an RGB picture of shape (H, W, 3), got {picture.shape}", str(path))
-    settings = dict(metadata or {})
-    suffix = target.suffix.lower()
-    if suffix == ".png":
-        content = png_bytes(to_screen(picture, exposure), settings)
-    elif suffix == ".npz":
-        content = _npz_bytes(picture, settings)
-    elif suffix == ".hdr":
-        content = _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
-    else:
-        content = _bitmap_bytes(picture, settings, "OpenEXR")
+    # Names of files are bytes on some systems; no format can hold those that are no text.
+    settings = {key: encodable(value) if isinstance(value, str) else value for key, value in (metadata or {}).items()}
+    try:
+        content = _encoded(suffix, picture, settings, exposure)
+    except Exception as error:  # whatever a library says: the picture must not be lost
+        array = _npz_bytes(picture, {})
+        kept = files.keep_elsewhere(Path(path).with_suffix(".npz"), lambda file: file.write_bytes(array))
+        hint = "nothing was written" if kept is None else f"it is kept as {kept}: `gonio convert` reads that"
+        raise MachineError(f"cannot be written as {suffix}: {summary(error)}", str(path), hint) from error
     return files.write_whole(path, content)
+
+
+def _encoded(suffix: str, picture: RGB, settings: Metadata, exposure: float) -> bytes:
+    if suffix == ".png":
+        return png_bytes(to_screen(picture, exposure), settings)
+    if suffix == ".npz":
+        return _npz_bytes(picture, settings)
+    if suffix == ".hdr":
+        return _with_comments(_bitmap_bytes(picture, {}, "RGBE"), settings)
+    return _bitmap_bytes(picture, settings, "OpenEXR")
 
 
 class Shown(NamedTuple):
@@ -201,7 +219,7 @@ def read(path: str | Path, encoding: str = "srgb") -> Picture:
     """
     if encoding not in ENCODINGS:
         raise InputError(f"unknown encoding '{encoding}'", "--encoding", did_you_mean(encoding, ENCODINGS))
-    source = Path(path).expanduser()
+    source = Path(os.path.expanduser(path))
     suffix = source.suffix.lower()
     if suffix not in SUFFIXES:
         what = f"unknown picture format '{source.suffix}'"

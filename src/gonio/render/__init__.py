@@ -120,7 +120,8 @@ def resume(
 
         picture = go.resume("phong.exr.checkpoint", spp=1024)
 
-    output      file to write; None is the one that was asked for, if one was
+    output      file to write; None is the one that was asked for, if one was: in the checkpoint's folder, or under its
+                name beside the checkpoint, with a warning
     spp         samples per pixel in all; None is what was asked for
     allow_code  let it run Python files that its scene names
     Raises InputError where the checkpoint is damaged, and where anything that the picture depends on has changed.
@@ -136,10 +137,11 @@ def resume(
         timeout=timeout,
     )
     change.check()
-    return _picture(checkpoints.asked_again(Path(checkpoint), change, allow_code), level=5)
+    request, notice = checkpoints.asked_again(Path(checkpoint), change, allow_code)
+    return _picture(request, 5, notice)
 
 
-def _picture(request: Request, level: int) -> RGB:
+def _picture(request: Request, level: int, notice: str = "") -> RGB:
     """Render it, write it where an output is named, and warn of what is to be known, at the caller `level` calls up."""
     import warnings
 
@@ -150,14 +152,14 @@ def _picture(request: Request, level: int) -> RGB:
     from .execute import execute
     from .prepare import prepare
 
-    notices: list[str] = []
+    notices = [notice] if notice else []
     output, exposure = request.output, request.exposure
     with engine.put_back():
         prepared = prepare(request)
         notices += prepared.warnings
         beside = None if output is None else checkpoints.beside(output)
         stopped, keeper = execute(prepared, temporary=beside, tell=notices.append)
-        picture = finish.picture_of(prepared.render, request.denoise)
+        picture = finish.picture_of(prepared.render, request.denoise, output)
         error, unmet = finish.estimated(prepared)
         notices += filter(None, [unmet])
         if output is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -44,6 +45,11 @@ class Request:
     checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from
     until_error: float | None = None  # relMSE at which to stop; `spp` is then the most
     gradient: tuple[str, ...] = ()  # paths of values in the scene, along which the picture is differentiated
+
+    @property
+    def is_mitsuba(self) -> bool:
+        """Whether the scene is a Mitsuba scene's file."""
+        return self.material is None and self.scene.suffix.lower() == ".xml" and os.path.isfile(self.scene)
 
     def check(self) -> None:
         """Raise InputError for an option that cannot be, before anything is loaded."""

@@ -31,6 +31,7 @@ MAX_BYTES = 64 << 20  # of all files together, and of what parameters add to the
 MAX_ELEMENTS = 1_000_000
 MAX_DEPTH = 64
 MAX_INCLUDES = 15  # inside each other, as Mitsuba has it
+MAX_PARAMETER = 100  # characters of a parameter's name: as many are compared behind each $
 MAX_VALUE = 1 << 20  # characters of a value in which parameters are replaced
 
 # elements that stand for an object, which a plugin makes
@@ -82,7 +83,7 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
     unused = [name for name in parameters if name not in reader.used]
     if unused:
         known = [name for name in reader.values if name not in unused]
-        hint = did_you_mean(unused[0], known) if known else "parameters stand as $name in its values"
+        hint = did_you_mean(unused[0], known[:200]) if known else "parameters stand as $name in its values"
         raise InputError(f"the scene has no parameter '{unused[0]}'", str(file), hint)
     return SceneText("\n".join(reader.lines) + "\n", reader.origins, reader.files, reader.sources, reader.runs_code)
 
@@ -141,6 +142,7 @@ class _Reader:
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
         self.folder = file.parent.resolve()
         self.values, self.used = dict(parameters), set[str]()
+        self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # of the parameters' names
         self.allow_outside, self.allow_code = allow_outside, allow_code
         self.lines: list[str] = []
         self.origins: list[tuple[Path, int]] = []
@@ -198,24 +200,40 @@ class _Reader:
     # ------------------------------------------------------------------ parameters
 
     def replaced(self, value: str, location: str) -> str:
-        """A value with the values of parameters in place of their names, the longest name first."""
+        """A value with the values of parameters in place of their names: behind each $ the longest name counts."""
         if "$" not in value:
             return value
-        for name in sorted(self.values, key=len, reverse=True):
-            parts = re.split(rf"(?<!\\){re.escape('$' + name)}", value)
-            if len(parts) == 1:
-                continue
+        first, *others = re.split(r"(?<!\\)\$", value)
+        result, length = [first.replace("\\$", "$")], len(first)
+        for text in others:
+            name = next((text[:n] for n in self.lengths if text[:n] in self.values), None)
+            if name is None:
+                unknown = re.match(r"\w*", text)[0]  # type: ignore[index]  # it matches any text
+                hint = did_you_mean(unknown, list(self.values)[:200]) if self.values else "give it a <default>"
+                raise InputError(f"the parameter ${unknown} has no value", location, hint)
             self.used.add(name)
-            more = (len(parts) - 1) * len(self.values[name])
-            self.grown += more
-            if len(value) + more > MAX_VALUE or self.grown > MAX_BYTES:
+            self.count(location)
+            rest = text[len(name) :].replace("\\$", "$")
+            length += len(self.values[name]) + len(rest)
+            self.grown += len(self.values[name])
+            if length > MAX_VALUE or self.grown > MAX_BYTES:
                 raise InputError(f"parameters such as ${name} make too long a text", location, "write values out")
-            value = self.values[name].join(parts)
-        unknown = re.search(r"(?<!\\)\$(\w*)", value)
-        if unknown:
-            hint = did_you_mean(unknown[1], list(self.values)) if self.values else "give it a <default>"
-            raise InputError(f"the parameter ${unknown[1]} has no value", location, hint)
-        return value.replace("\\$", "$")
+            result += [self.values[name], rest]
+        return "".join(result)
+
+    def add(self, name: str, value: str, location: str) -> None:
+        """A parameter's value, where none is given."""
+        if len(name) > MAX_PARAMETER:
+            raise InputError(f"a parameter's name of {len(name)} characters", location, f"use {MAX_PARAMETER} or fewer")
+        self.values.setdefault(name, value)
+        if len(name) not in self.lengths:
+            self.lengths = sorted({*self.lengths, len(name)}, reverse=True)
+
+    def count(self, location: str) -> None:
+        """One more element, or parameter that is replaced."""
+        self.elements += 1
+        if self.elements > MAX_ELEMENTS:
+            raise InputError(f"more than {MAX_ELEMENTS} elements", location, "keep large data in other files")
 
 
 class _File:
@@ -240,9 +258,7 @@ class _File:
 
     def _start(self, tag: str, given: dict[str, str]) -> None:
         scene = self.scene
-        scene.elements += 1
-        if scene.elements > MAX_ELEMENTS:
-            raise InputError(f"more than {MAX_ELEMENTS} elements", self.location, "keep large data in other files")
+        scene.count(self.location)
         if len(self.open) >= MAX_DEPTH:
             raise InputError(f"more than {MAX_DEPTH} elements inside each other", self.location)
         if len(self.open) > 1 and not self.open[-1]:
@@ -286,7 +302,7 @@ class _File:
 
     def _default(self, attributes: Mapping[str, str]) -> None:
         name, value = self._required("default", attributes, "name", "value")
-        self.scene.values.setdefault(name, value)
+        self.scene.add(name, value, self.location)
 
     def _path(self, attributes: Mapping[str, str]) -> None:
         (value,) = self._required("path", attributes, "value")

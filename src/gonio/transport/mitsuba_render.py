@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge.types import Plugin, Scene
+from ..errors import InputError
 from ..work import garbage
 from .passes import power_of_two
 
@@ -38,7 +39,8 @@ class MitsubaRender:
         self._integrator = scene.integrator() if integrator is None else integrator
         self._sensor = scene.sensors()[0]
         width, height = self._sensor.film().crop_size()
-        self.pass_size = min(spp, power_of_two(max(1, (wavefront or WAVEFRONT) // (int(width) * int(height)))))
+        self._largest_pass = power_of_two(max(1, (wavefront or WAVEFRONT) // (int(width) * int(height))))
+        self.pass_size = min(spp, self._largest_pass)
         self._sum: NDArray[np.float64] | None = None
         self._passes = 0
         self.done = 0
@@ -49,8 +51,10 @@ class MitsubaRender:
         samples = int(self._sensor.sampler().sample_count())
         # In float64: a sum of thousands of float32 passes would lose digits.
         weighted = picture.astype(np.float64) * samples
-        # A new array, since `state` has returned the old one.
-        self._sum = weighted if self._sum is None else self._sum + weighted
+        if self._sum is not None and self._sum.shape != weighted.shape:
+            what = f"a picture of {weighted.shape[2]} channels is added to a checkpoint of {self._sum.shape[2]}"
+            raise InputError(what, "checkpoint", "render anew without it")
+        self._sum = weighted if self._sum is None else self._sum + weighted  # a new one: `state` is of the old
         self._passes += 1
         self.done += samples
 
@@ -60,11 +64,16 @@ class MitsubaRender:
         return {"sum": self._sum, "passes": np.array([self._passes, self.pass_size], np.int64)}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue with the next pass: the same picture except for Mitsuba's last bits. ValueError for another film."""
+        """Go on with the next pass: the same picture up to Mitsuba's own last bit. ValueError or KeyError for another
+        film."""
         width, height = self._sensor.film().crop_size()
-        if "sum" not in state or "passes" not in state or state["sum"].shape[:2] != (int(height), int(width)):
+        total, passes = state["sum"], state["passes"]
+        fits = total.ndim == 3 and total.shape[:2] == (int(height), int(width)) and total.shape[2] > 0
+        if not (fits and total.dtype == np.float64 and passes.dtype == np.int64 and passes.shape == (2,)):
             raise ValueError("no sum of this film")
-        self._sum, (self._passes, self.pass_size) = state["sum"], map(int, state["passes"])
+        if not (done > 0 and passes[0] >= 0 and 0 < passes[1] <= self._largest_pass):
+            raise ValueError("no count of passes")
+        self._sum, (self._passes, self.pass_size) = total, map(int, passes)
         self.done = done
 
     def _render(self, integrator: Plugin, spp: int, seed: int) -> NDArray[np.float32]:

@@ -305,13 +305,16 @@ class Until:
         return result | _sums("half", self._halves)
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue bit-identically. Raises ValueError or KeyError for sums of another film."""
+        """Go on to the same bits. Raises ValueError, LookupError or ArithmeticError for sums of another film."""
         if "share" in state:
             pilot = state["pilot0"], state["pilot1"]
             shape = self._halves[0].height, self._halves[0].width, 3
             if state["share"].shape != (shape[0] * shape[1],) or any(picture.shape != shape for picture in pilot):
                 raise ValueError("shares of another film")
-            self._take(state["share"], float(state["gain"][0]), pilot)
+            gain = float(state["gain"][0])
+            if state["share"].dtype != np.uint32 or not 0.0 < gain <= 1.0:
+                raise ValueError("no shares")
+            self._take(state["share"], gain, pilot)
         if "narrowed" in state:
             *counts, self._lost, times = map(int, state["narrowed"][:4])
             radius, error, value, deviation, *known = map(float, state["narrowed"][4:])

@@ -37,8 +37,8 @@ def trial(
     progress: Progress | None = None,
 ) -> Report:
     """As `child.trial`, by the current executor of parts."""
-    # Several processes here share the targets; quick trials end before anything could be lost.
-    if crew.current().size == 1 and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
+    # Several processes here share the targets; quick looks end before anything could be lost.
+    if not crew.current().remote and (len(task.items) < 2 or jobs > 1 or task.effort == "quick"):
         return child.trial(task, jobs=jobs, limit=limit, memory=memory, progress=progress)
     began = time.perf_counter()
     names = {str(path): path for item in task.items for path in _files(item)}

@@ -20,7 +20,7 @@ from pathlib import Path
 from ..bridge import engine
 from ..catalog import notation, operands
 from ..catalog.operands import Kind
-from ..errors import GonioWarning, InputError
+from ..errors import GonioWarning, InputError, encodable
 from ..material import BSDF
 from ..owner import public
 from ..pictures import exposures, images
@@ -171,8 +171,8 @@ def render_sheet(
     identity = _identity(with_cell(request, cells[0], named)), [(one.path, repr(one.values)) for one in variations]
     with passes.Interrupts() as interrupts, parts.job("study", *identity) as job:
         if job.found:
-            tell(f"resuming a study: {job.found} of {len(cells)} pictures are done")
-        together = 1 if crew.current().size == 1 else 2 * crew.current().size  # enough for every process
+            tell(f"goes on with a study that was begun: {job.found} of {len(cells)} pictures are done")
+        together = 2 * crew.current().size if crew.current().remote else 1  # of a crew each needs enough to do
         for start in range(0, len(cells), together):
             some = cells[start : start + together]
             state = f"{start + len(some)}/{len(cells)}  " + ", ".join(map(figures.show_value, some[-1].values()))
@@ -184,14 +184,14 @@ def render_sheet(
         last = prepared[-1]
         width, height = last.size
         report(len(cells), len(cells), "drawing")
-    exposure = exposures.stops(request.exposure, *pictures)
-    clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
-    notices |= dict.fromkeys(filter(None, [clipped]))
-    heading = title or _scene_name(request.scene)
-    subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
-    drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
-    if output is not None:
-        drawing = drawing.save(output)
+        exposure = exposures.stops(request.exposure, *pictures)
+        clipped = exposures.clipping(exposure, *pictures, automatic=request.exposure == "auto")
+        notices |= dict.fromkeys(filter(None, [clipped]))
+        heading = encodable(title or _scene_name(request.scene))
+        subtitle = f"{width}×{height}, {last.spp} samples per pixel, {last.settings['integrator']}"  # noqa: RUF001
+        drawing = draw([images.to_screen(picture, exposure) for picture in pictures], variations, heading, subtitle)
+        if output is not None:  # in here: where it fails, the same command goes on from the pictures
+            drawing = drawing.save(output)
     seconds = round(time.perf_counter() - started, 2)
     return Sheet(cells, last.spp, last.size, exposure, seconds, tuple(notices), drawing)
 
@@ -219,7 +219,7 @@ def _pictures(prepared: Sequence[Prepared], job: parts.Parts, interrupts: passes
         pictures[key] = picture_of(one.render, one.request.denoise)
         job.put(key, {"picture": pictures[key]})
 
-    if crew.current().size > 1 and missing:
+    if crew.current().remote and missing:
         by_crew([one for _, one in missing], interrupted=lambda: interrupts.asked, finished=keep)
         interrupts.check()
     else:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .. import files
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean, encodable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -54,9 +54,9 @@ class Drawing:
     path: Path | None = None
 
     def save(self, path: str | Path) -> Drawing:
-        """Write it as .png, .pdf or .svg, completely or not at all; returns the drawing with that path."""
-        target = check_output(Path(path))
-        return replace(self, path=files.write_whole(target, lambda part: self._fill(part, target.suffix.lower()[1:])))
+        """Write it as .png, .pdf or .svg, whole or not at all; the drawing with that path."""
+        suffix = _suffix(Path(path))
+        return replace(self, path=files.write_whole(path, lambda part: self._fill(part, suffix[1:])))
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
@@ -65,19 +65,30 @@ class Drawing:
 
     def _fill(self, file: Path | BinaryIO, kind: str) -> None:
         import matplotlib
+        from matplotlib.text import Text
 
+        for text in self.figure.findobj(Text):  # names of files may be no text, which fonts refuse
+            text.set_text(encodable(text.get_text()))
         name = {"png": "Description", "pdf": "Subject", "svg": "Description"}[kind]
         with matplotlib.rc_context(STYLE):
-            self.figure.savefig(file, format=kind, dpi=self.dpi, metadata={name: self.about}, facecolor="white")
+            self.figure.savefig(
+                file, format=kind, dpi=self.dpi, metadata={name: encodable(self.about)}, facecolor="white"
+            )
 
 
 def check_output(path: Path) -> Path:
-    """Raise InputError if no figure can be written to `path`, before anything is computed."""
-    if path.suffix.lower() not in SUFFIXES:
-        hint = did_you_mean(path.suffix.lower(), SUFFIXES) if path.suffix else "add " + " or ".join(SUFFIXES)
-        raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
+    """Raise InputError where no figure can be written to `path`: before anything is computed."""
+    _suffix(path)
     files.check_file(path)
     return path
+
+
+def _suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        hint = did_you_mean(suffix, SUFFIXES) if suffix else "add " + " or ".join(SUFFIXES)
+        raise InputError(f"unknown figure format '{path.suffix}'", str(path), hint)
+    return suffix
 
 
 def blank(width: float, height: float, title: str, subtitle: str) -> Figure:
@@ -146,5 +157,5 @@ def show_value(value: object, longest: int = 28) -> str:
     elif isinstance(value, dict):
         text = str(value.get("type", json.dumps(value)))
     else:
-        text = str(value)
+        text = encodable(str(value))
     return text if len(text) <= longest else text[: longest - 1] + "…"

@@ -116,9 +116,9 @@ def _images(axes: list[Axes], measured: Values, fitted: Values) -> None:
     above = (wo[:, 2] > 0.02) & (wi[:, 2] > 0.02)
     pictures = []
     for values in (measured, fitted):
-        picture = np.full((x.size, 3), np.nan)
-        picture[above] = values(_unit(wo[above]), _unit(wi[above])) / wi[above, 2:]
-        pictures.append(picture.reshape(SIZE, SIZE, 3))
+        radiance = np.full((x.size, 3), np.nan)
+        radiance[above] = values(_unit(wo[above]), _unit(wi[above])) / wi[above, 2:]
+        pictures.append(radiance.reshape(SIZE, SIZE, 3))
     # values span decades: the cube root approximates perceived lightness
     white = max(float(np.nanpercentile(np.cbrt(np.abs(pictures[0])), 97.0)), 1e-6)
     for axis, picture, title in zip(axes, pictures, ("measured", "fitted"), strict=False):

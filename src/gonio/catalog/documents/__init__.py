@@ -11,6 +11,7 @@ of this package.
 from __future__ import annotations
 
 import json
+import os
 import re
 import warnings
 from collections.abc import Callable, Mapping
@@ -85,7 +86,7 @@ def parted(text: str) -> tuple[Document, Path, str] | None:
     for document in Document.family.all().values():
         for suffix in document.suffixes:
             match = re.fullmatch(rf"(.+?{re.escape(suffix)})(?::(.+))?", text, re.IGNORECASE | re.DOTALL)
-            if match and document.holds(path := Path(match[1]).expanduser()):
+            if match and document.holds(path := Path(os.path.expanduser(match[1]))):
                 return document, path, match[2] or ""
     return None
 
@@ -147,10 +148,11 @@ def convert(source: str, output: Path) -> tuple[str, ...]:
     source  FILE or FILE:MATERIAL
     output  .json, or a document's suffix
     """
-    parts = parted(source)
-    if parts is None:
-        raise InputError(f"'{source}' contains no material", source, 'such as {"type": "openpbr", ...} in a .json')
-    described = read(*parts)
+    found = parted(source)
+    if found is None:
+        raise InputError(f"'{source}' holds no material", source, 'such as {"type": "openpbr", ...} in a .json')
+    described = read(*found)
+    files.check_file(output)
     if output.suffix.lower() == ".json":
         text = json.dumps(for_scenes(described.notation), indent=2) + "\n"
         files.write_whole(output, text.encode())

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import ClassVar, TypeAlias
@@ -111,7 +112,7 @@ def _located(notation: Mapping[str, object], folder: Path, where: str, depth: in
         elif key == "type" and from_scenes({key: value})[key] in Document.family.all():
             raise InputError(f"a material of type '{value}' in it, which is in another file", where, "name that file")
         elif isinstance(value, str) and (key == "file" or outside.names_code(value)):
-            located[key] = str(folder / Path(value).expanduser())
+            located[key] = str(folder / Path(os.path.expanduser(value)))
         else:
             located[key] = value
     return located

@@ -8,6 +8,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from ..options import Code, Crew, Json
+from ..output import print_warnings
 from .base import PICTURES, verb
 from .render import carry_out
 
@@ -28,10 +29,11 @@ def resume(
     crew: Crew,
     as_json: Json = False,
 ) -> None:
-    """Go on with a render that was stopped, or that shall have more samples, from its checkpoint.
+    """Go on with a render that was stopped, or that needs more samples, from its checkpoint.
 
     The picture is that of a render which was never stopped, to the bit. A checkpoint whose scene, files, settings,
-    device or version have changed is refused.
+    device or version have changed is refused. Without -o the picture is written where the checkpoint says if that is
+    in the checkpoint's folder, else beside the checkpoint.
 
     \b
     Examples:
@@ -43,4 +45,6 @@ def resume(
 
     change = Request(checkpoint, output=output, spp=spp, timeout=timeout, threads=threads)
     change.check()
-    carry_out(checkpoints.asked_again(checkpoint, change, allow_code), checkpoint.name, as_json, crew)
+    request, notice = checkpoints.asked_again(checkpoint, change, allow_code, writes=True)
+    print_warnings((notice,) if notice else ())
+    carry_out(request, checkpoint.name, as_json, crew)

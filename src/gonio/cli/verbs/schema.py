@@ -31,6 +31,10 @@ def schema(
     """
     if kind not in KINDS:
         raise InputError(f"no schema of '{kind}'", "", did_you_mean(kind, KINDS))
+    if output is not None:
+        from ... import files
+
+        files.check_file(output)
     if kind == "report":
         from ...verify.ci import schema as report
 
@@ -42,7 +46,5 @@ def schema(
     if output is None:
         sys.stdout.write(text)
         return
-    from ... import files
-
     files.write_whole(output, text.encode())
     print(output)

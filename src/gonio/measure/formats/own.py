@@ -62,6 +62,9 @@ class Own(Format):
         except Exception:  # JSON of any structure
             raise _no_manifest(where) from None
         cls = Measurement.family.get(kind, where)
+        for name, part in parts.items():
+            if part.size == 0:  # such as an axis without entries, of which no table has one
+                raise InputError(f"the array {name} of shape {part.shape} is empty", where, "the file is damaged")
         nm = parts.pop("wavelengths", None)
         extra = {name: finite(parts.pop(name), name, where) for name in BESIDE if name in parts}
         try:

@@ -153,11 +153,14 @@ class Render:
         return {**self._sums.arrays(), **ahead}
 
     def restore(self, done: int, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the sums of so many samples, bit-identically. Raises ValueError for those of another film."""
+        """Go on from the sums of so many samples, to the same bits. Raises ValueError for those of another film."""
+        lanes = state.get(LANES)
+        if lanes is not None and (lanes.shape != (len(self._pixel),) or lanes.dtype != np.uint32):
+            raise ValueError("samples of other lanes")
         self._sums = Sums.of_arrays(self.mi, state, len(self._pixel), like=self._sums)
         self.done, self._lanes = done, None
-        if LANES in state and np.any(state[LANES] != done):
-            self._lanes = own(self.mi.UInt32, state[LANES])
+        if lanes is not None and np.any(lanes != done):
+            self._lanes = own(self.mi.UInt32, lanes)
 
     def select(self, lanes: slice) -> None:
         """Render these lanes only, from the first sample: a part of the picture, to be assembled by the caller."""

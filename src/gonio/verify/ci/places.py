@@ -31,7 +31,7 @@ def of(card: Card, verdict: Verdict | None = None) -> Place | None:
         file = Path(card.subject.target)
         known = file.suffix.lower() in (".json", ".xml", ".bsdf") and file.is_file()
         return Place(_relative(file), 1) if known else None
-    file = Path(named["file"]).expanduser()
+    file = Path(os.path.expanduser(named["file"]))
     for text in verdict.why if verdict else ():
         for match in _LINE.finditer(text):
             if match["file"] == file.name:
