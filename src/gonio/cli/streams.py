@@ -50,16 +50,19 @@ def prepare() -> None:
                 os.close(opened)
     codecs.register_error("gonio", _replaced)
     sys.stdin = sys.stdin or io.TextIOWrapper(io.FileIO(0, closefd=False))  # type: ignore[arg-type]
-    sys.stdout = _stream(sys.stdout, 1, _Output)
-    sys.stderr = _stream(sys.stderr, 2, io.TextIOWrapper)
+    sys.stdout = _stream(sys.stdout, sys.__stdout__, 1, _Output)
+    sys.stderr = _stream(sys.stderr, sys.__stderr__, 2, io.TextIOWrapper)
 
 
-def _stream(stream: TextIO | None, number: int, kind: type[io.TextIOWrapper]) -> TextIO:
-    """The stream that prints to a file descriptor, in place of one that is closed or of Python's own."""
+def _stream(stream: TextIO | None, own: TextIO | None, number: int, kind: type[io.TextIOWrapper]) -> TextIO:
+    """The stream that prints to a file descriptor, in place of one that is closed or of Python's own.
+
+    Any other stream is used as it is: a second wrapper would close its buffer when it is collected.
+    """
     if stream is None:
         raw = io.BufferedWriter(io.FileIO(number, "w", closefd=False))
         return kind(raw, "utf-8", "gonio")
-    if not isinstance(stream, io.TextIOWrapper):  # somebody's own
+    if stream is not own or not isinstance(stream, io.TextIOWrapper):
         return stream
     return kind(
         stream.buffer,
