@@ -18,8 +18,8 @@ PAGE = Path(__file__).parent / "options.md"
 
 HEAD = """# All options of all verbs
 
-Written by `python docs/make_options.py` from the declarations in `gonio.cli`; [the command line](command-line.md) has the rules
-behind the names. Every verb has `--help` too.
+Written by `python docs/make_options.py` from the declarations in `gonio.cli`; [the command line](command-line.md)
+has the rules behind the names. Every verb has `--help` too.
 """
 
 

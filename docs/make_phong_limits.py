@@ -191,7 +191,7 @@ the course sheet asks for, with the verifier's answer. Made by `python docs/make
 measured.
 
     gonio verify phong                          # what the model breaks, and that it says so itself
-    gonio verify phong --param kd=0 --param ks=1 --sweep p=1..64
+    gonio verify phong --param kd=0 --param ks=1 --vary p=1..64
 
 ## 1. v.r < 0, raised to an even power
 r is the light mirrored at n. Where the viewer stands more than 90 degrees away from it, v.r is negative, and an even

@@ -78,17 +78,17 @@ def test_a_study_is_shown_and_saved(tmp_path: Path, scene: Path) -> None:
 
 
 def test_a_trial_takes_the_command_lines_options(tmp_path: Path) -> None:
-    report = go.verify("lambert", quick=True, law="reciprocity", sweep="albedo=0.1,0.5", report=tmp_path / "r")
+    report = go.verify("lambert", quick=True, law="reciprocity", vary="albedo=0.1,0.5", output=tmp_path / "r")
     assert len(report.cards) == 2 and report.passed and (tmp_path / "r/report.html").is_file()
     assert "reciprocity" in report._repr_html_() and "<pre>" in report._repr_html_()
     with pytest.raises(InputError, match="quick and deep"):
         go.verify("lambert", quick=True, deep=True)
     with pytest.raises(InputError, match="sweep of a Python object"):
-        go.verify(go.Lambert(), sweep="albedo=0.1,0.5")
+        go.verify(go.Lambert(), vary="albedo=0.1,0.5")
 
 
 def test_tables_and_albedos_are_shown_in_notebooks() -> None:
-    shown = go.bake("ggx", size=4, lut=["E"])._repr_html_()
+    shown = go.bake("ggx", resolution=4, lut=["E"])._repr_html_()
     assert "4 roughness x 4 mu" in shown and "smith-correlated" in shown
     albedo = go.albedo(go.Lambert(0.3), mu=[0.2, 1.0])
     assert albedo._repr_html_().count("<td>0.3  0.3  0.3</td>") == 2
@@ -98,9 +98,9 @@ def test_tables_and_albedos_are_shown_in_notebooks() -> None:
 
 def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    baked = go.bake("ggx", size=4, lut=["E"])
+    baked = go.bake("ggx", resolution=4, lut=["E"])
     assert baked.arrays["E"].shape == (4, 4) and list(tmp_path.iterdir()) == []
-    assert go.bake("conductor(preset=Au)", size=4, lut=["E"]).arrays["E"].shape == (4, 4, 3)
+    assert go.bake("conductor(preset=Au)", resolution=4, lut=["E"]).arrays["E"].shape == (4, 4, 3)
     for target, message in (("ggxx", "unknown distribution or material"), ("ggx(alpha=.1)", "without parameters")):
         with pytest.raises(InputError, match=message):
             go.bake(target)

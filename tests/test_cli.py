@@ -331,7 +331,7 @@ def test_an_exposure_is_chosen_by_the_picture(scene: Path, capsys: pytest.Captur
     told = capsys.readouterr()
     chosen = images.read("a.png").metadata["exposure"]
     assert f"exposure {chosen:+g} EV" in told.out and told.err == ""
-    assert gonio("convert", "a.exr", "b.png", "--exposure", "auto", "--json") == 0
+    assert gonio("convert", "a.exr", "-o", "b.png", "--exposure", "auto", "--json") == 0
     assert json.loads(capsys.readouterr().out) == {"output": "b.png", "exposure": chosen, "notice": ""}
     np.testing.assert_array_equal(images.read("a.png").pixels, images.read("b.png").pixels)
     vary = ["--vary", "scene.shapes.0.material.p=8", "--exposure", "auto", "--json"]
@@ -342,7 +342,7 @@ def test_an_exposure_is_chosen_by_the_picture(scene: Path, capsys: pytest.Captur
 def test_what_clips_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert gonio("render", scene, "-o", "a.exr", "--exposure", "1") == 0
     assert ".exr keeps radiance as it is" in capsys.readouterr().err
-    for arguments in (["render", scene, "-o", "a.png"], ["convert", "a.exr", "a.png"]):
+    for arguments in (["render", scene, "-o", "a.png"], ["convert", "a.exr", "-o", "a.png"]):
         assert gonio(*arguments, "--exposure", "9") == 0
         told = re.search(
             r"warning: (\d+)% of the pixels .* try --exposure (-?[\d.]+), or auto", capsys.readouterr().err
@@ -361,19 +361,19 @@ def test_convert_keeps_the_picture_and_its_settings(
     pixels = np.random.default_rng(1).random((5, 7, 3), np.float32)
     images.write("a.exr", pixels, {"spp": 4})
     for source, output, tolerance in (("a.exr", "a.npz", 0.0), ("a.npz", "a.hdr", 0.005), ("a.exr", "a.png", 0.02)):
-        assert gonio("convert", source, output) == 0
+        assert gonio("convert", source, "-o", output) == 0
         assert capsys.readouterr().out.startswith(output)
         got = images.read(output)
         np.testing.assert_allclose(got.pixels, pixels, atol=tolerance)
         assert got.metadata["spp"] == 4
-    assert gonio("convert", "a.png", "a.png", "--exposure", "-1") == 0
+    assert gonio("convert", "a.png", "-o", "a.png", "--exposure", "-1") == 0
     np.testing.assert_allclose(images.read("a.png").pixels, pixels / 2, atol=0.02)
     capsys.readouterr()
     before = Path("a.png").read_bytes()
-    assert "unknown picture format '.jpg'" in failure(capsys, "convert", "a.exr", "a.jpg")
-    assert "cannot read" in failure(capsys, "convert", "b.exr", "a.png")
-    assert "no exposure" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "bright")
-    assert "-100 to 100" in failure(capsys, "convert", "a.exr", "a.png", "--exposure", "nan")
+    assert "unknown picture format '.jpg'" in failure(capsys, "convert", "a.exr", "-o", "a.jpg")
+    assert "cannot read" in failure(capsys, "convert", "b.exr", "-o", "a.png")
+    assert "no exposure" in failure(capsys, "convert", "a.exr", "-o", "a.png", "--exposure", "bright")
+    assert "-100 to 100" in failure(capsys, "convert", "a.exr", "-o", "a.png", "--exposure", "nan")
     assert Path("a.png").read_bytes() == before
 
 

@@ -9,12 +9,13 @@ import re
 import signal
 import sys
 import warnings
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from ..errors import GonioError, GonioWarning, InputError, in_user_code, out_of_loop
+from . import renamed
 from .signals import Ended, exit_code
 from .verbs.base import MATERIALS, PICTURES, SUPPORT, Verb
 
@@ -28,6 +29,11 @@ def _styled(text: str) -> str:
 
 
 class _Command(TyperCommand):
+    def make_parser(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        parser = super().make_parser(ctx)  # type: ignore[arg-type]
+        renamed.accept(parser, self.name or "")
+        return parser
+
     def get_help(self, ctx: typer.Context) -> str:  # type: ignore[override]  # Typer has its own Click
         return _styled(super().get_help(ctx))
 

@@ -25,35 +25,35 @@ from ..catalog.operands import Kind
 from ..errors import InputError
 from .subject import Subject
 
-STEPS = 5  # of a sweep
+STEPS = 5  # values of a range
 JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
-def resolve(target: str, settings: Sequence[str] = (), sweep: str = "") -> list[Subject]:
-    """The subjects that a target names, one for each value of the sweep.
+def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[Subject]:
+    """The subjects that a target names, one for each value that varies.
 
     settings  "name=value" each
-    sweep     "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
+    vary      "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
     Raises InputError with the nearest known spelling.
     """
     given = dict(map(notation.assignment, settings))
-    if not sweep:
+    if not vary:
         return [_build(target, given)]
-    name, values = _sweep(sweep)
+    name, values = _values(vary)
     return [_build(target, {**given, name: value}) for value in values]
 
 
-def _sweep(text: str) -> tuple[str, list[str]]:
-    name, value = notation.assignment(text, "--sweep")
+def _values(text: str) -> tuple[str, list[str]]:
+    name, value = notation.assignment(text, "--vary")
     ends = re.fullmatch(r"(.+?)\.\.(.+)", value)
     if not ends:
         return name, value.split(",")
     try:
         low, high = float(ends[1]), float(ends[2])
     except ValueError:
-        raise InputError(f"'{value}' is not a range", "--sweep", "such as --sweep alpha=0.01..1") from None
+        raise InputError(f"'{value}' is not a range", "--vary", "such as --vary alpha=0.01..1") from None
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InputError(f"'{value}' is not an increasing range", "--sweep", "such as --sweep alpha=0.01..1")
+        raise InputError(f"'{value}' is not an increasing range", "--vary", "such as --vary alpha=0.01..1")
     many = np.geomspace(low, high, STEPS) if low > 0.0 and high >= 10.0 * low else np.linspace(low, high, STEPS)
     return name, [f"{v:.6g}" for v in many]
 

@@ -18,6 +18,7 @@ import contextlib
 import errno
 import html
 import ipaddress
+import json
 import re
 import secrets
 import signal
@@ -316,7 +317,7 @@ class Server(uvicorn.Server):
     """uvicorn with the guards above, which says where it is reached and opens the browser once it is."""
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
-        self.application, self.browser, self.quiet = application, browser, quiet
+        self.application, self.browser, self.quiet, self.as_json = application, browser, quiet, False
         self._redirect: Path | None = None
         guarded = type("Guarded", (_Guarded,), {"waiting": {}, "answering": {}})
         self.listener = _listen(host, port)
@@ -360,7 +361,7 @@ class Server(uvicorn.Server):
         if self.application.watch:
             self.application.watch.start()
         if not self.quiet:
-            print(f"{self.url}\nCtrl-C ends it", flush=True)
+            print(json.dumps({"url": self.url}) if self.as_json else f"{self.url}\nCtrl-C ends it", flush=True)
         if self.browser:
             # some browsers hold up whoever opens them until they are closed
             self._redirect = _redirect_file(self.url)
@@ -435,12 +436,20 @@ def _open(url: str) -> None:
         webbrowser.open(url)
 
 
-def serve(what: Stage, host: str = LOOPBACK, port: int = 0, browser: bool = True, device: str = "cpu") -> None:
+def serve(
+    what: Stage,
+    host: str = LOOPBACK,
+    port: int = 0,
+    browser: bool = True,
+    device: str = "cpu",
+    as_json: bool = False,
+) -> None:
     """Show a stage until Ctrl-C.
 
     host     where to listen; anything but a loopback address opens it to the network, and a line says so
     port     0 takes any that is free
     browser  open the page there
+    as_json  print the address as {"url": ...}
     Raises MachineError where the port is taken or the device missing, InputError where a model cannot be shown.
     """
     if not 0 <= port < 65536:
@@ -448,6 +457,7 @@ def serve(what: Stage, host: str = LOOPBACK, port: int = 0, browser: bool = True
     engine.variant_for(device)  # complains about a missing GPU now, not when the first page asks
     application = Application(what, Door(host), device)
     server = Server(application, host, port, browser)
+    server.as_json = as_json
     if not ipaddress.ip_address(server.address).is_loopback:
         warning = "whoever knows the address below can use it, and it is not encrypted"
         print(f"listening on {server.address}: {warning}", file=sys.stderr)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Exit, Option
 
 from .. import completion
-from ..options import Json, Material
+from ..options import Json, Material, output_option
 from ..output import listing, print_rich
 from .base import PICTURES, verb
 
@@ -24,45 +24,41 @@ def compare(
         str,
         Argument(
             metavar="A",
-            help="The picture to judge: .exr, .hdr, .png, .npz; or a material.",
+            help="The picture to compare: .exr, .hdr, .png, .npz; or a material.",
             autocompletion=completion.materials,
         ),
     ],
     reference: Annotated[
         str,
-        Argument(
-            metavar="B", help="The picture, or the material, to judge it by.", autocompletion=completion.materials
-        ),
+        Argument(metavar="B", help="The reference: a picture or a material.", autocompletion=completion.materials),
     ],
     *,
-    tolerance: Annotated[float | None, Option(metavar="X", help="Exit with 1 where the metric is over X.")] = None,
+    tolerance: Annotated[float | None, Option(metavar="X", help="Exit with 1 if the metric exceeds X.")] = None,
     metric: Annotated[
         str | None,
-        Option(metavar="NAME", help="What --tolerance is for: relmse, rmse, flip; of materials mean, largest, albedo."),
+        Option(metavar="NAME", help="Metric of --tolerance: relmse, rmse, flip; of materials mean, largest, albedo."),
     ] = None,
     encoding: Annotated[
-        str, Option(metavar="srgb|linear", help="Of .png files: linear takes data, such as tables, as they are stored.")
+        str, Option(metavar="srgb|linear", help="Encoding of .png files; linear is for data, such as tables.")
     ] = "srgb",
-    output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="A map of the error: .png, .pdf, .svg.")
-    ] = None,
+    output: Annotated[Path | None, output_option("FILE", "A map of the error: .png, .pdf, .svg.")] = None,
     made: Material,
     as_json: Json = False,
 ) -> None:
-    """Say how far picture A is from picture B, or material A from material B.
+    """Measure the difference between picture A and picture B, or between material A and material B.
 
-    Of pictures: RMSE, relMSE, ratio of the means, FLIP. A .png is decoded from sRGB, unless --encoding linear says that
-    it holds data. FLIP of .exr, .hdr and .npz is HDR-FLIP: the worst of the exposures at which B can be shown.
+    Of pictures: RMSE, relMSE, ratio of the means, FLIP. A .png is decoded from sRGB; with --encoding linear it is read
+    as data. FLIP of .exr, .hdr and .npz is HDR-FLIP: the worst over the exposures at which B can be shown.
 
-    Of materials: where f differs most, by how much on average, and the albedos. --param and --preset set what each of
-    both has.
+    Of materials: the largest and the mean difference of f, and the albedos. --param and --preset apply to each of the
+    two that has them.
 
     \b
     Examples:
       gonio compare mine.exr reference.exr
       gonio compare mine.exr reference.exr --tolerance 0.01 -o error.png
       gonio compare tables/E.png reference/E.png --encoding linear
-      gonio compare mine.py:Rough oren-nayar -p sigma=.5 -o difference.png
+      gonio compare mine.py:Rough oren-nayar -p sigma=0.5 -o difference.png
     """
     from ...catalog import operands
     from ...catalog.operands import Kind

@@ -14,8 +14,8 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=4)
 def models(
-    quality: Annotated[bool, Option("--quality", help="How well each samples itself, at its defaults.")] = False,
-    library: Annotated[bool, Option("--library", help="The named materials, with the fits there are of each.")] = False,
+    quality: Annotated[bool, Option("--quality", help="Sampling quality of each material, at its defaults.")] = False,
+    library: Annotated[bool, Option("--library", help="The named materials, with the published fits of each.")] = False,
     as_json: Json = False,
 ) -> None:
     """List the materials.
