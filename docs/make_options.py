@@ -79,9 +79,9 @@ def _default(parameter: Any) -> str:
     if parameter.required:
         return "required"
     value = parameter.default
-    if value in (None, "", False, ()) or value == []:
+    if value is None or value is False or value == "":
         return ""
-    return {True: "on"}.get(value, str(value)) if isinstance(value, bool) else str(value)
+    return "on" if value is True else str(value)
 
 
 def _by_option(verbs: dict[str, list[Row]]) -> Iterator[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from dataclasses import fields
 from typing import Any
 
 import gonio as go
@@ -100,3 +102,21 @@ def test_former_keywords_reach_the_present_ones(call: Any, keywords: dict[str, A
     with pytest.warns(DeprecationWarning, match=" is now "), pytest.raises(InputError) as caught:
         call(**keywords)
     assert present in str(caught.value)
+
+
+def test_render_options_are_declared_once() -> None:
+    from typing import get_type_hints
+
+    from gonio.cli.options import Rendering
+    from gonio.render.options import RenderKeywords, RenderOptions
+    from gonio.render.request import Request
+
+    declared = get_type_hints(RenderOptions)
+    assert get_type_hints(RenderKeywords) == declared
+    assert {name: get_type_hints(Request)[name] for name in declared} == declared
+    assert list(get_type_hints(Rendering)) == list(declared)
+    for function in (go.render, go.study):
+        parameters = inspect.signature(function).parameters
+        assert {name: parameters[name].default for name in declared} == {
+            field.name: field.default for field in fields(RenderOptions)
+        }

@@ -5,40 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args, get_type_hints
 
 from typer import Argument, Option
 from typer.models import OptionInfo
 
+from ..render.options import RenderOptions
 from . import completion
 
 if TYPE_CHECKING:
     from ..catalog import notation, operands
     from ..material import BSDF
     from ..render.request import Request
-
-Model = Annotated[
-    str, Argument(metavar="MODEL", help="A material; `gonio models` lists them.", autocompletion=completion.materials)
-]
-SceneFile = Annotated[
-    str, Argument(metavar="SCENE", help="A scene: its folder, .json or Mitsuba .xml; or a material, shown on a ball.")
-]
-Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
-Outside = Annotated[bool, Option("--allow-outside", help="Allow the scene to read files outside its folder.")]
-Code = Annotated[bool, Option("--allow-code", help="Allow the scene to run the Python files and plugins it names.")]
-Device = Annotated[str, Option(metavar="cpu|cuda|auto", help="Where to compute.")]
-Threads = Annotated[int | None, Option(metavar="N", help="CPU cores to use; all by default.")]
-Seed = Annotated[
-    int | None, Option(metavar="N", help="Seed of all random numbers; the same seed gives the same result.")
-]
-Spp = Annotated[int | None, Option(metavar="N", help="Samples per pixel.")]
-Timeout = Annotated[float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")]
-Checkpoint = Annotated[
-    Path | None, Option(metavar="FILE", help="Store intermediate sums there; resume from the file if it exists.")
-]
-Exposure = Annotated[str, Option(metavar="EV|auto", help="Brightness of a .png, in stops.")]
 
 
 def output_option(metavar: str, text: str) -> OptionInfo:
@@ -49,6 +29,33 @@ def output_option(metavar: str, text: str) -> OptionInfo:
 def samples_option(text: str) -> OptionInfo:
     """`--samples`: random samples of anything but a pixel."""
     return Option("--samples", metavar="N", help=text)
+
+
+def render_option(name: str) -> OptionInfo:
+    """An option of `RenderOptions`, with what is said of it there."""
+    kind, shown = get_args(get_type_hints(RenderOptions, include_extras=True)[name])
+    flag = [f"--{name.replace('_', '-')}"] if kind is bool else []
+    return Option(*flag, metavar=shown.metavar or None, help=shown.help)
+
+
+Model = Annotated[
+    str, Argument(metavar="MODEL", help="A material; `gonio models` lists them.", autocompletion=completion.materials)
+]
+SceneFile = Annotated[
+    str, Argument(metavar="SCENE", help="A scene: its folder, .json or Mitsuba .xml; or a material, shown on a ball.")
+]
+Json = Annotated[bool, Option("--json", help="Print the result as JSON.")]
+Outside = Annotated[bool, render_option("allow_outside")]
+Code = Annotated[bool, render_option("allow_code")]
+Device = Annotated[str, render_option("device")]
+Threads = Annotated[int | None, render_option("threads")]
+Seed = Annotated[int | None, render_option("seed")]
+Spp = Annotated[int | None, render_option("spp")]
+Exposure = Annotated[str, render_option("exposure")]
+Timeout = Annotated[float | None, Option(metavar="S", help="Stop after S seconds and keep the picture so far.")]
+Checkpoint = Annotated[
+    Path | None, Option(metavar="FILE", help="Store intermediate sums there; resume from the file if it exists.")
+]
 
 
 @dataclass(frozen=True)
@@ -161,23 +168,8 @@ class Executor:
         return Cluster(self.cluster, workers=self.workers)
 
 
-@dataclass(frozen=True)
-class Rendering:
-    """How a scene is rendered; None: as the scene says."""
-
-    spp: Spp = None
-    size: Annotated[str | None, Option(metavar="WxH", help="Film size in pixels, such as 640x480.")] = None
-    integrator: Annotated[str | None, Option(metavar="NAME", help="direct, path, caustics, light, normal, ...")] = None
-    max_depth: Annotated[int | None, Option(metavar="N", help="Maximum path length, of path, caustics, light.")] = None
-    sampler: Annotated[str | None, Option(metavar="NAME", help="Random points: sobol, independent, ...")] = None
-    seed: Seed = None
-    device: Device = "cpu"
-    spectral: Annotated[bool, Option("--spectral", help="Trace wavelengths, so that glass disperses.")] = False
-    threads: Threads = None
-    denoise: Annotated[bool, Option("--denoise", help="Remove noise with Open Image Denoise.")] = False
-    exposure: Exposure = "0"
-    allow_outside: Outside = False
-    allow_code: Code = False
+class Rendering(RenderOptions):
+    """How a scene is rendered, as the command line takes it: size and exposure are texts until `request`."""
 
     def request(
         self,
@@ -197,9 +189,18 @@ class Rendering:
             timeout=timeout,
             **vars(self)
             | {
-                "size": None if self.size is None else parse_size(self.size),
-                "exposure": exposures.parse(self.exposure),
+                "size": None if self.size is None else parse_size(str(self.size)),
+                "exposure": exposures.parse(str(self.exposure)),
                 "material": material,
                 "checkpoint": checkpoint,
             },
         )
+
+
+# size and exposure are read by `request`, whose errors say more than Typer's
+_TEXTS: dict[str, object] = {"size": str | None, "exposure": str}
+_TYPES = get_type_hints(RenderOptions)
+Rendering.__annotations__ = {
+    field.name: Annotated[_TEXTS.get(field.name, _TYPES[field.name]), render_option(field.name)]
+    for field in fields(RenderOptions)
+}

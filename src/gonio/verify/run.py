@@ -346,9 +346,7 @@ def _subjects(targets: Sequence[Target], vary: str) -> list[Subject]:
 
             subjects += resolve(target, vary=vary)
         elif vary:
-            raise InputError(
-                "a sweep of a Python object", "--vary", "name the target, such as 'conductor(preset=Au)'"
-            )
+            raise InputError("a sweep of a Python object", "--vary", "name the target, such as 'conductor(preset=Au)'")
         else:
             subjects.append(subject.of(target))
     return subjects

@@ -13,19 +13,15 @@ gold.json                what a fit found, or a material in Gonio's notation
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..catalog import notation, operands, outside, texts
 from ..catalog.operands import Kind
 from ..errors import InputError
 from .subject import Subject
 
-STEPS = 5  # values of a range
 JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
@@ -45,17 +41,7 @@ def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[S
 
 def _values(text: str) -> tuple[str, list[str]]:
     name, value = notation.assignment(text, "--vary")
-    ends = re.fullmatch(r"(.+?)\.\.(.+)", value)
-    if not ends:
-        return name, value.split(",")
-    try:
-        low, high = float(ends[1]), float(ends[2])
-    except ValueError:
-        raise InputError(f"'{value}' is not a range", "--vary", "such as --vary alpha=0.01..1") from None
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InputError(f"'{value}' is not an increasing range", "--vary", "such as --vary alpha=0.01..1")
-    many = np.geomspace(low, high, STEPS) if low > 0.0 and high >= 10.0 * low else np.linspace(low, high, STEPS)
-    return name, [f"{v:.6g}" for v in many]
+    return name, texts.range_of(value) or value.split(",")
 
 
 def _build(target: str, given: dict[str, str]) -> Subject:

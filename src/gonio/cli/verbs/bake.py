@@ -27,7 +27,9 @@ class Baking:
         str | None, Option(metavar="NAME", help="Masking term of a distribution: smith-correlated, ..., FILE.py:CLASS.")
     ] = None
     samples: Annotated[int, samples_option("Random samples per texel, of the methods that sample.")] = 1024
-    sampler: Annotated[str, Option(metavar="hammersley|independent", help="Random points of these.")] = "hammersley"
+    sampler: Annotated[str, Option(metavar="NAME", help="Random points of these: hammersley or independent.")] = (
+        "hammersley"
+    )
     seed: Seed = None
     layout: Annotated[str, Option(metavar="linear|stretched|homework", help="Axes and files.")] = "linear"
     aspect: Annotated[

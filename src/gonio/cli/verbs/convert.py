@@ -18,7 +18,7 @@ def convert(
     source: Annotated[str, Argument(metavar="IN", help="A picture, measured values, or a material.")],
     *,
     output: Annotated[Path, output_option("FILE", "The file; its suffix names the format.")],
-    exposure: Exposure = "0",
+    exposure: Exposure = "0.0",
     as_json: Json = False,
 ) -> None:
     """Write a picture, a measured material, or another program's material in another format.

@@ -20,7 +20,7 @@ def study(
     *,
     vary: Annotated[
         list[str],
-        Option(metavar="NAME=V1,V2", help="A parameter or path and its values, or A,B=(V,W),(V,W); repeatable."),
+        Option(metavar="NAME=V1,V2|A..B", help="A parameter or path and its values; repeatable."),
     ],
     output: Annotated[Path, output_option("FILE", "The sheet: .png, .pdf or .svg.")] = Path("study.png"),
     made: Material,

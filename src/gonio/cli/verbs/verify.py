@@ -44,9 +44,7 @@ class Files:
 class Effort:
     """What is judged, and how thoroughly."""
 
-    vary: Annotated[
-        str, Option(metavar="NAME=A..B", help="A report card for each of five values, or of NAME=V1,V2,...")
-    ] = ""
+    vary: Annotated[str, Option(metavar="NAME=V1,V2|A..B", help="A report card for each value; a range has five.")] = ""
     quick: Annotated[bool, Option("--quick", help="A first look, in seconds.")] = False
     deep: Annotated[bool, Option("--deep", help="More samples, directions and roughnesses.")] = False
     seed: Seed = None
