@@ -339,6 +339,10 @@ readout = go.measure(surface="gaussian:alpha=.3", facet=go.Mirror(), output="rou
 print(readout.table.beside["error"], readout.first, readout.later, readout.error)
 go.measure(gold, "gold.binary", noise=0.02, blocked=5.0, solid_angle=0.002)
 
+found = go.fit_picture("photo.exr", "scene.json", ["shapes.0.material"], param={"camera.verticalFov": 30.0})
+print(found.materials, found.losses)
+print(go.convert("ball.exr", "ball.png", exposure="auto").summary, go.info("gold.binary")["path"])
+print(go.explain("ggx").text(80), go.compensation(gold, samples=1000)["rms"])
 photographed = go.capture("photographs", "lambert+ggx", grazing=75.0)
 assert_type(photographed.material, go.BSDF)
 print(photographed.fit.interval, photographed.warnings, photographed.next(2)[0].position)

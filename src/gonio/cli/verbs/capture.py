@@ -71,21 +71,23 @@ def capture(
             progress=lambda text: bar.step(0, 1, text),
         )
         plan = result.next(next_) if next_ else []
-    written = []
-    if target is not None:
-        from ...viewer import capture_figure
-
-        written = [result.save(target), target.with_suffix(".png")]
-        capture_figure.draw(result).save(written[1])
+    written = [] if target is None else _write(result, target)
     if as_json:
         print(json.dumps(result.as_dict() | ({"next": [one.as_dict() for one in plan]} if plan else {})))
         return
     print_warnings(result.warnings)
     _print(result)
-    for one in plan:
-        print(f"next: {one}")
-    if written:
-        print(*written)
+    for line in [*(f"next: {one}" for one in plan), *([" ".join(map(str, written))] if written else [])]:
+        print(line)
+
+
+def _write(result: Capture, target: Path) -> list[Path]:
+    """The table or the fit, and a figure of it; the files."""
+    from ...viewer import capture_figure
+
+    written = [result.save(target), target.with_suffix(".png")]
+    capture_figure.draw(result).save(written[1])
+    return written
 
 
 def _print_plan(plan: Sequence[Proposal], as_json: bool) -> None:

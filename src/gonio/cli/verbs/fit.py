@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
@@ -14,6 +14,9 @@ from ...errors import InputError
 from ..options import Fitting, Json, Spp, output_option
 from ..output import Bar, listing, print_intervals, print_rich
 from .base import MATERIALS, verb
+
+if TYPE_CHECKING:
+    from ...fitting.batch import Row
 
 PICTURES = (".exr", ".hdr", ".png")
 
@@ -77,10 +80,7 @@ def fit(
     if of.scene is not None:
         _to_picture(data, of.scene, _single_model(how.models(what.model or ())), how, of.spp, target, as_json)
         return
-    if len(data) == 1 and Path(data[0]).suffix.lower() in PICTURES:
-        hint = f"gonio fit {data[0]} --scene scene.json"
-        raise InputError(f"'{data[0]}' is a picture, and --scene is not given", "--scene", hint)
-    files = batch.files_of(data)
+    files = batch.files_of(_measurements(data))
     with Bar("fit", len(files)) as bar:
         rows = batch.run(
             files,
@@ -93,19 +93,26 @@ def fit(
             report=lambda done, total, text: bar.step(done, total, text),
             notice=bar.tell,
         )
-    if target is not None:
-        from ...viewer import fit_figure
-
-        batch.write(target, rows)
-        if len(files) == 1 and rows[0].best is not None:
-            fit_figure.draw(rows[0].best, files[0]).save(target.with_suffix(".png"))
+    written = [] if target is None else _write(target, files, rows)
     if as_json:
         print(json.dumps([row.as_dict() for row in rows] if len(rows) > 1 else rows[0].as_dict()))
         return
     for row in rows:
         _print(row.as_dict())
-    if target is not None:
-        print(target, *([target.with_suffix(".png")] if len(files) == 1 else []))
+    if written:
+        print(*written)
+
+
+def _write(target: Path, files: Sequence[str], rows: Sequence[Row]) -> list[Path]:
+    """The rows, and of a single file a figure; the files written."""
+    from ...fitting import batch
+    from ...viewer import fit_figure
+
+    batch.write(target, rows)
+    if len(files) > 1 or rows[0].best is None:
+        return [target]
+    fit_figure.draw(rows[0].best, files[0]).save(target.with_suffix(".png"))
+    return [target, target.with_suffix(".png")]
 
 
 def _nothing(scene: Path | None) -> InputError:
@@ -113,6 +120,14 @@ def _nothing(scene: Path | None) -> InputError:
         return InputError("--scene given without a picture", "DATA", f"gonio fit picture.exr --scene {scene}")
     hint = "name a file of measurements, or a picture with --scene scene.json"
     return InputError("no files of measurements given", "gonio fit", hint)
+
+
+def _measurements(data: list[str]) -> list[str]:
+    """The files, unless the one is a picture."""
+    if len(data) == 1 and Path(data[0]).suffix.lower() in PICTURES:
+        hint = f"gonio fit {data[0]} --scene scene.json"
+        raise InputError(f"'{data[0]}' is a picture, and --scene is not given", "--scene", hint)
+    return data
 
 
 def _single_model(models: Sequence[str]) -> str | None:

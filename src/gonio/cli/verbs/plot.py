@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,15 @@ from typer import Argument, Option
 from .. import completion
 from ..options import Json, Material, output_option
 from .base import MATERIALS, verb
+
+
+@dataclass(frozen=True)
+class Interface:
+    """The interface of `gonio plot fresnel`."""
+
+    eta: Annotated[float | None, Option(metavar="ETA", help="Relative index of fresnel: inside over outside.")] = None
+    k: Annotated[float, Option("--k", metavar="K", help="Imaginary part of the index of fresnel.")] = 0.0
+    metal: Annotated[str | None, Option(metavar="NAME", help="Metal of fresnel, such as Au.")] = None
 
 
 @verb(MATERIALS, place=1)
@@ -27,9 +37,7 @@ def plot(
     made: Material,
     kind: Annotated[str, Option(metavar="lobe|slice|albedo|image", help="What to draw.")] = "lobe",
     angles: Annotated[str | None, Option(metavar="A,B,..", help="Viewing angles, degrees from the normal.")] = None,
-    eta: Annotated[float | None, Option(metavar="ETA", help="Relative index of fresnel: inside over outside.")] = None,
-    k: Annotated[float, Option("--k", metavar="K", help="Imaginary part of the index of fresnel.")] = 0.0,
-    metal: Annotated[str | None, Option(metavar="NAME", help="Metal of fresnel, such as Au.")] = None,
+    interface: Interface,
     output: Annotated[Path | None, output_option("FILE", "The figure: .png, .pdf, .svg.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -54,7 +62,7 @@ def plot(
 
     if len(model) == 1 and plots.is_tables(model[0]):
         made.refuse(model[0])
-        eta, k, metal = None, 0.0, None  # of no meaning here
+        interface = Interface()  # of no meaning here
         texts, name = model, f"{Path(model[0]).resolve().stem}-tables"
     elif model == ["fresnel"]:
         texts, name = model, "fresnel"
@@ -64,7 +72,7 @@ def plot(
         name = f"{'-'.join(map(_file_name, heads))}-{kind}"
     views = None if angles is None else figures.split_values(angles)
     output = output or Path(f"{name}.png")
-    drawing = plots.plot(*texts, kind=kind, angles=views, eta=eta, k=k, metal=metal, output=output)
+    drawing = plots.plot(*texts, kind=kind, angles=views, output=output, **vars(interface))
     print(json.dumps({"output": str(drawing.path), "about": drawing.about}) if as_json else drawing.path)
 
 

@@ -6,7 +6,7 @@ import json
 import os
 import shlex
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +23,18 @@ if TYPE_CHECKING:
     from ...render.request import Request
 
 
+@dataclass(frozen=True)
+class Until:
+    """When a render stops, and where it is stored meanwhile."""
+
+    timeout: Timeout = None
+    until_error: Annotated[
+        float | None,
+        Option(metavar="E", help="Stop when the estimated relMSE is below E, or after --spp; 65536 by default."),
+    ] = None
+    checkpoint: Checkpoint = None
+
+
 @verb(PICTURES, place=1)
 def render(
     scene: SceneFile,
@@ -30,12 +42,7 @@ def render(
     output: Annotated[Path | None, output_option("FILE", "The picture: .exr, .hdr, .png or .npz.")] = None,
     made: Material,
     how: Rendering,
-    timeout: Timeout = None,
-    until_error: Annotated[
-        float | None,
-        Option(metavar="E", help="Stop when the estimated relMSE is below E, or after --spp; 65536 by default."),
-    ] = None,
-    checkpoint: Checkpoint = None,
+    until: Until,
     executor: Executor,
     as_json: Json = False,
 ) -> None:
@@ -60,8 +67,8 @@ def render(
     from ...catalog import notation
 
     named = made.instead_of(scene, how.allow_code)
-    request = how.request(scene, output, timeout, named and notation.build(named), checkpoint)
-    request = replace(request, until_error=until_error)
+    request = how.request(scene, output, until.timeout, named and notation.build(named), until.checkpoint)
+    request = replace(request, until_error=until.until_error)
     carry_out(request, Path(scene).name, as_json, executor)
 
 

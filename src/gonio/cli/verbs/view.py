@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,15 @@ from .base import PICTURES, verb
 
 if TYPE_CHECKING:
     from ...viewer.stage import Stage
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where the page is served."""
+
+    host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1"
+    port: Annotated[int, Option(metavar="N", help="Port to listen at; 0 takes any free one.")] = 0
+    browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True
 
 
 @verb(PICTURES, place=4)
@@ -35,9 +45,7 @@ def view(
         Path | None,
         Option("-o", "--output", "--export", metavar="FILE", help="Write the page as one .html and exit."),
     ] = None,
-    host: Annotated[str, Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[int, Option(metavar="N", help="Port to listen at; 0 takes any free one.")] = 0,
-    browser: Annotated[bool, Option("--open/--no-open", help="Open the page in a browser.")] = True,
+    address: Address,
     device: Device = "cpu",
     allow_outside: Outside = False,
     allow_code: Code = False,
@@ -68,7 +76,7 @@ def view(
         return
     from ...viewer import server
 
-    server.serve(stage, host, port, browser, device, as_json)
+    server.serve(stage, address.host, address.port, address.browser, device, as_json)
 
 
 def _stage(target: Sequence[str], made: Material, allow_outside: bool, allow_code: bool) -> Stage:
