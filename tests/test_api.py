@@ -104,3 +104,16 @@ def test_tables_are_baked_without_a_folder(tmp_path: Path, monkeypatch: pytest.M
     for target, message in (("ggxx", "unknown distribution or material"), ("ggx(alpha=.1)", "without parameters")):
         with pytest.raises(InputError, match=message):
             go.bake(target)
+
+
+def test_what_the_command_line_tells_is_there_in_python(tmp_path: Path) -> None:
+    assert go.explain("ggx").text().startswith("ggx (")
+    assert go.explain("conductor").as_dict()["name"] == "conductor" and "families" in str(go.explain()).lower()
+    images.write(tmp_path / "a.exr", np.full((4, 4, 3), 4.0, np.float32))
+    with pytest.warns(GonioWarning, match="clip"):
+        picture = go.convert(tmp_path / "a.exr", tmp_path / "a.png")
+    assert picture.as_dict() == {"output": str(tmp_path / "a.png"), "exposure": 0.0, "notice": picture.notices[0]}
+    (tmp_path / "m.json").write_text('{"type": "lambert", "albedo": 0.5}')
+    assert list(go.info(tmp_path / "m.json")) == ["path", "materials"]
+    with pytest.raises(InputError):
+        go.info(tmp_path / "a.png")

@@ -52,7 +52,7 @@ def check(
     target  a material, or a target's name as `gonio verify` takes it
     law     a law's name, or several; all where None
     breaks  laws that may be broken, by name, or with the largest figure that may be; one that holds fails the test
-    more    as `gonio.verify` takes it: deep, seed, limit, memory, isolated
+    more    as `gonio.verify` takes it: deep, seed, timeout, memory, isolated
     A material that can be sent to another process, or named, is judged there, and may crash.
     """
     __tracebackhide__ = True

@@ -27,7 +27,7 @@ class Home(NamedTuple):
 
 
 HOMES = (
-    Home("gonio.models", "BSDF", "gonio plot {name}"),
+    Home("gonio.material", "BSDF", "gonio plot {name}"),
     Home("gonio.optics.ndf", "NDF", "--param ndf={name}, gonio bake {name}"),
     Home("gonio.optics.masking", "Masking", "--param masking={name}"),
     Home("gonio.optics.fresnel", "Fresnel", "--param fresnel={name}"),
