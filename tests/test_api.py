@@ -15,8 +15,16 @@ from gonio.pictures import images
 
 FUNCTIONS: dict[str, Callable[..., object]] = {
     "bake": go.bake,
+    "capture": go.capture,
     "compare": go.compare,
+    "compensation": go.compensation,
+    "compress": go.compress,
+    "convert": go.convert,
     "emit": emit,
+    "explain": go.explain,
+    "fit": go.fit,
+    "info": go.info,
+    "measure": go.measure,
     "plot": go.plot,
     "render": render,
     "study": go.study,
@@ -25,9 +33,16 @@ FUNCTIONS: dict[str, Callable[..., object]] = {
 # What only a command line needs: materials as text, and where a result goes when no variable takes it.
 TEXT = {"param", "preset", "as_json"}
 CREW = {"workers", "cluster"}  # in a program: with go.cluster(...)
-ONLY_TYPED = {"verify": {"at", "github"}, "emit": {"output", "bundle"}}
+ONLY_TYPED = {
+    "verify": {"at", "github"},
+    "emit": {"output"},
+    "fit": {"data", "scene", "spp", "output"},  # the scene is for go.fit_picture
+    "capture": {"next_", "output"},  # methods of what is returned
+    "compensation": {"model"},
+}
 # Typed as text there, as what it is here; and a file that the command line writes anyhow.
 OTHER_DEFAULTS = {"render exposure", "study exposure", "study output", "bake output", "bake lut", "emit functions"}
+OTHER_DEFAULTS |= {"convert exposure", "capture free", "fit free", "fit model"}
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))

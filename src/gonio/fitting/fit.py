@@ -185,6 +185,7 @@ def fit(
     param    path -> value of parameters that are held
     free     paths of parameters that move although they stay by themselves: factors that are 1
     grazing  degrees: values beyond, of either direction, are left out
+    progress  called after each start and at the end, with the loss in words
     Levenberg and Marquardt from several starts: the widths of lobes, ever more values as it goes on, at last all.
     Raises InputError for files, models and paths that are none.
     """

@@ -19,7 +19,7 @@ def compress(
     *,
     output: Annotated[Path, output_option("FILE", "The file to write: .gonio.")],
     codec: Annotated[str, Option(metavar="NAME", help="log, lowrank, rgl or network.")] = "log",
-    size: Annotated[int, Option("--bytes", metavar="N", help="Size per material, of log and lowrank.")] = 16384,
+    bytes: Annotated[int, Option(metavar="N", help="Size per material, of log and lowrank.")] = 16384,
     as_json: Json = False,
 ) -> None:
     """Write measured materials in fewer bytes, and report the error.
@@ -41,7 +41,7 @@ def compress(
     for file in files:
         operands.kind_of(file, {operands.Kind.TABLE}, "FILE")
 
-    rows = compressed(files, output, codec, size)
+    rows = compressed(files, output, codec, bytes)
     if as_json:
         print(json.dumps([row.as_dict() for row in rows] if len(rows) > 1 else rows[0].as_dict()))
         return

@@ -15,7 +15,7 @@ from .base import MATERIALS, verb
 
 @verb(MATERIALS, place=5)
 def explain(
-    model: Annotated[
+    name: Annotated[
         str,
         Argument(
             metavar="[NAME]",
@@ -39,5 +39,5 @@ def explain(
     """
     from ...viewer.explanation import explain
 
-    page = explain(model)
+    page = explain(name)
     print(json.dumps(page.as_dict()) if as_json else page.text(shutil.get_terminal_size().columns))

@@ -62,7 +62,7 @@ class Specimen:
 
 @verb(MATERIALS, place=7)
 def measure(
-    model: Annotated[
+    material: Annotated[
         str | None,
         Argument(metavar="MODEL", help="A material; none with --surface.", autocompletion=completion.materials),
     ] = None,
@@ -101,7 +101,7 @@ def measure(
             rate = done / max(time.perf_counter() - begun, 1e-3)
             bar.step(done, total, f"{done / 1e6:.1f}/{total / 1e6:.1f} M rays  {rate / 1e6:.2f} M rays/s")
 
-        target = made.text(model) if model and not specimen.surface else model
+        target = made.text(material) if material and not specimen.surface else material
         readout = run.measure(target, output, **options, progress=progress)
     if as_json:
         print(json.dumps(readout.as_dict()))
