@@ -24,7 +24,7 @@ _NAMES = re.compile(r"^  (-\S+(?:, --\S+)?(?= |$)|[a-z][\w-]*(?=  ))", re.MULTIL
 
 
 def _styled(text: str) -> str:
-    """Help with bold headings and coloured names. Typer's own way, by Rich, takes longer than all else together."""
+    """Help with bold headings and colored names. Typer's own way, by Rich, takes longer than all else together."""
     return _NAMES.sub("  \x1b[36m\\1\x1b[0m", _HEADINGS.sub("\x1b[1m\\g<0>\x1b[0m", text))
 
 
@@ -95,7 +95,7 @@ def gonio(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback where Gonio fails.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error.")] = False,
 ) -> None:
     """A laboratory for the scattering of light by materials."""
     if debug:
@@ -120,7 +120,7 @@ def _fail(error: GonioError, as_json: bool) -> int:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
-    """Our own warnings are for the user, in one line; those of libraries are for their authors."""
+    """Print Gonio's own warnings in one line; those of libraries are for their authors."""
     if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
         print(f"warning: {message}", file=sys.stderr)
 
@@ -145,7 +145,7 @@ def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
         print(ended.line, file=sys.stderr)
         return ended.code
     except OSError as error:
-        if isinstance(error, BrokenPipeError):  # `gonio schema | head`: whoever read us has seen enough
+        if isinstance(error, BrokenPipeError):  # `gonio schema | head`: the reader has closed the pipe
             _say_no_more()
             return 0
         if error.errno == errno.EIO and ended.number:  # the terminal has closed
@@ -165,8 +165,7 @@ def _say_no_more() -> None:
 
 
 def _broken(error: Exception, as_json: bool, ended: Ended) -> int:
-    """The exit code of what is a fault of code that the user named, or else of Gonio, unless a signal came in the
-    middle of an import."""
+    """The exit code of an unexpected error: of code that the user named, of Gonio, or of a signal during an import."""
     if ended.number:
         print(ended.line, file=sys.stderr)
         return ended.code

@@ -1,5 +1,5 @@
-"""Options and arguments that several verbs take, declared once: one by one, or as a dataclass of those that belong
-together, whose fields a verb gets as one parameter."""
+"""Options and arguments that several verbs share, declared once: singly, or as a dataclass of related ones, which a
+verb takes as one parameter."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def samples_option(text: str) -> OptionInfo:
 
 
 def render_option(name: str) -> OptionInfo:
-    """An option of `RenderOptions`, with what is said of it there."""
+    """An option of `RenderOptions`, with its help text."""
     kind, shown = get_args(get_type_hints(RenderOptions, include_extras=True)[name])
     flag = [f"--{name.replace('_', '-')}"] if kind is bool else []
     return Option(*flag, metavar=shown.metavar or None, help=shown.help)
@@ -70,10 +70,10 @@ class Material:
     ] = ""
 
     def texts(self, models: Sequence[str], accepted: Collection[operands.Kind] = ()) -> list[str]:
-        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share what they have.
+        """Each material as one text, such as "conductor(preset=Au,alpha=.3)"; several share the parameters they have.
 
         accepted  the kinds that may stand there; materials alone if not given
-        Raises InputError for what is none of these, and for a parameter that none has.
+        Raises InputError for a word of another kind, and for a parameter that no material has.
         """
         from ..catalog import notation, operands, texts
 
@@ -96,7 +96,7 @@ class Material:
         return [*([f"preset={self.preset}"] if self.preset else []), *(self.param or ())]
 
     def refuse(self, target: str) -> None:
-        """Raise InputError for parameters of a material where there is none."""
+        """Raise InputError if parameters are given without a material."""
         from ..errors import InputError
 
         if self.settings():

@@ -45,7 +45,7 @@ FORMER = (
 
 
 def warn(verb: str, old: str) -> None:
-    """Say on stderr what a former spelling is called now."""
+    """Print the present name of a former spelling, on stderr."""
     former = next(one for one in FORMER if (one.verb, one.old) == (verb, old))
     example = "DIR/" if former.convert is _folder else ""
     new = f"{former.new} {example}".rstrip() if former.new.startswith("-") else f"the argument {former.new}"

@@ -42,7 +42,7 @@ def info(
 
 
 def _print(is_document: bool, about: dict[str, Any]) -> None:
-    """A table of described materials, or of what is known of measured values."""
+    """Print a table of the materials, or of the properties of measured values."""
     from ...catalog import texts
     from ...measure import report
 

@@ -128,7 +128,7 @@ def verify(
 
 
 def _judge(task: Task, title: str, how: Effort, executor: Executor) -> Report:
-    """The report of a task, by the processes that are asked for, with a progress bar."""
+    """The report of a task, by the processes of `executor`, with a progress bar."""
     from ...verify.isolation import child
 
     with _progress(title) as progress:
