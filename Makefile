@@ -91,6 +91,7 @@ bench: .venv/installed
 
 docs: .venv/installed
 	$(BIN)/python docs/make_pages.py
+	$(BIN)/python docs/make_options.py
 
 clean:
 	rm -rf .venv out build dist

@@ -97,12 +97,12 @@ def test_a_picture_has_the_same_bits(
 def test_a_study_and_a_bake_have_the_same_bits(two: Cluster, scene: Path, tmp_path: Path) -> None:
     vary = {"shapes.0.material.p": [4, 16]}
     alone = go.study(scene, vary, spp=3)
-    table = go.bake("ggx", size=12, seed=1)
+    table = go.bake("ggx", resolution=12, seed=1)
     parts.Parts("none").clear()
     os.environ["GONIO_CACHE"] += "-anew"
     with crew.working(two):
         together = go.study(scene, vary, spp=3)
-        other = go.bake("ggx", size=12, seed=1)
+        other = go.bake("ggx", resolution=12, seed=1)
     assert together._repr_png_() == alone._repr_png_()
     assert all(np.array_equal(table.arrays[name], other.arrays[name]) for name in table.arrays)
 

@@ -48,6 +48,7 @@ _PLACES = {
     "energy": ("Albedo", "albedo"),
     "instruments.capture.run": ("capture",),
     "instruments.goniometer.run": ("measure",),
+    "instruments.pictures": ("fit_picture",),
     "render": ("render", "resume"),
     "render.tables": ("bake",),
     "shaders": ("emit",),
@@ -57,7 +58,11 @@ _PLACES = {
     "viewer.error_map": ("compare",),
     "viewer.panels": ("Panel",),
     "viewer.plots": ("plot",),
+    "viewer.compensations": ("compensation",),
     "viewer.contact_sheet": ("study",),
+    "viewer.conversion": ("convert",),
+    "viewer.description": ("info",),
+    "viewer.explanation": ("explain",),
     "viewer.widget": ("view",),
     "work.cluster": ("Cluster",),
 }
@@ -73,6 +78,7 @@ if TYPE_CHECKING:
     from .fitting.fit import fit
     from .instruments.capture.run import capture
     from .instruments.goniometer.run import measure
+    from .instruments.pictures import fit_picture
     from .material import BSDF, KnownViolation, Parameter, Preset, Sample, method, model, models, never
     from .material.parameters import (
         Angle,
@@ -124,8 +130,12 @@ if TYPE_CHECKING:
     from .transport.integrators import Integrator
     from .verify import verify
     from .verify.laws import Law
+    from .viewer.compensations import compensation
     from .viewer.contact_sheet import study
+    from .viewer.conversion import convert
+    from .viewer.description import info
     from .viewer.error_map import compare
+    from .viewer.explanation import explain
     from .viewer.panels import Panel
     from .viewer.plots import plot
     from .viewer.widget import view
@@ -229,16 +239,21 @@ __all__ = [
     "choice",
     "cluster",
     "compare",
+    "compensation",
     "compress",
+    "convert",
     "emit",
+    "explain",
     "file",
     "fit",
+    "fit_picture",
     "fits",
     "flag",
     "fresnel",
     "get_precision",
     "index",
     "indices",
+    "info",
     "material",
     "materials",
     "measure",

@@ -16,6 +16,7 @@ import inspect
 import math
 import operator
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import ParamSpec, TypeAlias, TypeVar
 
@@ -49,6 +50,26 @@ def checked(call: Callable[P, R]) -> Callable[P, R]:
         return call(*bound.args, **bound.kwargs)
 
     return guarded
+
+
+def renamed(**names: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function that takes former names of keywords too, with a DeprecationWarning: `@renamed(former="present")`."""
+
+    def decorate(call: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(call)
+        def translated(*args: P.args, **kwargs: P.kwargs) -> R:
+            for former, present in names.items():
+                if former in kwargs:
+                    if present in kwargs:
+                        raise InputError(f"both {former} and {present} given", call.__name__, f"give {present} alone")
+                    text = f"{call.__name__}: {former} is now {present}"
+                    warnings.warn(text, DeprecationWarning, stacklevel=2)
+                    kwargs[present] = kwargs.pop(former)
+            return call(*args, **kwargs)
+
+        return translated
+
+    return decorate
 
 
 def shown(value: object) -> str:

@@ -49,11 +49,11 @@ def check(
 ) -> Report:
     """The report of a material that satisfies its laws; otherwise the test fails with the report's text.
 
-    target  a material, or a target's name as `gonio verify` accepts it
-    law     the name of a law, or several; None for all
-    breaks  laws that may be broken, by name or with the largest allowed figure; the test fails if one of them holds
-    more    further arguments of `gonio.verify`: deep, seed, limit, memory, isolated
-    A material that can be sent to another process, or that has a name, is judged in one, which may crash.
+    target  a material, or a target's name as `gonio verify` takes it
+    law     a law's name, or several; all where None
+    breaks  laws that may be broken, by name, or with the largest figure that may be; one that holds fails the test
+    more    as `gonio.verify` takes it: deep, seed, timeout, memory, isolated
+    A material that can be sent to another process, or named, is judged there, and may crash.
     """
     __tracebackhide__ = True
     from .errors import InputError

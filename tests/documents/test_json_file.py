@@ -44,15 +44,15 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "study {} --vary a.albedo=.1,.3 --spp 1 --size 8x8 -o a.png",
         "plot {} -o a.png",
         "emit {}",
-        "bake {} --size 4 --lut E -o tables",
+        "bake {} --resolution 4 --lut E -o tables",
         "measure {} --theta-i 0,40 -o a.gonio",
         "compare {} lambert",
         "explain {}",
         "info {}",
-        "convert {} again.json",
+        "convert {} -o again.json",
         "fit sample --model {} -o refined.json",
         pytest.param("verify {} --quick --law linearity", marks=pytest.mark.slow),
-        pytest.param("view {} --export a.html", marks=pytest.mark.slow),
+        pytest.param("view {} -o a.html", marks=pytest.mark.slow),
     ],
 )
 def test_every_verb_takes_the_result_of_a_fit(

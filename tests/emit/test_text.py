@@ -183,7 +183,7 @@ def test_command_line_prints_writes_and_refuses(tmp_path: Path, capsys: pytest.C
     assert run("lambert", "--lang", "cg") == 2
     assert run("random-walk", "-p", "base=conductor", "-o", str(tmp_path / "no.glsl")) == 2
     assert not (tmp_path / "no.glsl").exists()
-    assert run("lambert", "--bundle", str(tmp_path / "half"), "-o", str(tmp_path)) == 2
+    assert run("lambert", "-o", f"{tmp_path / 'half'}/", "-o", str(tmp_path)) == 2
     assert not (tmp_path / "half").exists()  # neither of both, where one cannot be
 
 

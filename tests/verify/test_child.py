@@ -182,11 +182,11 @@ def test_the_report_is_the_same_in_one_process_in_another_and_in_several(file: P
     laws = ["energy", "weight", "isotropy"]
     here = plain(verify(names, quick=True, law=laws, isolated=False))
     assert here == plain(verify(names, quick=True, law=laws))
-    assert here == plain(verify(names, quick=True, law=laws, jobs=3))
+    assert here == plain(verify(names, quick=True, law=laws, workers=3))
 
 
 def test_a_crash_in_one_setting_leaves_the_others_as_they_are(file: Path) -> None:
-    report = verify([f"{file}:Good", f"{file}:Aborts", "lambert"], quick=True, law=["weight", "shader"], jobs=2)
+    report = verify([f"{file}:Good", f"{file}:Aborts", "lambert"], quick=True, law=["weight", "shader"], workers=2)
     assert [card.passed for card in report.cards] == [True, False, True]
 
 

@@ -24,6 +24,9 @@ from gonio.viewer.variations import Variation
         ('name="a,b",c', ("a,b", "c")),
         ("flag=true,false", (True, False)),
         ("file=v1.5.png", ("v1.5.png",)),
+        ("file=a/../b.png", ("a/../b.png",)),
+        ("p=0..1", (0, 0.25, 0.5, 0.75, 1)),
+        ("p=1..16", (1, 2, 4, 8, 16)),  # geometric from a factor of ten on
     ],
 )
 def test_values_are_split_at_commas_outside_of_brackets(text: str, values: tuple[object, ...]) -> None:

@@ -303,7 +303,7 @@ def test_the_export_holds_everything_in_one_and_a_half_megabytes(tmp_path: Path)
 def test_nothing_is_written_where_it_cannot_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for wrong in ("page.pdf", "no/such/page.html"):
         with pytest.raises(SystemExit) as ended:
-            cli.main(["view", "lambert", "--export", str(tmp_path / wrong)])
+            cli.main(["view", "lambert", "--output", str(tmp_path / wrong)])
         assert ended.value.code == 2
     assert "end" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -17,6 +17,8 @@ from ..material.bsdf import BSDF
 from ..material.parameters import Value
 from . import documents, library, outside
 
+RANGE_STEPS = 5  # values of a range
+_RANGE = re.compile(r"(.+?)\.\.(.+)", re.DOTALL)
 _CALL = re.compile(r"\s*([\w-]+(?::[\w/-]+)?|[^({]+\.py:\w+)\s*(?:\((.*)\))?\s*", re.DOTALL)
 _SETTINGS = re.compile(r"\(\s*[\w.]+\s*=.*\)\s*\Z", re.DOTALL)  # at the end of a text
 
@@ -165,3 +167,23 @@ def as_text(value: object) -> str:
     if isinstance(value, list | tuple):
         return ",".join(map(as_text, value))
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def range_of(text: str) -> list[str]:
+    """The five values of "LOW..HIGH", geometric where the range spans a factor of ten or more; empty of any other text.
+
+    Raises InputError for ends that are no numbers, or do not increase.
+    """
+    import numpy as np
+
+    ends = _RANGE.fullmatch(text)
+    if ends is None:
+        return []
+    try:
+        low, high = float(ends[1]), float(ends[2])
+    except ValueError:
+        raise InputError(f"'{text}' is not a range", "--vary", "such as --vary alpha=0.01..1") from None
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InputError(f"'{text}' is not an increasing range", "--vary", "such as --vary alpha=0.01..1")
+    steps = np.geomspace if low > 0.0 and high >= 10.0 * low else np.linspace
+    return [f"{value:.6g}" for value in steps(low, high, RANGE_STEPS)]

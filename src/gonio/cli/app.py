@@ -9,14 +9,14 @@ import re
 import signal
 import sys
 import warnings
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from ..errors import GonioError, GonioWarning, InputError, MachineError, in_user_code, out_of_loop
 from ..files import check_current_folder
-from . import streams
+from . import renamed, streams
 from .signals import Ended, exit_code
 from .verbs.base import MATERIALS, PICTURES, SUPPORT, Verb
 
@@ -25,11 +25,16 @@ _NAMES = re.compile(r"^  (-\S+(?:, --\S+)?(?= |$)|[a-z][\w-]*(?=  ))", re.MULTIL
 
 
 def _styled(text: str) -> str:
-    """Help with bold headings and coloured names. Typer's own way, by Rich, takes longer than all else together."""
+    """Help with bold headings and colored names. Typer's own way, by Rich, takes longer than all else together."""
     return _NAMES.sub("  \x1b[36m\\1\x1b[0m", _HEADINGS.sub("\x1b[1m\\g<0>\x1b[0m", text))
 
 
 class _Command(TyperCommand):
+    def make_parser(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        parser = super().make_parser(ctx)  # type: ignore[arg-type]
+        renamed.accept(parser, self.name or "")
+        return parser
+
     def get_help(self, ctx: typer.Context) -> str:  # type: ignore[override]  # Typer has its own Click
         return _styled(super().get_help(ctx))
 
@@ -91,7 +96,7 @@ def gonio(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback where Gonio fails.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Print the traceback of an error.")] = False,
 ) -> None:
     """A laboratory for the scattering of light by materials."""
     if debug:
@@ -116,7 +121,7 @@ def _fail(error: GonioError, as_json: bool) -> int:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *place: object, **more: object) -> None:
-    """Our own warnings are for the user, in one line; those of libraries are for their authors."""
+    """Print Gonio's own warnings in one line; those of libraries are for their authors."""
     if issubclass(category, GonioWarning) or os.environ.get("GONIO_DEBUG"):
         print(f"warning: {message}", file=sys.stderr)
 
@@ -131,7 +136,7 @@ def run(arguments: list[str] | None, ended: Ended | None = None) -> int:
         code = _run(given, ended)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:  # `gonio schema | head`: whoever read us has seen enough
+    except BrokenPipeError:  # `gonio schema | head`: the reader has closed the pipe
         streams.silence(sys.stdout, sys.stderr)
         return 0
     except streams.OutputError as error:

@@ -92,7 +92,7 @@ def run(
             cells = data_of(read(file), grazing, file)
             fits = ranked(
                 [
-                    fit(cells, model, lobes=lobes, metric=metric, fixed=given, free=free, grazing=grazing)
+                    fit(cells, model, lobes=lobes, loss=metric, param=given, free=free, grazing=grazing)
                     for model in models
                 ]
             )

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import renamed
 from ..catalog import notation
 from ..errors import InputError
 from ..material import BSDF, tree
@@ -159,14 +160,15 @@ def moving_of(
     return material, [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
 
 
+@renamed(metric="loss", fixed="param")
 @public
 def fit(
     data: str | os.PathLike[str] | Measurement | Data,
     model: str | BSDF = "conductor",
     *,
     lobes: int = 1,
-    metric: str = "relative",
-    fixed: Mapping[str, object] | None = None,
+    loss: str = "relative",
+    param: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
     grazing: float = GRAZING,
     progress: Callable[[str], None] = lambda text: None,
@@ -179,22 +181,23 @@ def fit(
     data     a file of measurements, a table, or `Data`
     model    a material, or its name, or a sum of names such as "lambert+ggx"; what it is set to is where the fit starts
     lobes    how many of the last part are added up
-    metric   "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
-    fixed    path -> value of parameters that stay
+    loss     "relative", "log", "log1p" (Low2012), "cuberoot" or "linear" (Ngan2005)
+    param    path -> value of parameters that are held
     free     paths of parameters that move although they stay by themselves: factors that are 1
     grazing  degrees: values beyond, of either direction, are left out
+    progress  called after each start and at the end, with the loss in words
     Levenberg and Marquardt from several starts: the widths of lobes, ever more values as it goes on, at last all.
     Raises InputError for files, models and paths that are none.
     """
     started = time.perf_counter()
-    if metric not in METRICS:
-        raise InputError(f"unknown metric '{metric}'", "metric", " | ".join(METRICS))
-    material, moving = moving_of(model, lobes, fixed, free)
+    if loss not in METRICS:
+        raise InputError(f"unknown metric '{loss}'", "loss", " | ".join(METRICS))
+    material, moving = moving_of(model, lobes, param, free)
     cells = (
         data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
     )
     # "relative" weighs by the model itself, so its way there leads over the logarithm, which needs no weights
-    rough = "log" if metric == "relative" else metric
+    rough = "log" if loss == "relative" else loss
     floor = Problem(material, moving, cells.some(SOME), rough).floor
 
     def problem(part: Data, name: str) -> Problem:
@@ -210,15 +213,15 @@ def fit(
     # the two best, where they differ: a few values may not tell which is better
     ends = [solve(middle, one.numbers, steps=40) for one in tried[:2]]
     best = min(ends, key=lambda one: one.cost)
-    if metric != rough:
-        middle = problem(middle.data, metric)
+    if loss != rough:
+        middle = problem(middle.data, loss)
         best = reweighed(middle, best.numbers, times=3)
     whole = middle
     if len(cells) > SOME:
-        whole = problem(cells, metric)
+        whole = problem(cells, loss)
         best = reweighed(whole, best.numbers, times=1)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
-    return _result(whole, best, metric, time.perf_counter() - started)
+    return _result(whole, best, loss, time.perf_counter() - started)
 
 
 def _starts(material: BSDF, free: list[Free]) -> list[Floats]:

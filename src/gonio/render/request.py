@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..material import BSDF
 from ..pictures import denoise, exposures, images
 from ..scene.film import check_film
+from .options import RenderOptions
 
 MOST = 1 << 30  # samples a pixel, and segments: kernels count them in 32 bits
 UNTIL_MOST = 1 << 16  # samples per pixel until an error is reached, where nobody says how many at most
@@ -21,25 +22,12 @@ MOST_THREADS = 1024
 
 
 @dataclass(frozen=True)
-class Request:
-    """What to render and how; None means: as the scene says."""
+class Request(RenderOptions):
+    """What to render, and how."""
 
     scene: Path  # of a material alone, its name
     output: Path | None = None
-    spp: int | None = None
-    size: tuple[int, int] | None = None
-    integrator: str | None = None
-    max_depth: int | None = None
-    sampler: str | None = None
-    seed: int | None = None
-    device: str = "cpu"
-    spectral: bool = False
-    threads: int | None = None
     timeout: float | None = None
-    denoise: bool = False
-    exposure: exposures.Exposure = 0.0
-    allow_outside: bool = False
-    allow_code: bool = False
     overrides: Mapping[str, object] = field(default_factory=dict)
     material: BSDF | None = None  # to be shown on a ball, in place of a scene
     checkpoint: Path | None = None  # file of the sums so far; one that is there is gone on from

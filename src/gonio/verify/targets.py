@@ -13,49 +13,35 @@ gold.json                the result of a fit, or a material in Gonio's notation
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..catalog import notation, operands, outside, texts
 from ..catalog.operands import Kind
 from ..errors import InputError
 from .subject import Subject
 
-STEPS = 5  # of a sweep
 JUDGED = frozenset({Kind.PLUGIN, *operands.MATERIALS})
 
 
-def resolve(target: str, settings: Sequence[str] = (), sweep: str = "") -> list[Subject]:
-    """The subjects that a target names, one per value of the sweep.
+def resolve(target: str, settings: Sequence[str] = (), vary: str = "") -> list[Subject]:
+    """The subjects that a target names, one for each value that varies.
 
     settings  "name=value" each
-    sweep     "name=low..high" (5 values, geometric if the range spans a factor of ten or more), or "name=v1,v2,..."
+    vary      "name=low..high" (5 values, geometric where the range spans ten or more), or "name=v1,v2,..."
     Raises InputError with the nearest known spelling.
     """
     given = dict(map(notation.assignment, settings))
-    if not sweep:
+    if not vary:
         return [_build(target, given)]
-    name, values = _sweep(sweep)
+    name, values = _values(vary)
     return [_build(target, {**given, name: value}) for value in values]
 
 
-def _sweep(text: str) -> tuple[str, list[str]]:
-    name, value = notation.assignment(text, "--sweep")
-    ends = re.fullmatch(r"(.+?)\.\.(.+)", value)
-    if not ends:
-        return name, value.split(",")
-    try:
-        low, high = float(ends[1]), float(ends[2])
-    except ValueError:
-        raise InputError(f"'{value}' is not a range", "--sweep", "such as --sweep alpha=0.01..1") from None
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InputError(f"'{value}' is not an increasing range", "--sweep", "such as --sweep alpha=0.01..1")
-    many = np.geomspace(low, high, STEPS) if low > 0.0 and high >= 10.0 * low else np.linspace(low, high, STEPS)
-    return name, [f"{v:.6g}" for v in many]
+def _values(text: str) -> tuple[str, list[str]]:
+    name, value = notation.assignment(text, "--vary")
+    return name, texts.range_of(value) or value.split(",")
 
 
 def _build(target: str, given: dict[str, str]) -> Subject:

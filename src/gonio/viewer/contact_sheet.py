@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Unpack
 
 from ..bridge import engine
 from ..catalog import notation, operands
@@ -26,6 +27,7 @@ from ..owner import public
 from ..pictures import exposures, images
 from ..render.execute import by_crew, execute
 from ..render.finish import picture_of
+from ..render.options import RenderKeywords, takes_render_options
 from ..render.prepare import Prepared, prepare
 from ..render.request import Request
 from ..render.request_json import described
@@ -71,25 +73,14 @@ class Sheet:
 
 
 @public
+@takes_render_options
 def study(
     scene: str | Path | BSDF,
     vary: Mapping[str | tuple[str, ...], Sequence[object]],
     *,
     output: str | Path | None = None,
-    spp: int | None = None,
-    size: tuple[int, int] | None = None,
-    integrator: str | None = None,
-    max_depth: int | None = None,
-    sampler: str | None = None,
-    seed: int | None = None,
-    device: str = "cpu",
-    spectral: bool = False,
-    threads: int | None = None,
-    denoise: bool = False,
-    exposure: exposures.Exposure = 0.0,
-    allow_outside: bool = False,
-    allow_code: bool = False,
     title: str = "",
+    **options: Unpack[RenderKeywords],
 ) -> Sheet:
     """Render a scene with every combination of values, and arrange the pictures on one labeled sheet.
 
@@ -109,19 +100,7 @@ def study(
     named = _named(scene)
     request = Request(
         Path(named[0].name if named else str(scene)),
-        spp=spp,
-        size=size,
-        integrator=integrator,
-        max_depth=max_depth,
-        sampler=sampler,
-        seed=seed,
-        device=device,
-        spectral=spectral,
-        threads=threads,
-        denoise=denoise,
-        exposure=exposure,
-        allow_outside=allow_outside,
-        allow_code=allow_code,
+        **options,
     )
     variations = [variation(path, values) for path, values in vary.items()]
     tell = functools.partial(warnings.warn, category=GonioWarning, stacklevel=3)

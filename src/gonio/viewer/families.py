@@ -27,7 +27,7 @@ class Home(NamedTuple):
 
 
 HOMES = (
-    Home("gonio.models", "BSDF", "gonio plot {name}"),
+    Home("gonio.material", "BSDF", "gonio plot {name}"),
     Home("gonio.optics.ndf", "NDF", "--param ndf={name}, gonio bake {name}"),
     Home("gonio.optics.masking", "Masking", "--param masking={name}"),
     Home("gonio.optics.fresnel", "Fresnel", "--param fresnel={name}"),
@@ -35,9 +35,9 @@ HOMES = (
     Home("gonio.verify.laws", "Law", "gonio verify TARGET --law {name}"),
     Home("gonio.shaders.languages", "Language", "gonio emit MODEL --lang {name}"),
     Home("gonio.instruments.surfaces.base", "Surface", "gonio measure --surface {name} -o FILE"),
-    Home("gonio.measure.tables.base", "Measurement", "gonio measure MODEL --kind {name} -o FILE.gonio"),
-    Home("gonio.measure.formats.base", "Format", "a file with its suffix, wherever measured values are accepted"),
-    Home("gonio.measure.compression.base", "Method", "gonio compress FILE --method {name} -o OUT.gonio"),
+    Home("gonio.measure.tables.base", "Measurement", "gonio measure MODEL --table {name} -o FILE.gonio"),
+    Home("gonio.measure.formats.base", "Format", "a file with its suffix, wherever measured values may stand"),
+    Home("gonio.measure.compression.base", "Method", "gonio compress FILE --codec {name} -o OUT.gonio"),
     Home("gonio.catalog.documents", "Document", 'in a scene {{"type": "{name}", "file": ...}}'),
     Home("gonio.viewer.panels.base", "Panel", "a panel of gonio view"),
 )

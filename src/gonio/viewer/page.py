@@ -340,7 +340,7 @@ def export(what: Stage, path: Path) -> Path:
     from .. import files
 
     if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"unknown page format '{path.suffix}'", "--export", "give a name that ends in .html")
+        raise InputError(f"unknown page format '{path.suffix}'", "--output", "give a name that ends in .html")
     target = files.check_file(path)
     files.write_whole(target, html(page_data(what)).encode())
     return target

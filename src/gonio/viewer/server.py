@@ -18,6 +18,7 @@ import contextlib
 import errno
 import html
 import ipaddress
+import json
 import re
 import signal
 import socket
@@ -166,7 +167,7 @@ class Server(uvicorn.Server):
     """uvicorn with the limits of `guards`, which prints its address and opens the browser once it is running."""
 
     def __init__(self, application: Application, host: str, port: int, browser: bool = False, quiet: bool = False):
-        self.application, self.browser, self.quiet = application, browser, quiet
+        self.application, self.browser, self.quiet, self.as_json = application, browser, quiet, False
         self._redirect: Path | None = None
         guarded = type("Guarded", (guards.GuardedHTTP,), {"waiting": {}, "answering": {}})
         self.listener = _listen(host, port)
@@ -210,7 +211,7 @@ class Server(uvicorn.Server):
         if self.application.watch:
             self.application.watch.start()
         if not self.quiet:
-            print(f"{self.url}\nPress Ctrl-C to end", flush=True)
+            print(json.dumps({"url": self.url}) if self.as_json else f"{self.url}\nCtrl-C ends it", flush=True)
         if self.browser:
             # some browsers block the caller until they are closed
             self._redirect = _redirect_file(self.url)
@@ -285,19 +286,28 @@ def _open(url: str) -> None:
         webbrowser.open(url)
 
 
-def serve(what: Stage, host: str = LOOPBACK, port: int = 0, browser: bool = True, device: str = "cpu") -> None:
+def serve(
+    what: Stage,
+    host: str = LOOPBACK,
+    port: int = 0,
+    browser: bool = True,
+    device: str = "cpu",
+    as_json: bool = False,
+) -> None:
     """Show a stage until Ctrl-C.
 
-    host     address to listen on; any other than loopback opens it to the network, with a printed warning
-    port     0 for any free port
-    browser  whether to open the page in a browser
-    Raises MachineError if the port is in use or the device missing, InputError if a model cannot be shown.
+    host     where to listen; anything but a loopback address opens it to the network, and a line says so
+    port     0 takes any that is free
+    browser  open the page there
+    as_json  print the address as {"url": ...}
+    Raises MachineError where the port is taken or the device missing, InputError where a model cannot be shown.
     """
     if not 0 <= port < 65536:
         raise InputError(f"port {port}", "--port", "give 0 to 65535")
     engine.variant_for(device)  # raises for a missing GPU now, not when the first page connects
     application = Application(what, AccessControl(host), device)
     server = Server(application, host, port, browser)
+    server.as_json = as_json
     if not ipaddress.ip_address(server.address).is_loopback:
         warning = "anyone who knows the address below has access, and the connection is not encrypted"
         print(f"listening on {server.address}: {warning}", file=sys.stderr)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..catalog import notation
+from ..catalog import notation, texts
 from ..errors import InputError
 from ..render.request import Request
 from ..scene.schema import SceneDescription
 from . import figures
+
+_RANGE = re.compile(r"[-+\d.eE]*\d\.\.[-+\d.eE]+")  # of numbers; a path of files may have two dots too
 
 
 @dataclass(frozen=True)
@@ -49,9 +52,11 @@ def _last_word(path: str) -> str:
 def parse_variation(text: str) -> Variation:
     """A `Variation` of "shapes.0.material.p=4,16,64", or of several paths together, "kd,ks=(0.2,0.8),(0.5,0.5)".
 
-    Values are JSON; commas in brackets do not separate.
+    Values are JSON; commas in brackets do not separate. "0.1..1" is a range of five values.
     """
     paths, values = notation.assignment(text, "--vary")
+    if _RANGE.fullmatch(values):
+        return variation(paths, [figures.parse_value(value) for value in texts.range_of(values)])
     return variation(paths, figures.split_values(values))
 
 

@@ -177,11 +177,11 @@ def _check(lut: tuple[str, ...] | list[str], size: int, spp: int, points: str, l
     if layout not in LAYOUTS:
         raise InputError(f"unknown layout '{layout}'", "--layout", did_you_mean(layout, [*LAYOUTS, "homework"]))
     if not 1 <= size <= MAX_SIZE:
-        raise InputError(f"a table of {size} x {size} requested", "--size", f"give 1 to {MAX_SIZE}")
+        raise InputError(f"a table of {size} x {size} asked for", "--resolution", f"give 1 to {MAX_SIZE}")
     if spp < 1:
-        raise InputError(f"{spp} samples given", "--spp", "give 1 or more")
+        raise InputError(f"{spp} samples asked for", "--samples", "give 1 or more")
     if points not in monte_carlo.POINTS:
-        raise InputError(f"unknown points '{points}'", "--points", did_you_mean(points, list(monte_carlo.POINTS)))
+        raise InputError(f"unknown points '{points}'", "--sampler", did_you_mean(points, list(monte_carlo.POINTS)))
 
 
 def _resolved(

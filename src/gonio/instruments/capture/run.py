@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import files
+from ...arguments import renamed
 from ...catalog import operands
 from ...errors import InputError
 from ...fitting.fit import Fit, moving_of
@@ -144,6 +145,7 @@ def _table_format(path: Path) -> Format:
     return form
 
 
+@renamed(fixed="param")
 @public
 def capture(
     photographs: str | Path | Sequence[str],
@@ -151,7 +153,7 @@ def capture(
     *,
     calibration: str | Path | None = None,
     grazing: float = GRAZING,
-    fixed: Mapping[str, object] | None = None,
+    param: Mapping[str, object] | None = None,
     free: Sequence[str] = (),
     progress: Callable[[str], None] = lambda text: None,
 ) -> Capture:
@@ -165,7 +167,7 @@ def capture(
     model        what is fitted, as `go.fit` takes it; None: samples alone
     calibration  the file that says what stood where; None: calibration.json beside the photographs
     grazing      degrees: pixels seen or lit from beyond are left out
-    fixed        path -> value of parameters that stay
+    param        path -> value of parameters that are held
     free         paths of parameters that move although they stay by themselves
     Raises InputError, with the file's name, for photographs without exposure data, of another size, saturated
     throughout, or that show no sample.
@@ -186,7 +188,7 @@ def capture(
     found = None
     if model is not None:
         progress("fits")
-        found = fitting.fitted(scene, chosen, model, stated.uncertainty, fixed=fixed, free=free)
+        found = fitting.fitted(scene, chosen, model, stated.uncertainty, fixed=param, free=free)
         scene = found.problem.corrected(found.numbers)
     gathered = pixels.gather(scene, chosen, title=folder.resolve().name)
     warnings = advice.on(scene, chosen, found)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ... import files
+from ...arguments import renamed
 from ...errors import InputError
 from .. import parted, read
 from ..compare import difference
@@ -47,20 +48,21 @@ class Compressed:
         return dict(vars(self))
 
 
+@renamed(method="codec")
 def compress(
     source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     output: str | os.PathLike[str],
-    method: str = "log",
+    codec: str = "log",
     bytes: int = SIZE,
 ) -> list[Compressed]:
     """Compress measured materials into a `.gonio` file; the errors are measured on the written file.
 
-    source  a file or several, as for `go.Measured`; several make one file, with materials OUT.gonio:NAME
-    method  log (quantized logarithms), lowrank (shared factors), rgl (without `vndf`), network (675 weights)
-    bytes   per material, for log and lowrank
-    Raises InputError if a file cannot be read, or the method does not apply to it.
+    source  a file or several, as `go.Measured` takes them; several make one file, whose materials are OUT.gonio:NAME
+    codec   log (quantised logarithms), lowrank (factors that all share), rgl (without `vndf`), network (675 weights)
+    bytes   a material, for log and lowrank
+    Raises InputError where a file cannot be read, or the codec cannot be used for it.
     """
-    one = Method.family.get(method, "method")
+    one = Method.family.get(codec, "codec")
     if not isinstance(bytes, int) or bytes < LEAST:
         raise InputError(f"{bytes} bytes given, a whole number from {LEAST} expected", "bytes")
     path = files.check_file(Path(output))
@@ -83,7 +85,7 @@ def compress(
         new = own.read(data, str(path), item)
         results.append(
             Compressed(
-                f"{output}:{item}" if item else str(output), new.name, method, round(len(data) / len(made)),
+                f"{output}:{item}" if item else str(output), new.name, codec, round(len(data) / len(made)),
                 sum(array.nbytes for array in table.arrays().values()), difference(table, new),
                 sphere.error(sphere.picture(table.rgb), sphere.picture(new.rgb)), seconds,
             )

@@ -112,9 +112,9 @@ def trial(
     threshold  p-value below which a test rejects, if the task is part of a larger one
     """
     if jobs < 1:
-        raise InputError(f"{jobs} jobs", "--jobs", "give 1 or more")
+        raise InputError(f"{jobs} workers", "--workers", "give 1 or more")
     limit = watch.LIMIT if limit is None else limit
-    for name, value in (("--limit", limit), ("--memory", memory)):
+    for name, value in (("--timeout", limit), ("--memory", memory)):
         if value is not None and value <= 0.0:
             raise InputError(f"a limit of {value:g}", name, "give more than 0")
     jobs = min(jobs, sum(item.cards for item in task.items))
