@@ -130,8 +130,8 @@ def test_every_result_is_read(tmp_path: Path, content: Any, item: str, expected:
         ('{"type": "two-sided", "base": ' * 70 + '{"type": "lambert"}' + "}" * 70, "", "more than 64 materials"),
         ('{"fits": [{"notation": 3}]}', "", 'an object with a "type"'),
         ('[{"file": "a", "fits": [{"notation": {"type": "lambert"}}]}, {"file": "b", "fits": [{}]}]', "", "say which"),
-        ('{"type": "own.py:Own", "albedo": 0.5}', "", "code that a file of data alone does not run"),
-        ('{"type": "conductor", "ndf": "own.py:Own"}', "", "code that a file of data alone does not run"),
+        ('{"type": "own.py:Own", "albedo": 0.5}', "", "code that a data file may not run"),
+        ('{"type": "conductor", "ndf": "own.py:Own"}', "", "code that a data file may not run"),
     ],
 )
 def test_what_is_no_material_is_one_clear_error(tmp_path: Path, content: str, text: str, words: str) -> None:
@@ -194,7 +194,7 @@ def test_a_scene_takes_it_with_its_own_defaults(tmp_path: Path, fitted: Path) ->
         ({"type": "measured", "file": "../secret.binary"}, "outside the scene's folder"),
         ({"type": "measured", "file": "/etc/secret.binary"}, "outside the scene's folder"),
         ({"type": "mix", "a": {"type": "json", "file": "found.json"}}, "in another file"),
-        ({"scene": {}}, "it holds no material"),
+        ({"scene": {}}, "it contains no material"),
     ],
 )
 def test_nothing_gets_in_through_it(tmp_path: Path, content: dict[str, Any], says: str) -> None:

@@ -54,7 +54,7 @@ if importlib.util.find_spec("MaterialX"):
         assert found["base_color"] == pytest.approx([0.8, 0.4 * 0.75, 0.2 * 0.5])
         assert [found[key] for key in ("base_weight", "specular_roughness", "coat_weight")] == [1.0, 0.2, 0.5]
         assert found["fuzz_roughness"] == pytest.approx(0.3**0.4)
-        assert notices == ("specular_rotation is left out",)
+        assert notices == ("specular_rotation is omitted",)
         old = STANDARD.replace('surfaceshader"', 'surfaceshader" version="1.0.0"', 1)
         assert read(tmp_path, old).notation["base_weight"] == 0.8
 
@@ -148,14 +148,14 @@ if importlib.util.find_spec("MaterialX"):
         "no value": (given("base_weight", "float", ""), "base_weight = '' is no float"),
         "not finite": (given("base_weight", "float", 'value="1e999"'), "base_weight = '1e999' is no"),
         "of itself": (including("a.mtlx"), "which includes it again"),
-        "outside": (including("../b.mtlx"), "lies outside its folder"),
+        "outside": (including("../b.mtlx"), "is outside its folder"),
         "a million nodes": (HEAD + "<a/>" * 1_000_000 + "</materialx>", "more than 100000 elements"),
         "deep": (HEAD + "<a>" * 100_000 + "</a>" * 100_000 + "</materialx>", "more than 64 elements"),
         "laughs": (f'<!DOCTYPE m [<!ENTITY l0 "ha">{LAUGHS}]><materialx>&l11;</materialx>', "declares a document type"),
         "a file": ('<!DOCTYPE m [<!ENTITY x SYSTEM "/etc/passwd">]><materialx>&x;</materialx>', "declares a document"),
         "cut off": (PAINT[:200], "not well-formed"),
         "another language": ("<scene/>", "<scene> is no MaterialX document"),
-        "nothing to read": (f"{HEAD}</materialx>", "it holds no material"),
+        "nothing to read": (f"{HEAD}</materialx>", "it contains no material"),
     }
 
     @pytest.mark.parametrize("name", BAD)

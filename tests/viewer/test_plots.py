@@ -170,7 +170,7 @@ def test_the_map_of_schlicks_error_is_the_difference_of_both() -> None:
     ("arguments", "text"),
     [
         ({"eta": 0.0}, "eta = 0, a positive index expected"),
-        ({"eta": 1.5, "k": -1.0}, "k = -1, which would give light"),
+        ({"eta": 1.5, "k": -1.0}, "k = -1, which would amplify light"),
         ({"eta": 1.5, "metal": "Au"}, "an index and a metal"),
         ({"metal": "Aurum"}, "unknown metal 'Aurum'"),
     ],

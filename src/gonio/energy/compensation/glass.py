@@ -172,7 +172,7 @@ def glass(base: BSDF, surface: Microsurface) -> Glass:
     width = sqrt(0.5 * (sqr(alpha.x) + sqr(alpha.y))) if two else alpha.x
     eta = maximum(index, 1.0 / index)
     place = (
-        inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.LARGEST_ROOT)), curves.GLASS_ETAS),
+        inset(sqrt(maximum(eta - 1.0, 1e-6) / ((eta + 1.0) * curves.MAX_ROOT)), curves.GLASS_ETAS),
         inset(sqrt(width), curves.GLASS_ROWS),
     )
     tables = curves.glass(*names)
