@@ -186,7 +186,7 @@ def test_light_is_absorbed_inside_by_the_colour_at_its_depth() -> None:
     ("values", "what"),
     [
         ({"emission_luminance": 10.0}, "emission given"),
-        ({"transmission_weight": 1.0, "transmission_depth": 1.0, "transmission_scatter": 0.5}, "volume scattering is not"),
+        ({"transmission_weight": 1.0, "transmission_depth": 1.0, "transmission_scatter": 0.5}, "volume scattering"),
         ({"transmission_weight": 1.0, "transmission_dispersion_scale": 1.0}, "dispersion is not supported"),
         ({"specular_ior": 0.7}, ">= 1"),
     ],
