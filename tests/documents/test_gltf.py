@@ -193,8 +193,8 @@ BAD = {
     "picture without data": (with_image(), "/images/0/bufferView"),
     "no base64": (with_buffer(uri="data:;base64,###"), "no base64"),
     "a buffer that lies": (with_buffer(uri="data:;base64,AAAA"), "a buffer of 36 bytes, but there are 3"),
-    "cut off": (WHOLE[:-40], "and has"),
-    "a head alone": (WHOLE[:12], "no glTF"),
+    "cut off": (WHOLE[:-40], "but it has"),
+    "a head alone": (WHOLE[:12], "not a glTF file"),
     "a chunk that lies": (WHOLE[:12] + b"\xff\xff\xff\x7f" + WHOLE[16:], "a chunk of 2147483647 bytes"),
     "version 1": (WHOLE[:4] + b"\1" + WHOLE[5:], "version 1 of .glb"),
     "a view that lies": (
@@ -219,11 +219,11 @@ BAD = {
         "a list of 3 numbers expected",
     ),
     "no number": (b'{"asset": {"version": "2.0"}, "materials": [{"alphaCutoff": NaN}]}', "NaN is no number"),
-    "deep": (b'{"asset": ' * 100_000, "nested too deep|no JSON"),
+    "deep": (b'{"asset": ' * 100_000, "nested too deep|not valid JSON"),
     "version 3": (b'{"asset": {"version": "3.0"}}', "version 3.0"),
     "no materials": (b'{"asset": {"version": "2.0"}}', "it contains no material"),
     "a list": (b"[]", "an object expected"),
-    "nothing": (b"", "no JSON"),
+    "nothing": (b"", "not valid JSON"),
 }
 
 

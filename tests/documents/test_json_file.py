@@ -119,9 +119,9 @@ def test_every_result_is_read(tmp_path: Path, content: Any, item: str, expected:
 @pytest.mark.parametrize(
     ("content", "text", "words"),
     [
-        ("{", "", "is no material"),
-        ('{"scene": {}, "camera": {}}', "", "is no material"),
-        ("[1, 2]", "", "is no material"),
+        ("{", "", "is not a material"),
+        ('{"scene": {}, "camera": {}}', "", "is not a material"),
+        ("[1, 2]", "", "is not a material"),
         ('{"type": "conductr"}', "", "unknown material 'conductr'"),
         ('{"type": "conductor", "alhpa": 1}', "", "no parameter 'alhpa'"),
         ('{"fits": [{"material": "lambert(albedo=0.5)"}]}', "", "name the material itself: 'lambert(albedo=0.5)'"),

@@ -141,8 +141,8 @@ if importlib.util.find_spec("MaterialX"):
     BAD = {
         "unknown surface": (surface("", "gold_leaf"), "unknown node 'gold_leaf'"),
         "unknown input": (given("base_colour", "color3", 'value="1,1,1"'), "no input 'base_colour'"),
-        "a picture": (given("base_color", "color3", 'nodename="tiles"'), "its base_color is joined to 'tiles'"),
-        "a graph": (given("base_color", "color3", 'nodegraph="G" output="o"'), "its base_color is joined to 'G'"),
+        "a picture": (given("base_color", "color3", 'nodename="tiles"'), "its base_color is connected to 'tiles'"),
+        "a graph": (given("base_color", "color3", 'nodegraph="G" output="o"'), "its base_color is connected to 'G'"),
         "another type": (given("base_color", "float", 'value="1"'), "of type float, color3 expected"),
         "no number": (given("base_weight", "float", 'value="red"'), "base_weight = 'red' is no float"),
         "no value": (given("base_weight", "float", ""), "base_weight = '' is no float"),
@@ -154,7 +154,7 @@ if importlib.util.find_spec("MaterialX"):
         "laughs": (f'<!DOCTYPE m [<!ENTITY l0 "ha">{LAUGHS}]><materialx>&l11;</materialx>', "declares a document type"),
         "a file": ('<!DOCTYPE m [<!ENTITY x SYSTEM "/etc/passwd">]><materialx>&x;</materialx>', "declares a document"),
         "cut off": (PAINT[:200], "not well-formed"),
-        "another language": ("<scene/>", "<scene> is no MaterialX document"),
+        "another language": ("<scene/>", "<scene> is not a MaterialX document"),
         "nothing to read": (f"{HEAD}</materialx>", "it contains no material"),
     }
 

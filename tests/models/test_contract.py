@@ -281,7 +281,7 @@ def test_directions_go_by_name_too() -> None:
 
 def test_a_tree_of_materials_has_a_bound() -> None:
     m: go.BSDF = go.Lambert(0.5)
-    with pytest.raises(InputError, match="inside each other, 64 at most are expected"):
+    with pytest.raises(InputError, match="nested materials, at most 64 expected"):
         for _ in range(300):
             m = go.mix(m, go.Lambert(0.2), 0.5)
 

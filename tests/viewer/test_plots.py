@@ -120,7 +120,7 @@ def test_a_drawing_leaves_the_notebooks_windows_alone() -> None:
         (["lamberd"], {}, "unknown material", "did you mean 'lambert'?"),
         (["lambert(albdo=1)"], {}, "no parameter 'albdo'", "did you mean 'albedo'?"),
         (["lambert(preset=Au)"], {}, "no presets", "--param"),
-        (["mix(a=3,b=lambert)"], {}, "is no material", "such as lambert"),
+        (["mix(a=3,b=lambert)"], {}, "is not a material", "such as lambert"),
         (["lambert"], {"kind": "lob"}, "unknown kind", "did you mean 'lobe'?"),
         (["lambert"], {"angles": [10, 90]}, "'90' is no angle", "below 90"),
         (["lambert"], {"angles": ["x"]}, "several numbers expected", ""),
