@@ -89,7 +89,7 @@ def test_an_extension_that_a_file_requires_and_nobody_reads_is_an_error(tmp_path
 
 
 def test_materials_are_named_by_name_or_number(tmp_path: Path, file: Path) -> None:
-    with pytest.raises(InputError, match="it holds 8 materials"):
+    with pytest.raises(InputError, match="it contains 8 materials"):
         go.material(str(file))
     with pytest.raises(InputError, match="no material 'Rd'") as caught:
         go.material(f"{file}:Rd")
@@ -145,7 +145,7 @@ def test_a_scene_takes_a_file_with_the_pictures_inside(tmp_path: Path) -> None:
     [
         ({"file": "../all.gltf"}, "lies outside the scene's folder"),
         ({"file": "none.gltf"}, "'none.gltf' does not exist"),
-        ({"file": "all.gltf"}, "it holds 8 materials"),
+        ({"file": "all.gltf"}, "it contains 8 materials"),
         ({"file": "all.gltf", "material": "Gold"}, "no material 'Gold'"),
         ({"file": "scene.json"}, "no gltf file by its name"),
         ({"file": "all.gltf", "material": "Red", "alpha": 1}, "unknown key 'alpha'"),
@@ -187,7 +187,7 @@ BAD = {
     "of the network": (with_buffer(uri="http://example.org/a.bin"), "is not a file in its folder"),
     "of a drive": (with_buffer(uri="C:/a.bin"), "is not a file in its folder"),
     "missing": (with_buffer(uri="none.bin"), "does not exist"),
-    "zero byte": (with_buffer(uri="a\0b"), "no usable file name"),
+    "zero byte": (with_buffer(uri="a\0b"), "not a usable file name"),
     "picture outside": (with_image(uri="../secret.png"), "is outside its folder"),
     "picture of the network": (with_image(uri="//example.org/a.png"), "is not a file in its folder"),
     "picture without data": (with_image(), "/images/0/bufferView"),

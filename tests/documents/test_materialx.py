@@ -121,7 +121,7 @@ if importlib.util.find_spec("MaterialX"):
 
     def test_a_material_that_the_format_does_not_hold_is_not_written(tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text('{"type": "conductor", "alpha": 0.3}')
-        with pytest.raises(InputError, match="a conductor given, and materialx holds openpbr"):
+        with pytest.raises(InputError, match="a conductor given, but materialx holds openpbr"):
             documents.convert(str(tmp_path / "a.json"), tmp_path / "a.mtlx")
         (tmp_path / "b.json").write_text('{"type": "openpbr", "alpha": 0.3}')
         with pytest.raises(InputError, match="has no input 'alpha'"):
@@ -150,7 +150,7 @@ if importlib.util.find_spec("MaterialX"):
         "of itself": (including("a.mtlx"), "which includes it again"),
         "outside": (including("../b.mtlx"), "is outside its folder"),
         "a million nodes": (HEAD + "<a/>" * 1_000_000 + "</materialx>", "more than 100000 elements"),
-        "deep": (HEAD + "<a>" * 100_000 + "</a>" * 100_000 + "</materialx>", "more than 64 elements"),
+        "deep": (HEAD + "<a>" * 100_000 + "</a>" * 100_000 + "</materialx>", "more than 64 nested elements"),
         "laughs": (f'<!DOCTYPE m [<!ENTITY l0 "ha">{LAUGHS}]><materialx>&l11;</materialx>', "declares a document type"),
         "a file": ('<!DOCTYPE m [<!ENTITY x SYSTEM "/etc/passwd">]><materialx>&x;</materialx>', "declares a document"),
         "cut off": (PAINT[:200], "not well-formed"),

@@ -15,7 +15,7 @@ from .structure import is_composite
 HERE = str(Path(__file__).parent)
 
 
-def name_locals(function: Any, node: type, outermost: CodeType) -> None:
+def name_locals(function: Any, node: type[Any], outermost: CodeType) -> None:
     """Give the values of `function` the names of the Python variables that currently hold them.
 
     Called for every new value, so that variables bound by earlier lines are still in scope. A name in the function's
@@ -41,7 +41,7 @@ _CONTAINERS = (tuple, list, dict)
 _PLAIN = (float, int, str, bool, type(None), np.ndarray)  # types that contain no values, checked first
 
 
-def _name_parts(function: Any, node: type, depth: int, value: Any, path: tuple) -> None:
+def _name_parts(function: Any, node: type[Any], depth: int, value: Any, path: tuple) -> None:
     """`name_locals` for the values inside a variable, in the order and with the paths of `structure.flatten`.
 
     It runs for every new value and usually finds nothing unnamed, so paths are built only when a value is named.

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol, TypeGuard
+from typing import Any, Protocol, TypeGuard
 
 from .types import Value
 
@@ -26,7 +26,7 @@ def is_composite(value: object) -> TypeGuard[Composite]:
     return hasattr(type(value), "__parts__")
 
 
-def flatten(value: object, name: str, kind: type) -> Iterator[tuple[str, Value]]:
+def flatten(value: object, name: str, kind: type[Any]) -> Iterator[tuple[str, Value]]:
     """The values inside an argument (value, tuple, list, dict, object with fields), each with its path."""
     if isinstance(value, kind):
         yield name, value
@@ -56,7 +56,7 @@ def rebuild(value: Value, replace: Callable[[Value], object], kind: type | tuple
     return value
 
 
-def static_key(value: Value, kind: type) -> object:
+def static_key(value: Value, kind: type[Any]) -> object:
     """The parts of an argument other than values that determine the recording: names, flags, classes, plain numbers."""
     if isinstance(value, kind):
         return value.type
