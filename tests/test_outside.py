@@ -245,11 +245,11 @@ def test_a_saved_file_takes_the_place_of_its_former_self(here: Path) -> None:
 @pytest.mark.parametrize(
     ("body", "what", "hint"),
     [
-        ("return wi.z", "eval returned a float, a spectrum expected", "colour"),
-        ("return 1 / zero", "NameError", "mend"),
+        ("return wi.z", "eval returned a float, a spectrum expected", "color"),
+        ("return 1 / zero", "NameError", "correct"),
         ("if wo.z > 0:\n            return self.kd\n        return self.kd", "Python `if`", "where"),
-        ("for _ in range(wo.z):\n            pass\n        return self.kd", "integer", "known before anything runs"),
-        ("return (", "SyntaxError", "mend"),
+        ("for _ in range(wo.z):\n            pass\n        return self.kd", "integer", "must not depend on values"),
+        ("return (", "SyntaxError", "correct"),
     ],
 )
 def test_a_faulty_formula_is_one_error_with_its_line(

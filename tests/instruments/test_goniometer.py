@@ -354,7 +354,7 @@ def test_the_command_measures_and_says_so_in_json(tmp_path: Path, capsys: pytest
         ({"material": "lambert", "theta_i": [10.0], "output": "a.binary"}, "directions of its own"),
         ({"material": "lambert", "table": "samples", "output": "a.binary"}, "hold tables of kind half-difference"),
         ({"material": "lambert", "output": "a.npz"}, "cannot be written"),
-        ({"material": "lambert", "output": "a.tif"}, "no format of measurements"),
+        ({"material": "lambert", "output": "a.tif"}, "not a format of measurements"),
         ({"surface": SMALL, "solid_angle": 0.0}, "more than 0"),
         ({"surface": SMALL, "solid_angle": -1.0}, "more than 0"),
         ({"surface": SMALL, "solid_angle": 1e-9}, "half angle"),

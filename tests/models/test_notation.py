@@ -84,7 +84,7 @@ class Strict(BSDF):
     ("text", "given", "words"),
     [
         ("lamberd", [], "did you mean 'lambert'"),
-        ("lambert(", [], "is no material"),
+        ("lambert(", [], "is not a material"),
         ("lambert(albedo)", [], "sets nothing"),
         ("lambert", ["=3"], "sets nothing"),
         ("lambert", ["albdo=1"], "no parameter 'albdo'"),
@@ -94,9 +94,9 @@ class Strict(BSDF):
         ("lambert(preset=Au)", [], "no presets"),
         ("dielectric", ["transmission=perhaps"], "true or false"),
         ("dielectric", ["ndf=gxg"], "did you mean 'ggx'"),
-        ("mix", ["a=3"], "'3' is no material"),
-        ("mix", ['a={"kind": "lambert"}'], "is no material"),
-        ("mix", ["a={"], "is no material"),
+        ("mix", ["a=3"], "'3' is not a material"),
+        ("mix", ['a={"kind": "lambert"}'], "is not a material"),
+        ("mix", ["a={"], "is not a material"),
         ("mix(a=lambert(albedo=-1))", [], "-1 given"),
     ],
 )
@@ -136,7 +136,7 @@ def test_a_path_leads_through_several_materials() -> None:
     [
         (["bse.alpha=.2"], "did you mean 'base'?"),
         (["base.alhpa=.2"], "did you mean 'alpha'?"),
-        (["base.alpha.x=.2"], "'alpha' of conductor is no material"),
+        (["base.alpha.x=.2"], "'alpha' of conductor is not a material"),
         (["base=lambert", "base.alpha=.2"], "lambert has no parameter 'alpha'"),
         (["base.alpha=-1"], "-1 given"),
     ],

@@ -178,7 +178,7 @@ def test_a_material_of_this_program_alone_is_refused_before_the_render(tmp_path:
     namespace: dict[str, object] = {}
     exec("import gonio as go\nclass Mine(go.Lambert):\n    'Mine.'\n    name = 'mine-for-checkpoints'\n", namespace)
     mine = namespace["Mine"]()  # type: ignore[operator]
-    with pytest.raises(InputError, match="known to this program alone"):
+    with pytest.raises(InputError, match="known to this program only"):
         go.render(mine, spp=4, size=(24, 16), checkpoint=tmp_path / "c")
     assert go.render(mine, spp=2, size=(24, 16), output=tmp_path / "a.exr").shape == (16, 24, 3)
 

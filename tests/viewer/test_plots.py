@@ -121,7 +121,7 @@ def test_a_drawing_leaves_the_notebooks_windows_alone() -> None:
         (["lamberd"], {}, "unknown material", "did you mean 'lambert'?"),
         (["lambert(albdo=1)"], {}, "no parameter 'albdo'", "did you mean 'albedo'?"),
         (["lambert(preset=Au)"], {}, "no presets", "--param"),
-        (["mix(a=3,b=lambert)"], {}, "is no material", "such as lambert"),
+        (["mix(a=3,b=lambert)"], {}, "is not a material", "such as lambert"),
         (["lambert"], {"kind": "lob"}, "unknown kind", "did you mean 'lobe'?"),
         (["lambert"], {"angles": [10, 90]}, "'90' is no angle", "below 90"),
         (["lambert"], {"angles": ["x"]}, "several numbers expected", ""),
@@ -171,7 +171,7 @@ def test_the_map_of_schlicks_error_is_the_difference_of_both() -> None:
     ("arguments", "text"),
     [
         ({"eta": 0.0}, "eta = 0, a positive index expected"),
-        ({"eta": 1.5, "k": -1.0}, "k = -1, which would give light"),
+        ({"eta": 1.5, "k": -1.0}, "k = -1, which would amplify light"),
         ({"eta": 1.5, "metal": "Au"}, "an index and a metal"),
         ({"metal": "Aurum"}, "unknown metal 'Aurum'"),
     ],

@@ -33,10 +33,7 @@ from ..optics import warp
 from . import binding, equality, guide_search, notebook, recording, tree
 from .angular_range import EVERYWHERE, AngularRange
 from .calling import V3, Given, method
-from .facts import Interior as Interior
-from .facts import KnownViolation as KnownViolation
-from .facts import Microsurface as Microsurface
-from .facts import Preset as Preset
+from .facts import Interior, KnownViolation, Microsurface, Preset
 from .former_names import add_former_names, move_former_names
 from .parameters import Floats, Material, Parameter, Value, bsdf, declared, file, pair_of
 from .polarization import Polarized
@@ -44,7 +41,7 @@ from .sample import Sample
 
 Delta: TypeAlias = Literal["never", "maybe", "always"]
 
-# Directional albedo of an inner material at (mu, phi), (N, 3), or None
+# directional albedo of an inner material at (mu, phi), (N, 3), or None
 InnerAlbedo: TypeAlias = "Callable[[BSDF, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64] | None]"
 
 

@@ -1,6 +1,6 @@
 """A parameter of a material, declared once with kind, range, unit and a line of documentation.
 
-    albedo: Colour = spectrum(0.5, "share of light that is reflected", high=1.0)
+    `albedo: Colour = spectrum(0.5, "fraction of light that is reflected", high=1.0)`
 
 The command line, scenes, plugins, sliders, shaders and the manual all read this declaration. Each kind is a class that
 defines which values are valid, how a value is bound, and which symbol stands for it in a recording.

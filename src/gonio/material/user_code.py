@@ -191,7 +191,7 @@ def _located(error: BaseException, path: Path) -> GonioError:
     if isinstance(error, SyntaxError) and error.filename:
         text = f": {error.text.strip()}" if error.text else ""
         return InputError(
-            f"{type(error).__name__}: {error.msg}{text}", f"{error.filename}:{error.lineno}", "mend the line"
+            f"{type(error).__name__}: {error.msg}{text}", f"{error.filename}:{error.lineno}", "correct the line"
         )
     place = line_in(error, path) or str(path)
     if isinstance(error, GonioError):

@@ -16,23 +16,22 @@ from __future__ import annotations
 import html
 import inspect
 import itertools
-import math
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
-from pathlib import Path
-from types import FrameType
-from typing import Protocol, TypeAlias, TypeGuard
+from collections.abc import Callable, Container, Iterator
+from typing import TypeAlias
 
 import numpy as np
 
 from ..errors import GonioError
 from ..owner import exclusive
-from .table import fetch_in_numpy, read_in_numpy
+from .evaluation import NUMPY as NUMPY
+from .evaluation import operate
+from .naming import HERE, name_locals
+from .structure import flatten, leaves, rebuild, static_key
 from .types import Value
 
 Operand: TypeAlias = "Node | float"
 
-_HERE = str(Path(__file__).parent)
 _SIZES = {"vec2": 2, "vec3": 3}
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
@@ -47,56 +46,9 @@ class ForbiddenOperator(RecordingError):
 
 def _source_line() -> str:
     frame = sys._getframe(1)
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(HERE):
         frame = frame.f_back
     return f"{frame.f_code.co_filename}:{frame.f_lineno}"
-
-
-def _name_locals(function: Function) -> None:
-    """Give the values of `function` the names of the Python variables that currently hold them.
-
-    Called for every new value, so that variables bound by earlier lines are still in scope. A name in the function's
-    own frame has priority over one in a plain function that it calls, and the first name over a later one.
-    """
-    frames = []
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None and frame.f_code is not _define.__code__:
-        if not frame.f_code.co_filename.startswith(_HERE):
-            frames.append(frame)
-        frame = frame.f_back
-    for depth, own in enumerate(reversed(frames)):
-        for name, value in own.f_locals.items():
-            if isinstance(value, Node):
-                if value.function is function and value.depth > depth:
-                    value.name, value.depth = name.strip("_"), depth
-            elif isinstance(value, _CONTAINERS):
-                _name_parts(function, depth, value, (name,))
-
-
-_CONTAINERS = (tuple, list, dict)
-_PLAIN = (float, int, str, bool, type(None), np.ndarray)  # types that contain no values, checked first
-
-
-def _name_parts(function: Function, depth: int, value: object, path: tuple) -> None:
-    """`_name_locals` for the values inside a variable, in the order and with the paths of `_flatten`.
-
-    It runs for every new value and usually finds nothing unnamed, so paths are built only when a value is named.
-    """
-    pairs: Iterable[tuple[object, object]]
-    if isinstance(value, tuple | list):
-        pairs = zip(getattr(value, "_fields", None) or range(len(value)), value, strict=True)
-    elif isinstance(value, dict):
-        pairs = value.items()
-    elif _is_composite(value):
-        pairs = value.__parts__().items()
-    else:
-        return
-    for key, item in pairs:
-        if isinstance(item, Node):
-            if item.function is function and item.depth > depth:
-                item.name, item.depth = ".".join(map(str, (*path, key))).strip("_"), depth
-        elif not isinstance(item, _PLAIN):
-            _name_parts(function, depth, item, (*path, key))
 
 
 def _logical(op: str) -> Callable[[Node, object], Node]:
@@ -120,7 +72,7 @@ class Node:
         self.index = len(function.nodes)
         # otherwise the variables of all calling frames would be searched
         if _stack and _stack[-1][1] is function:
-            _name_locals(function)
+            name_locals(function, Node, _define.__code__)
         function.nodes.append(self)
 
     def __repr__(self) -> str:
@@ -206,7 +158,7 @@ class Function:
         for node in self.nodes:
             if node.op != "parameter":
                 lines.append(f"  %{node.index:<3} {node.name:<12} {node.type:<9} {_written(node)}".rstrip())
-        return "\n".join([*lines, f"  return {', '.join(map(_reference, _leaves(self.result)))}"])
+        return "\n".join([*lines, f"  return {', '.join(map(_reference, leaves(self.result)))}"])
 
 
 class Graph:
@@ -312,66 +264,8 @@ def arithmetic(op: str, a: Operand, b: Operand) -> Node:
 
 
 def _flatten(value: object, name: str) -> Iterator[tuple[str, Node]]:
-    """The nodes inside an argument (node, tuple, list, dict, object with fields), each with its path."""
-    if isinstance(value, Node):
-        yield name, value
-    elif isinstance(value, tuple | list):
-        fields = getattr(value, "_fields", None) or [str(i) for i in range(len(value))]
-        for field, item in zip(fields, value, strict=True):
-            yield from _flatten(item, f"{name}.{field}")
-    elif isinstance(value, dict):
-        for key, item in value.items():
-            yield from _flatten(item, f"{name}.{key}")
-    elif _is_composite(value):
-        for part, held in value.__parts__().items():
-            yield from _flatten(held, f"{name}.{part}")
-
-
-class Composite(Protocol):
-    """An object whose parts a recording follows, such as a material."""
-
-    def __parts__(self) -> Mapping[str, object]:
-        """The parts that may contain values, by name."""
-
-    def __with_parts__(self, parts: Mapping[str, object]) -> object:
-        """A copy with these parts replaced."""
-
-
-def _is_composite(value: object) -> TypeGuard[Composite]:
-    # called for every local variable and every new value: isinstance with a Protocol took 80 % of the time of `emit`
-    return hasattr(type(value), "__parts__")
-
-
-def _rebuild(value: Value, replace: Callable[[Value], object], kind: type | tuple[type, ...] = Node) -> Value:
-    """The same structure with each node, or each object of another kind, replaced."""
-    if isinstance(value, kind):
-        return replace(value)
-    if isinstance(value, tuple | list):
-        items = [_rebuild(item, replace, kind) for item in value]
-        return type(value)(*items) if hasattr(value, "_fields") else type(value)(items)
-    if isinstance(value, dict):
-        return {key: _rebuild(item, replace, kind) for key, item in value.items()}
-    if _is_composite(value):
-        return value.__with_parts__({name: _rebuild(part, replace, kind) for name, part in value.__parts__().items()})
-    return value
-
-
-def _static_key(value: object) -> object:
-    """The parts of an argument that are not nodes but determine the recording: names, flags, classes, plain numbers."""
-    if isinstance(value, Node):
-        return value.type
-    if isinstance(value, tuple | list):
-        return tuple(_static_key(item) for item in value)
-    if isinstance(value, dict):
-        return tuple((key, _static_key(item)) for key, item in value.items())
-    if _is_composite(value):
-        return (type(value), *((name, _static_key(part)) for name, part in value.__parts__().items()))
-    try:
-        hash(value)
-    except TypeError:
-        return id(value)
-    # with the type, since True, 1 and 1.0 are equal keys; repr distinguishes 0.0 from -0.0
-    return (type(value), repr(value) if isinstance(value, float) else value)
+    """The nodes inside an argument, each with its path."""
+    return flatten(value, name, Node)
 
 
 def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value], name: str) -> Function:
@@ -381,10 +275,10 @@ def _define(graph: Graph, python_function: Callable, arguments: dict[str, Value]
     try:
         given = [pair for argument, value in arguments.items() for pair in _flatten(value, argument)]
         parameters = iter([function.parameter(path, node.type) for path, node in given])
-        inner = {argument: _rebuild(value, lambda _: next(parameters)) for argument, value in arguments.items()}
+        inner = {argument: rebuild(value, lambda _: next(parameters), Node) for argument, value in arguments.items()}
         function.arguments = dict(inner)
         # returned plain numbers become nodes, so that a result consists of nodes only
-        function.result = _rebuild(python_function(**inner), _constant, (bool, int, float, np.number))
+        function.result = rebuild(python_function(**inner), _constant, (bool, int, float, np.number))
     finally:
         _stack.pop()
     graph.functions.append(function)
@@ -414,7 +308,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
     for argument, value in bound.arguments.items():
         if type(value) is float:  # recorded as an argument; otherwise each number would define another function
             bound.arguments[argument] = emit("constant", "float", static=value)
-    key = (python_function, *(_static_key(value) for value in bound.arguments.values()))
+    key = (python_function, *(static_key(value, Node) for value in bound.arguments.values()))
     function = graph._known.get(key)
     if function is None:
         used = {f.name for f in graph.functions} | {f.name for _, f in _stack}
@@ -432,7 +326,7 @@ def call(python_function: Callable, args: tuple, kwargs: dict) -> Value:
         called.type = function.result.type
         return called
     counter = itertools.count()
-    return _rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)))
+    return rebuild(function.result, lambda node: emit("element", node.type, called, static=next(counter)), Node)
 
 
 def recording(values: tuple) -> bool:
@@ -481,42 +375,6 @@ def symbol(kind: str) -> Node:
 # --------------------------------------------------------------------------- evaluation in NumPy
 
 
-NUMPY: dict[str, Callable] = {
-    "add": np.add,
-    "sub": np.subtract,
-    "mul": np.multiply,
-    "div": np.divide,
-    "neg": np.negative,
-    "lt": np.less,
-    "le": np.less_equal,
-    "gt": np.greater,
-    "ge": np.greater_equal,
-    "eq": np.equal,
-    "ne": np.not_equal,
-    "and": np.logical_and,
-    "or": np.logical_or,
-    "not": np.logical_not,
-    "where": np.where,
-    "sqrt": np.sqrt,
-    "abs": np.abs,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-    "exp": np.exp,
-    "log": np.log,
-    "pow": np.power,
-    "sin": np.sin,
-    "cos": np.cos,
-    "atan2": np.arctan2,
-    "floor": np.floor,
-    "erf": np.vectorize(math.erf, otypes=[float]),
-    "copysign": np.copysign,
-    "isfinite": np.isfinite,
-    "dot": lambda a, b: sum(a[i] * b[i] for i in range(len(a))),
-    "mean": lambda a: np.mean(a, axis=0),
-    "max_component": lambda a: np.max(a, axis=0),
-}
-
-
 def _run(function: Function, arguments: list) -> Value:
     values: list[Value] = []
     remaining = iter(arguments)
@@ -530,28 +388,10 @@ def _run(function: Function, arguments: list) -> Value:
             values.append(next(remaining))
         elif node.op == "constant":
             values.append(np.asarray(node.static))
-        elif node.op == "component":
-            values.append(args[0][node.static])
-        elif node.op == "vector":
-            values.append(np.stack(np.broadcast_arrays(*[np.asarray(a, float) for a in args])))
         elif node.op == "call":
             values.append(_run(node.static, args))
         elif node.op == "element":
-            values.append(list(_leaves(args[0]))[node.static])
-        elif node.op == "lookup":
-            table, channel = node.static
-            values.append(read_in_numpy(table, *args)[channel])
-        elif node.op == "fetch":
-            table, channel = node.static
-            values.append(fetch_in_numpy(table, *args)[channel])
+            values.append(list(leaves(args[0]))[node.static])
         else:
-            values.append(NUMPY[node.op](*args))
-    return _rebuild(function.result, get)
-
-
-def _leaves(value: Value) -> Iterator[Value]:
-    if isinstance(value, tuple | dict):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from _leaves(item)
-    else:
-        yield value
+            values.append(operate(node.op, node.static, args))
+    return rebuild(function.result, get, Node)

@@ -39,11 +39,11 @@ class Gltf(Document):
     suffixes: ClassVar[tuple[str, ...]] = (".gltf", ".glb")
 
     def materials(self, path: Path) -> list[str]:
-        return _names(GltfFile(path))
+        return GltfFile(path).material_names()
 
     def read(self, path: Path, name: str) -> Described:
         file = GltfFile(path)
-        return _Material(file, _names(file).index(name)).described()
+        return _Material(file, file.material_names().index(name)).described()
 
     def image(self, path: Path, index: str) -> bytes:
         file = GltfFile(path)
@@ -55,16 +55,6 @@ class Gltf(Document):
         if isinstance(uri, str):
             return file.data(uri, f"{at}/uri")
         return file.view(file.index(image, "bufferView", "bufferViews", at))
-
-
-def _names(file: GltfFile) -> list[str]:
-    """A material's name if it is unique, else its number."""
-    given = [str(material.get("name", "")) for material in file.items("materials")]
-    count: dict[str, int] = {}
-    for name in given:
-        count[name] = count.get(name, 0) + 1
-    plain = {name for name, times in count.items() if name and times == 1 and not name.isdigit()}
-    return [name if name in plain else str(index) for index, name in enumerate(given)]
 
 
 class _Material:

@@ -10,6 +10,7 @@ import base64
 import binascii
 import json
 import struct
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NoReturn, TypeAlias
@@ -61,6 +62,12 @@ class GltfFile:
                 self.fail("a list of objects expected", f"/{key}")
             self._lists[key] = items
         return self._lists[key]
+
+    def material_names(self) -> list[str]:
+        """Each material's name if it is unique, else its number."""
+        given = [str(material.get("name", "")) for material in self.items("materials")]
+        unique = {name for name, times in Counter(given).items() if name and times == 1 and not name.isdigit()}
+        return [name if name in unique else str(index) for index, name in enumerate(given)]
 
     def member(self, of: Mapping[str, object], key: str, at: str) -> Json:
         """A member that is an object, empty if it is missing."""

@@ -118,13 +118,13 @@ def _checked(environment: Environment, levels: int, location: str) -> Array:
     bad = np.count_nonzero(~np.isfinite(source) | (source < 0.0))
     if bad:
         raise InputError(
-            f"{bad} values are negative or not finite", location, "radiance is 0 or more: mend the picture"
+            f"{bad} values are negative or not finite", location, "radiance is 0 or more: correct the picture"
         )
     height = source.shape[0]
     if not MIN_ROWS <= height <= MAX_ROWS:
         raise InputError(f"a map of {height} rows, expected {MIN_ROWS} to {MAX_ROWS}", location, "scale the picture")
     if not 2 <= levels <= MAX_LEVELS:
-        raise InputError(f"{levels} levels asked for", "--levels", f"give 2 to {MAX_LEVELS}")
+        raise InputError(f"{levels} levels given", "--levels", f"give 2 to {MAX_LEVELS}")
     if height >> (levels - 1) < 2:
         what = f"{levels} levels of a map of {height} rows, each half as large as the one before"
         raise InputError(what, location, f"give fewer --levels, or a map of {2 << (levels - 1)} rows or more")

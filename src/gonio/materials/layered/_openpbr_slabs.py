@@ -87,7 +87,7 @@ class _OpenPBR(BSDF):
     subsurface_weight: Number = number(
         default=0.0, doc="fraction of the opaque dielectric with subsurface scattering", low=0.0, high=1.0, off=0.0
     )
-    subsurface_color: Colour = spectrum(default=0.8, doc="its colour", low=0.0, high=1.0)
+    subsurface_color: Colour = spectrum(default=0.8, doc="its color", low=0.0, high=1.0)
     subsurface_radius: Number = number(
         default=1.0, doc="mean free path; treated as 0, with a warning", low=0.0, inside=True
     )

@@ -135,7 +135,7 @@ def colour_of(base: BSDF, up: Direction) -> Spectrum:
     return ops.safe_div(tint, white.tint(up))
 
 
-def _colours(base: BSDF) -> Floats:
+def _colors(base: BSDF) -> Floats:
     """`colour_of` as three numbers."""
     kind = backend.types("float64")
     up = ops.vec3(kind.float(0.0), kind.float(0.0), kind.float(1.0))
@@ -154,8 +154,8 @@ def find(coat: Coated) -> LayerTables:
     draws = _drawn(coat.base, index)
     totally = (draws.weight * (draws.position <= 0.0)).sum(1) / np.maximum(draws.weight.sum(1), EPSILON)
     t, v = np.linspace(0.0, 1.0, COLOURS), np.linspace(0.0, 1.0, LEFT - 1)
-    colours = np.maximum(2.0 * t / (1.0 + t), 1e-4)
-    sums = [_series(draws, colours, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
+    colors = np.maximum(2.0 * t / (1.0 + t), 1e-4)
+    sums = [_series(draws, colors, u, face, index) for u in np.maximum(3.0 * v / (1.0 + 2.0 * v), MIN_LEFT)]
     rest, over_factor, norm = (_continued([one[n] for one in sums]) for n in range(3))
     # fraction sampled by a cosine: base samples that are totally reflected, and the rest
     share = np.maximum(1.7 * np.interp(np.sqrt(outside), draws.place, totally), 0.7 * sums[-1].share)
@@ -270,7 +270,7 @@ class _Draws(NamedTuple):
     place, mu           of the nodes
     weight              of each sample at each node (nodes, POINTS)
     cosine, position    of the sampled directions
-    colours, share      of black, the base's channels and white, ascending; the factor of each for samples of the others
+    colors, share      of black, the base's channels and white, ascending; the factor of each for samples of the others
     """
 
     place: Floats
@@ -278,7 +278,7 @@ class _Draws(NamedTuple):
     weight: Floats
     cosine: Floats
     position: Floats
-    colours: Floats
+    colors: Floats
     share: Floats
 
 
@@ -291,8 +291,8 @@ def _drawn(base: BSDF, index: float) -> _Draws:
     wo = _directions(mu, lattice)
     drawn = white.sample(wo, np.tile(lattice[:, :3], (len(mu), 1)), precision="float64")
     channels = drawn.weight
-    colours, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
-    tints = _colours(base)
+    colors, share = np.array([0.0, 1.0]), np.stack([0.0 * channels[:, 0], 1.0 + 0.0 * channels[:, 0]])
+    tints = _colors(base)
     if white is base:
         channels = channels[:, np.argmax(tints)][:, None]
     else:
@@ -300,13 +300,13 @@ def _drawn(base: BSDF, index: float) -> _Draws:
         known, first = np.unique(np.round(tints, 3), return_index=True)
         known, first = known[known < 1.0], first[known < 1.0]
         ratio = np.where(full > 0.0, own / np.where(full > 0.0, full, 1.0), tints)[:, first].T
-        colours = np.concatenate([[0.0], known, [1.0]])
+        colors = np.concatenate([[0.0], known, [1.0]])
         share = np.concatenate([share[:1], np.clip(ratio, 0.0, 1.0), share[1:]])
     weight = np.where(drawn.pdf > 0.0, channels.mean(1), 0.0).reshape(len(mu), POINTS) / POINTS
     weight /= np.maximum(weight.sum(1, keepdims=True), 1.0)  # the series would diverge for a base that gains light
     cosine = np.clip(drawn.wi[:, 2], 1e-4, 1.0).reshape(len(mu), POINTS)
     share = share.reshape(-1, len(mu), POINTS)
-    return _Draws(place, mu, weight, cosine, _place_of(cosine, index), colours, share)
+    return _Draws(place, mu, weight, cosine, _place_of(cosine, index), colors, share)
 
 
 class _Sum(NamedTuple):
@@ -318,7 +318,7 @@ class _Sum(NamedTuple):
     share: Floats
 
 
-def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: float) -> _Sum:
+def _series(draws: _Draws, colors: Floats, u: float, face: _Interface, index: float) -> _Sum:
     """The sum of the series, divided into lobe and rest."""
     n = len(draws.place)
     out, t = face.out(draws.position), u ** (1.0 / draws.cosine)
@@ -351,8 +351,8 @@ def _series(draws: _Draws, colours: Floats, u: float, face: _Interface, index: f
     area = np.gradient(root) * 2.0 * root**3  # x dx
     judged = x > 1e-3  # both vanish at the horizon
     rests, factors, norms, share = [], [], [], 0.0 * x
-    for a in colours:
-        mixed = [float(np.interp(a, draws.colours, one)) for one in np.eye(len(draws.colours))[1:]]
+    for a in colors:
+        mixed = [float(np.interp(a, draws.colors, one)) for one in np.eye(len(draws.colors))[1:]]
         P, first, lobe = (
             sum(m * one for m, one in zip(mixed, parts, strict=True)) for parts in zip(*kinds, strict=True)
         )
