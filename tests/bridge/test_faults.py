@@ -17,10 +17,10 @@ from gonio.bridge.faults.black_environment import is_black_environment
 from gonio.bridge.faults.interrupted_recording import interruptible
 from gonio.bridge.faults.lost_derivatives import own_variable
 from gonio.bridge.faults.merged_mesh_bbox import compute_boxes
+from gonio.bridge.faults.rotated_sphere_normal import with_radial_normal
 from gonio.bridge.faults.shadow_ray_gap import shadow_ray_to
 from gonio.bridge.faults.textured_area_light import must_sample_by_area
 from gonio.bridge.faults.thin_lens_importance import camera_sample
-from gonio.bridge.faults.rotated_sphere_normal import with_radial_normal
 
 mi = engine.load()
 import drjit as dr  # noqa: E402  (after `load` has chosen an LLVM)

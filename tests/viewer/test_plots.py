@@ -178,5 +178,5 @@ def test_the_map_of_schlicks_error_is_the_difference_of_both() -> None:
 def test_an_index_that_cannot_be_drawn_is_an_error(arguments: dict[str, Any], text: str) -> None:
     with pytest.raises(InputError, match=text):
         go.plot("fresnel", **arguments)
-    with pytest.raises(InputError, match="no fresnel to draw"):
+    with pytest.raises(InputError, match="an index is given without fresnel"):
         go.plot("lambert", eta=1.5)

@@ -24,8 +24,8 @@ def load_image(path: Path, where: str, *, srgb: bool = False, channel: str | Non
     Raises InputError where the file is no image, claims more pixels than it can hold, or holds NaN.
     """
     name = path.name
-    if path.stat().st_size > formats.MOST_BYTES:
-        raise InputError(f"'{name}' is larger than {formats.MOST_BYTES >> 20} MiB", where, "scale it down")
+    if path.stat().st_size > formats.MAX_BYTES:
+        raise InputError(f"'{name}' is larger than {formats.MAX_BYTES >> 20} MiB", where, "scale it down")
     try:
         content = path.read_bytes()
     except OSError as error:
