@@ -122,7 +122,7 @@ def test_a_drawing_leaves_the_notebooks_windows_alone() -> None:
         (["lambert(preset=Au)"], {}, "no presets", "--param"),
         (["mix(a=3,b=lambert)"], {}, "is no material", "such as lambert"),
         (["lambert"], {"kind": "lob"}, "unknown kind", "did you mean 'lobe'?"),
-        (["lambert"], {"angles": [10, 90]}, "'90' is no angle", "below 90"),
+        (["lambert"], {"angles": [10, 90]}, "'90' is not an angle", "below 90"),
         (["lambert"], {"angles": ["x"]}, "several numbers expected", ""),
         (["lambert"], {"angles": []}, "0 angles", "such as"),
         (["lambert"], {"output": "a.gif"}, "figure format", ".png"),
