@@ -1,4 +1,4 @@
-"""Canaries: each test fails once a fault of Mitsuba or Dr.Jit is mended, and its file in `bridge/faults` can go.
+"""Canaries: each test fails once a fault of Mitsuba or Dr.Jit is fixed, and its file in `bridge/faults` can go.
 
 Not here, since they would end or hang the test's process: `exr_threads` (tests/test_one_cpu.py has the workaround),
 `missing_texture`; `shape_order`, which is left to chance; `bent_normals`, a call that BSDFs do not have;

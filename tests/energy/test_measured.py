@@ -181,5 +181,5 @@ def test_textures_are_refused_when_the_scene_is_built():
     mi = engine.load("cpu")
     adapter.register(mi)
     base = {"type": "gonio_oren_nayar", "albedo": {"type": "checkerboard"}}
-    with pytest.raises(RuntimeError, match="it takes colours and numbers, no texture"):
+    with pytest.raises(RuntimeError, match="this base needs tables, which are computed for colors and numbers"):
         mi.load_dict({"type": "gonio_kulla_conty", "base": base})

@@ -78,7 +78,7 @@ def test_a_plugin_is_no_path(tmp_path: Path, kind: str) -> None:
 
 
 def test_a_scene_gives_no_addresses_of_memory(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="addresses of memory"):
+    with pytest.raises(InputError, match="memory addresses"):
         load(tmp_path / "a.xml", '<shape type="blender"/>')
 
 

@@ -123,7 +123,7 @@ def test_a_drawing_leaves_the_notebooks_windows_alone() -> None:
         (["lambert(preset=Au)"], {}, "no presets", "--param"),
         (["mix(a=3,b=lambert)"], {}, "is not a material", "such as lambert"),
         (["lambert"], {"kind": "lob"}, "unknown kind", "did you mean 'lobe'?"),
-        (["lambert"], {"angles": [10, 90]}, "'90' is no angle", "below 90"),
+        (["lambert"], {"angles": [10, 90]}, "'90' is not an angle", "below 90"),
         (["lambert"], {"angles": ["x"]}, "several numbers expected", ""),
         (["lambert"], {"angles": []}, "0 angles", "such as"),
         (["lambert"], {"output": "a.gif"}, "figure format", ".png"),
@@ -179,5 +179,5 @@ def test_the_map_of_schlicks_error_is_the_difference_of_both() -> None:
 def test_an_index_that_cannot_be_drawn_is_an_error(arguments: dict[str, Any], text: str) -> None:
     with pytest.raises(InputError, match=text):
         go.plot("fresnel", **arguments)
-    with pytest.raises(InputError, match="no fresnel to draw"):
+    with pytest.raises(InputError, match="an index is given without fresnel"):
         go.plot("lambert", eta=1.5)

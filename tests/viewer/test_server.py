@@ -150,7 +150,7 @@ def test_every_variant_that_is_asked_for_comes(monkeypatch: pytest.MonkeyPatch) 
         ]
         monkeypatch.setattr(session, "MAX_WISHES", 0)
         client.send(json.dumps({"type": "choice", "id": 9, "material": "m0", "choices": {}}))
-        assert "choices wait" in read(client.recv(20))[0]["what"]
+        assert "shaders are pending" in read(client.recv(20))[0]["what"]
 
 
 def test_a_scene_that_came_while_another_failed_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -236,16 +236,16 @@ def test_a_picture_that_is_not_what_was_announced_is_refused() -> None:
     upload = messages.Upload(type="environment", key="a", width=2, height=1)
     with pytest.raises(InputError, match="8 bytes received, 16 were announced"):
         messages.environment(upload, bytes(8))
-    with pytest.raises(InputError, match="no radiance"):
+    with pytest.raises(InputError, match="negative or infinite values"):
         messages.environment(upload, np.full(8, np.inf, "<f2").tobytes())
-    with pytest.raises(InputError, match="no radiance"):
+    with pytest.raises(InputError, match="negative or infinite values"):
         messages.environment(upload, np.full(8, -1.0, "<f2").tobytes())
 
 
 def test_bytes_that_nothing_announced_are_refused(one: server.Server) -> None:
     with speak(one) as client:
         client.send(b"1234")
-        assert "nothing announced" in read(client.recv(20))[0]["what"]
+        assert "without an announcement" in read(client.recv(20))[0]["what"]
 
 
 @pytest.mark.parametrize("path", ["/", "/nothing", "/?token=wrong"])

@@ -456,7 +456,7 @@ def test_nothing_lies_over_three_rows(chrome: Any, tmp_path: Path) -> None:
     page.set("s.view.term = 'D'")
     assert "1/sr" in tab.locator(".term-note").text_content()
     page.set("s.view.term = 'full'")
-    assert "C: a mirror shows an environment only" in tab.locator(".term-note").text_content()
+    assert "C: a mirror reflects an environment only" in tab.locator(".term-note").text_content()
     page.set("s.furnace = true")
     assert tab.locator(".term-note").text_content() == ""
     assert page.problems == []

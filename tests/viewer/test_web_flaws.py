@@ -109,7 +109,7 @@ def test_black_by_a_fault_is_told_from_black_by_nature(opened: Any) -> None:
     """No lamp reached long shaders, and five black balls stood there without a word."""
     page = opened(go.Lambert(), UNLIT)
     assert page.picture(4)[..., :3].max() == 0
-    assert line(page) == "A 1: black, though the material scatters the light that falls on it (checkered)"
+    assert line(page) == "A 1: black, although the material scatters the incident light (checkered)"
     assert magenta(page) > 100
     assert len(page.problems) == 1
     mirror = opened(go.Mirror())

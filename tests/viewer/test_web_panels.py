@@ -131,7 +131,7 @@ def test_terms_multiply_to_eval(opened: Opened) -> None:
 
 
 def test_too_few_numbers_are_refused(opened: Opened) -> None:
-    with pytest.raises(Exception, match="three a direction"):
+    with pytest.raises(Exception, match="three per direction"):
         opened.ask("evaluate", 0, 0, [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
 
 

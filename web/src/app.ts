@@ -330,7 +330,7 @@ export class PageApp implements App {
       this.resolveReady();
       this.onRefresh("picture");
       if (moving || !this.renderer.done(scene) || this.inspector.due(true)) this.schedule();
-      this.mended();
+      this.clearFault();
     } catch (error) {
       this.fail(error);
     }
@@ -346,7 +346,7 @@ export class PageApp implements App {
     this.rejectReady(error);
   }
 
-  private mended(): void {
+  private clearFault(): void {
     if (!this.failed) return;
     this.failed = false;
     this.onFault(null);

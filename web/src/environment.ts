@@ -3,7 +3,7 @@
  * ball and, for the split sum, the environment blurred by the lobe at several widths.
  */
 import { type Values, decodeBase64 } from "./data";
-import { SAMPLES_VERTEX, albedoText, prefilterText } from "./glsl";
+import { SAMPLES_VERTEX, albedoText, prefilterText } from "./environment-glsl";
 import { distribution } from "./importance";
 import type { Source } from "./programs";
 import type { Shader, ShaderLibrary } from "./shaders";

@@ -25,7 +25,7 @@ from .faults.exr_threads import file_threads
 from .native import MitsubaBSDF
 from .types import BSDFPlugin, OfVariant, PluginDict
 
-# Below it, Mitsuba's documentation says to use the smooth plugin, and its float32 code is close to its limit.
+# Below it, Mitsuba's documentation recommends the smooth plugin, and its float32 code is close to its limit.
 SMALLEST_ALPHA = 1e-3
 # Albedo-like properties of Mitsuba's own plugins, [0, 1]; others are passed on as they are
 ALBEDOS = ("reflectance", "diffuse_reflectance", "specular_reflectance", "specular_transmittance", "base_color")

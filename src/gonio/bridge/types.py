@@ -23,7 +23,7 @@ BSDFContext: TypeAlias = OfVariant
 TraversalCallback: TypeAlias = OfVariant
 PluginDict: TypeAlias = dict[str, Any]  # what `mi.load_dict` takes
 
-# What a scene file holds
+# The contents of a scene file
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
 # Records with one entry per lane

@@ -54,7 +54,7 @@ def kind_of(content: bytes) -> str | None:
 
 
 def check(content: bytes, kind: str) -> Claimed:
-    """Raise Unreadable if a file contradicts itself, or claims more than it can hold."""
+    """Raise Unreadable if a file contradicts itself, or claims more than it can contain."""
     try:
         claimed = _HEADERS[kind](content)
     except (struct.error, IndexError):
@@ -64,7 +64,7 @@ def check(content: bytes, kind: str) -> Claimed:
     pixels = claimed.width * claimed.height
     if pixels * claimed.bits > MAX_EXPANSION * 8 * len(content):
         claim = f"{claimed.width} x {claimed.height} pixels"
-        raise Unreadable(f"it claims {claim}, which {len(content)} bytes cannot hold")
+        raise Unreadable(f"it claims {claim}, which {len(content)} bytes cannot contain")
     if pixels > MAX_PIXELS:
         raise Unreadable(f"its {claimed.width} x {claimed.height} pixels are more than {MAX_PIXELS >> 20} Mi")
     return claimed
@@ -208,7 +208,7 @@ def exr_attributes(content: bytes) -> Iterator[tuple[str, str, bytes]]:
     if version & 0xFF != 2 or version & ~0x1EFF:
         raise Unreadable(f"it is of an unknown version of OpenEXR, {version:#x}")
     if version & 0x800:
-        raise Unreadable("it holds deep data, which is not supported")
+        raise Unreadable("it contains deep data, which is not supported")
     at = 8
     while content[at]:
         texts = []

@@ -321,7 +321,7 @@ def _read_npz(source: Path) -> tuple[RGB, dict[str, Value]]:
         raise InputError(f"this .npz cannot be read: {error}", location, "save it with np.savez(...)") from error
     name = "radiance" if "radiance" in arrays else next(iter(arrays), "") if len(arrays) == 1 else ""
     if not name:
-        hint = "save it with np.savez(path, radiance=picture); it holds " + ", ".join(arrays)
+        hint = "save it with np.savez(path, radiance=picture); it contains " + ", ".join(arrays)
         raise InputError("no array named 'radiance'", location, hint)
     array = arrays[name]
     if array.ndim not in (2, 3) or array.dtype.kind not in "fiu" or array.size == 0:

@@ -39,7 +39,7 @@ def check_file(path: Path) -> None:
 
 def _fits(content: bytes, at: int, needed: int) -> None:
     if not 0 <= at <= len(content) or not 0 < needed <= len(content) - at:
-        raise Unreadable("it claims more pixels than it holds")
+        raise Unreadable("it claims more pixels than it contains")
 
 
 def _plain_text(content: bytes) -> None:
@@ -87,7 +87,7 @@ def _serialized(content: bytes) -> None:
     wide = 8 if version == 4 else 4
     end = len(content) - 4 - wide * count
     if count == 0 or end < 8:
-        raise Unreadable(f"it claims to hold {count} meshes")
+        raise Unreadable(f"it claims to contain {count} meshes")
     begins = np.frombuffer(content, f"<u{wide}", count, end).tolist()
     if begins[0] != 0 or any(a >= b for a, b in itertools.pairwise([*begins, end])):
         raise Unreadable("its list of offsets is damaged")
@@ -131,7 +131,7 @@ class _Inflated:
                 raise Unreadable(f"it cannot be decompressed: {error}") from None
             self.packed = self.zlib.unconsumed_tail
             if not more:
-                raise Unreadable("it claims more vertices or faces than it holds")
+                raise Unreadable("it claims more vertices or faces than it contains")
             self.ready += more
         result, self.ready = self.ready[:count], self.ready[count:]
         return result

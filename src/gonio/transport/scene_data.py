@@ -129,7 +129,7 @@ class SceneData:
         return self.mi.Bool(True)
 
     def visible(self, si: SurfaceInteraction, point: Point, active: Mask) -> Mask:
-        """Lanes whose surface sees a point that lies on no surface."""
+        """Lanes from whose surface a point that is on no surface is visible."""
         return active & ~self.surfaces.blocked(shadow_ray_to(si, point), active)
 
     def features(self, throughput: Radiance, si: SurfaceInteraction, alive: Mask, active: Mask) -> list[Float]:

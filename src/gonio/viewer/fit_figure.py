@@ -121,8 +121,8 @@ def _images(axes: list[Axes], measured: Values, fitted: Values) -> None:
         pictures.append(radiance.reshape(SIZE, SIZE, 3))
     # values span decades: the cube root approximates perceived lightness
     white = max(float(np.nanpercentile(np.cbrt(np.abs(pictures[0])), 97.0)), 1e-6)
-    for axis, picture, title in zip(axes, pictures, ("measured", "fitted"), strict=False):
-        shown = np.where(np.isnan(picture), 1.0, np.clip(np.cbrt(np.maximum(picture, 0.0)) / white, 0.0, 1.0))
+    for axis, image, title in zip(axes, pictures, ("measured", "fitted"), strict=False):
+        shown = np.where(np.isnan(image), 1.0, np.clip(np.cbrt(np.maximum(image, 0.0)) / white, 0.0, 1.0))
         axis.imshow(shown, origin="lower", extent=(0.0, 1.0, 0.0, 90.0), aspect="auto", interpolation="nearest")
         axis.set_title(f"{title}, f by its cube root", fontsize=10)
         _half_difference_axes(axis)

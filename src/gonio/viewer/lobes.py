@@ -101,7 +101,7 @@ def _panel(axes: Axes, curves: Sequence[Curve], full: bool) -> None:
         for angle, strength in curve.deltas:
             x, y = math.sin(math.radians(angle)), math.cos(math.radians(angle))
             _arrow(axes, x, y, color, 2)
-            # The arrows may coincide: their labels are placed below each other.
+            # Labels of coincident arrows are placed below each other.
             along = 0.55 + 0.16 * index
             x, y = along * x - 0.12 * y, along * y + 0.12 * x
             axes.text(x, y, f"{strength:.2f}", fontsize=9.5, color=color, ha="center", va="center")
