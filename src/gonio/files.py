@@ -149,8 +149,8 @@ def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], els
     fill       makes the file, or the folder, of the name that it is given
     elsewhere  do not try beside the target: its disk is full
     """
-    kept = keep_elsewhere(target, fill, elsewhere)
-    hint = failure.hint if kept is None else f"it is kept as {kept}: move it from there"
+    place = keep_elsewhere(target, fill, elsewhere)
+    hint = failure.hint if place is None else f"it is kept as {place}: move it from there"
     raise type(failure)(failure.what, failure.where, hint)
 
 
@@ -160,11 +160,11 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 
     elsewhere  not beside the target: its disk is full
     """
-    for place in (*([] if elsewhere else [target.parent]), Path.cwd, tempfile.gettempdir):
+    places: list[Callable[[], str | Path]] = [lambda: target.parent, Path.cwd, tempfile.gettempdir]
+    for place in places[1:] if elsewhere else places:
         folder = None
         try:
-            where = place if isinstance(place, Path) else Path(place())
-            folder = Path(tempfile.mkdtemp(prefix="gonio-", dir=where))
+            folder = Path(tempfile.mkdtemp(prefix="gonio-", dir=place()))
             file = folder / (with_ending(target, "").name if target.name else "files")
             fill(file)
             return file
