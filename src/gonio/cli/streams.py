@@ -59,7 +59,8 @@ def _stream(stream: TextIO | None, number: int, kind: type[io.TextIOWrapper]) ->
     if stream is None:
         raw = io.BufferedWriter(io.FileIO(number, "w", closefd=False))
         return kind(raw, "utf-8", "gonio")
-    if not isinstance(stream, io.TextIOWrapper):  # somebody's own
+    own = (sys.__stdout__, sys.__stderr__)
+    if not isinstance(stream, io.TextIOWrapper) or not any(stream is one for one in own):  # of whoever calls `main`
         return stream
     return kind(
         stream.buffer,
