@@ -149,8 +149,8 @@ def _rescue(failure: GonioError, target: Path, fill: Callable[[Path], None], els
     fill       makes the file, or the folder, of the name that it is given
     elsewhere  do not try beside the target: its disk is full
     """
-    kept = keep_elsewhere(target, fill, elsewhere)
-    hint = failure.hint if kept is None else f"it is kept as {kept}: move it from there"
+    place = keep_elsewhere(target, fill, elsewhere)
+    hint = failure.hint if place is None else f"it is kept as {place}: move it from there"
     raise type(failure)(failure.what, failure.where, hint)
 
 
@@ -160,8 +160,8 @@ def keep_elsewhere(target: Path, fill: Callable[[Path], object], elsewhere: bool
 
     elsewhere  not beside the target: its disk is full
     """
-    places: list[Callable[[], str | Path]] = [Path.cwd, tempfile.gettempdir]
-    for place in places if elsewhere else [lambda: target.parent, *places]:
+    places: list[Callable[[], str | Path]] = [lambda: target.parent, Path.cwd, tempfile.gettempdir]
+    for place in places[1:] if elsewhere else places:
         folder = None
         try:
             folder = Path(tempfile.mkdtemp(prefix="gonio-", dir=place()))

@@ -311,7 +311,7 @@ def test_a_long_render_has_a_checkpoint_beside_it_until_it_is_done(
 
     def look(progress: passes.Progress) -> None:
         time.sleep(0.05)  # the file is written by a thread of its own
-        seen.append(checkpoints.beside(output).exists())
+        seen.append(checkpoints.default_path(output).exists())
 
     render_to_file(Request(scene, output, spp=6), report=look)
     assert seen[-1]

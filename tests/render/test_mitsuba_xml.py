@@ -228,3 +228,24 @@ def test_many_parameters_take_no_longer_than_few(tmp_path: Path) -> None:
 def test_the_longest_name_of_a_parameter_counts_and_its_value_is_no_name(tmp_path: Path) -> None:
     content = '<default name="a" value="1"/><default name="ab" value="2$a"/><string name="x" value="$ab$a.$abc\\$a"/>'
     assert '<string name="x" value="211.21c\\$a">' in mitsuba_xml.read(scene(tmp_path / "scene", content), {}).text
+
+
+@pytest.mark.parametrize(
+    ("count", "last", "message"),
+    [
+        (60, '<bsdf type="diffuse" id="a60"/>', ""),
+        (20_000, '<bsdf type="diffuse" id="a20000"/>', "references lead on from one object to the next 20000 times"),
+        (1, '<bsdf type="twosided" id="a1"><ref id="a1"/></bsdf>', "is part of itself"),
+        (20_000, '<alias id="a0" as="a20000"/>', "is part of itself"),
+    ],
+)
+def test_references_are_bounded_before_mitsuba_follows_them(
+    count: int, last: str, message: str, tmp_path: Path
+) -> None:
+    content = "".join(f'<bsdf type="twosided" id="a{n}"><ref id="a{n + 1}"/></bsdf>' for n in range(count)) + last
+    file = scene(tmp_path / "scene", content)
+    if not message:
+        mitsuba_xml.read(file, {})
+        return
+    with pytest.raises(InputError, match=message):
+        mitsuba_xml.read(file, {})

@@ -135,8 +135,8 @@ def _picture(request: Request, level: int, notice: str = "") -> RGB:
     with engine.put_back():
         prepared = prepare(request)
         notices += prepared.warnings
-        beside = None if output is None else checkpoints.beside(output)
-        stopped, keeper = execute(prepared, temporary=beside, tell=notices.append)
+        checkpoint = None if output is None else checkpoints.default_path(output)
+        stopped, keeper = execute(prepared, temporary=checkpoint, tell=notices.append)
         picture = finish.picture_of(prepared.render, request.denoise, output)
         error, unmet = finish.estimated(prepared)
         notices += filter(None, [unmet])

@@ -38,11 +38,11 @@ KIND = "render"
 def load(path: Path) -> kept.Kept:
     """The checkpoint in a file, or the one before where it is damaged. Raises InputError where there is none, and for
     facts that no render has."""
-    found = kept.read(path)
-    if found.facts.get("kind") != KIND:
+    saved = kept.read(path)
+    if saved.facts.get("kind") != KIND:
         raise InputError("this is no checkpoint of a render", str(path), "give one that `gonio render` has written")
-    validated(_Facts, found.facts, str(path))
-    return found
+    validated(_Facts, saved.facts, str(path))
+    return saved
 
 
 class _Facts(BaseModel):
@@ -59,10 +59,10 @@ class _Facts(BaseModel):
     identity: dict[str, str]
 
 
-def restore(render: Renders, found: kept.Kept, where: str) -> None:
+def restore(render: Renders, saved: kept.Kept, where: str) -> None:
     """Carry the sums over."""
     try:
-        render.restore(int(found.facts["done"]), found.arrays)
+        render.restore(int(saved.facts["done"]), saved.arrays)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError("this checkpoint does not fit the picture", where, "render anew") from error
 
@@ -172,7 +172,7 @@ class Keeper:
         self._cost = before + (time.thread_time() - began) / (os.cpu_count() or 1)
 
 
-def beside(output: Path) -> Path:
+def default_path(output: Path) -> Path:
     """Where the checkpoint of a picture is that nobody asked for."""
     return files.with_ending(output, SUFFIX)
 
@@ -186,23 +186,23 @@ def earlier(path: Path, prepared: Prepared, temporary: bool) -> tuple[str, bool]
     if not kept.exists(path):
         return "", temporary
     try:
-        found = load(path)
-        check(found.facts, prepared.sources.identity(), str(path))
-        done = int(found.facts["done"])
+        saved = load(path)
+        check(saved.facts, prepared.sources.identity(), str(path))
+        done = int(saved.facts["done"])
         if done > prepared.spp:
             what = f"the checkpoint holds {done} samples per pixel, {prepared.spp} are asked for"
             raise InputError(what, str(path), f"give --spp {done} or more, or another --checkpoint")
-        restore(prepared.render, found, str(path))
+        restore(prepared.render, saved, str(path))
     except InputError as error:
         if not temporary:
             raise
         kept.remove(path)
         return f"{path} is not used, and removed: {error.what}", temporary
     text = f"goes on from {path}: {done} of {prepared.spp} samples per pixel are done"
-    if "lanes" in found.arrays:
-        share = float(np.mean(found.arrays["lanes"] >= prepared.spp))
+    if "lanes" in saved.arrays:
+        share = float(np.mean(saved.arrays["lanes"] >= prepared.spp))
         text = f"goes on from {path}: {share:.0%} of the pixels are done"
-    return text, temporary or bool(found.facts.get("temporary"))
+    return text, temporary or bool(saved.facts.get("temporary"))
 
 
 def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = False) -> tuple[Request, str]:
@@ -211,18 +211,18 @@ def asked_again(path: Path, change: Request, allow_code: bool, writes: bool = Fa
 
     writes  the picture is written, under the name that the scene gives it where the render was asked for no other
     """
-    found = load(path)
-    if found.facts["request"] is None:
+    saved = load(path)
+    if saved.facts["request"] is None:
         what = "its material is known to the program alone that made it"
         raise InputError(what, str(path), "call that program again with the same checkpoint")
-    old = request_of(found.facts["request"], str(path), allow_code)
+    old = request_of(saved.facts["request"], str(path), allow_code)
     output, notice = change.output, ""
     if output is None and (old.output is not None or writes):
-        output, notice = _placed(old.output or Path(found.facts["output"]), path)
+        output, notice = _placed(old.output or Path(saved.facts["output"]), path)
     request = replace(
         old,
         output=output,
-        spp=change.spp or found.facts["wanted"],
+        spp=change.spp or saved.facts["wanted"],
         timeout=change.timeout,
         threads=change.threads,
         checkpoint=path,
@@ -242,6 +242,6 @@ def _placed(output: Path, checkpoint: Path) -> tuple[Path, str]:
     if not inside:
         placed = folder / (output.name or "picture.exr")
         notice = f"the picture goes to {placed}: the checkpoint names {output}, outside its folder; -o writes it there"
-    if placed.absolute() in (checkpoint.absolute(), beside(checkpoint.absolute())):
+    if placed.absolute() in (checkpoint.absolute(), default_path(checkpoint.absolute())):
         raise InputError("the checkpoint itself has the picture's name", str(checkpoint), "name another file with -o")
     return placed, notice

@@ -47,9 +47,9 @@ def execute(
     path = request.checkpoint or temporary
     unasked = request.checkpoint is None
     if path is not None:
-        found, unasked = checkpoints.earlier(path, prepared, unasked)
-        if found:
-            tell(found)
+        notice, unasked = checkpoints.earlier(path, prepared, unasked)
+        if notice:
+            tell(notice)
     gathered = None
     goal: int | Callable[[], int] = prepared.spp
     if isinstance(prepared.render, until.Until):

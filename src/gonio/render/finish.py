@@ -77,9 +77,9 @@ def render_to_file(
     with Interrupts(notice) as interrupts:  # from here on: an import that is interrupted half-way can crash
         prepared = prepare(request, writes=True)
         interrupts.check()
-        beside = checkpoints.beside(prepared.output)
+        checkpoint = checkpoints.default_path(prepared.output)
         stopped, keeper = execute(
-            prepared, temporary=beside, report=report, interrupted=lambda: interrupts.asked, tell=tell
+            prepared, temporary=checkpoint, report=report, interrupted=lambda: interrupts.asked, tell=tell
         )
         picture = picture_of(prepared.render, request.denoise, prepared.output)
         settings = prepared.settings | {"spp": prepared.render.done}

@@ -25,15 +25,15 @@ STRICT = ConfigDict(strict=True, extra="forbid", arbitrary_types_allowed=True)
 
 def described(request: Request) -> Facts:
     """A request as a file can hold it. Raises InputError for a material that this program alone knows."""
-    found: Facts = {}
+    values: Facts = {}
     for one in fields(Request):
         value = getattr(request, one.name)
         if one.name in LEFT_OUT:
             continue
         if isinstance(value, Path):
             value = str(value.absolute()) if one.name == "output" or request.material is None else str(value)
-        found[one.name] = _plain(value)
-    return found
+        values[one.name] = _plain(value)
+    return values
 
 
 def _plain(value: Any) -> Any:
@@ -48,13 +48,13 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def request_of(found: Facts, where: str, allow_code: bool) -> Request:
+def request_of(given: Facts, where: str, allow_code: bool) -> Request:
     """The request that `described` made. A file alone never makes Gonio run Python: `allow_code` is asked for again."""
-    if not allow_code and (found.get("allow_code") or ".py:" in json.dumps(found)):
+    if not allow_code and (given.get("allow_code") or ".py:" in json.dumps(given)):
         raise InputError(
             "this render runs Python files that its scene names", where, "add --allow-code if you trust it"
         )
-    values = vars(validated(_fields(), found, where, "/request"))
+    values = vars(validated(_fields(), given, where, "/request"))
     try:
         material = _rebuilt(values["material"])
         if not (material is None or isinstance(material, BSDF)):
@@ -71,21 +71,21 @@ def _fields() -> type[BaseModel]:
     """The fields that `described` writes, with their types."""
     hints = get_type_hints(Request)
     hints |= {"material": dict[str, Any] | None, "overrides": dict[str, Any]}
-    kept: Any = {one.name: (hints[one.name], ...) for one in fields(Request) if one.name not in LEFT_OUT}
-    return create_model("RequestFields", __config__=STRICT, **kept)
+    types: Any = {one.name: (hints[one.name], ...) for one in fields(Request) if one.name not in LEFT_OUT}
+    return create_model("RequestFields", __config__=STRICT, **types)
 
 
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def validated(model: type[Model], found: Facts, where: str, pointer: str = "") -> Model:
+def validated(model: type[Model], given: Facts, where: str, pointer: str = "") -> Model:
     """The facts of an untrusted file as `model` has them.
 
     pointer  where they stand in the file
     Raises InputError with the place and what is expected there.
     """
     try:
-        return model.model_validate_json(json.dumps(found))  # from JSON a list is a tuple, and a text a path
+        return model.model_validate_json(json.dumps(given))  # from JSON a list is a tuple, and a text a path
     except ValidationError as error:
         if {"missing", "extra_forbidden"} & {one["type"] for one in error.errors(include_url=False)}:
             raise InputError("this checkpoint is of another version of Gonio", where, "render anew") from None

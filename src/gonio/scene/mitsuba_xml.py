@@ -15,6 +15,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -80,6 +81,7 @@ def read(file: Path, parameters: Mapping[str, str], allow_outside: bool = False,
     reader = _Reader(file, parameters, allow_outside, allow_code)
     reader.parse(file, [reader.folder, plugin_search.package()])
     reader.place_files()
+    reader.check_references()
     unused = [name for name in parameters if name not in reader.used]
     if unused:
         known = [name for name in reader.values if name not in unused]
@@ -140,7 +142,7 @@ class _Reader:
     """
 
     def __init__(self, file: Path, parameters: Mapping[str, str], allow_outside: bool, allow_code: bool) -> None:
-        self.folder = file.parent.resolve()
+        self.file, self.folder = file, file.parent.resolve()
         self.values, self.used = dict(parameters), set[str]()
         self.lengths = sorted({len(name) for name in parameters}, reverse=True)  # of the parameters' names
         self.allow_outside, self.allow_code = allow_outside, allow_code
@@ -150,6 +152,7 @@ class _Reader:
         self.sources: list[str] = []
         self.folders: list[Path] = []
         self.texts: list[tuple[int, str, dict[str, str], str]] = []  # those of plugins: line, plugin, element, place
+        self.references: dict[str, set[str]] = {}  # from the id of an object to those that it needs
         self.runs_code = False
         self.version = ""  # of the scene's own file
         self.bytes = self.elements = self.grown = 0  # what was read, and what parameters have added to it
@@ -184,6 +187,25 @@ class _Reader:
             name, value = attributes.get("name", ""), attributes["value"]
             value = property_value(kind, name, value, location, locate, self.allow_code)
             self.lines[line] = _tag("string", {**attributes, "value": value})
+
+    def check_references(self) -> None:
+        """Raise InputError where references go round in a circle, or lead on from one object to the next too often:
+        Mitsuba follows them by recursion."""
+        depths = dict.fromkeys({*self.references, *(n for names in self.references.values() for n in names)}, 0)
+        waiting = Counter(name for names in self.references.values() for name in names)
+        ready = [name for name in depths if not waiting[name]]
+        for name in ready:  # it grows: objects whose references have all been followed
+            for inner in self.references.get(name, ()):
+                depths[inner] = max(depths[inner], depths[name] + 1)
+                waiting[inner] -= 1
+                if not waiting[inner]:
+                    ready.append(inner)
+        deepest = max(depths.values(), default=0)
+        if deepest > MAX_DEPTH or len(ready) < len(depths):
+            what = f"references lead on from one object to the next {deepest} times, at most {MAX_DEPTH} are possible"
+            if len(ready) < len(depths):
+                what = f"the object '{min(set(depths) - set(ready))}' is part of itself, or refers to one that is"
+            raise InputError(what, str(self.file), "leave some references out")
 
     def located(self, name: str, folders: list[Path], location: str) -> str:
         """The absolute path of a file that the scene names, once it is sure that it may be read."""
@@ -245,6 +267,7 @@ class _File:
         self.scene, self.file, self.folders, self.included, self.level = scene, file, folders, included, level
         self.open: list[str] = []  # elements around, "" for those that are carried out here and not written
         self.kinds: list[str] = []  # of plugins, of the same elements
+        self.ids: list[str] = []  # of the same elements
         self.parser = expat.ParserCreate()
         self.parser.StartDoctypeDeclHandler = self.parser.EntityDeclHandler = self._refused
         self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
@@ -272,11 +295,13 @@ class _File:
             written = ""
         self.open.append(written)
         self.kinds.append(attributes.get("type", ""))
+        self.ids.append("" if tag == "ref" else attributes.get("id", ""))
         if written:
             self._write(tag, attributes)
 
     def _end(self, tag: str) -> None:
         self.kinds.pop()
+        self.ids.pop()
         if self.open.pop():
             self._line(f"</{tag}>")
 
@@ -298,7 +323,16 @@ class _File:
             attributes = {**attributes, "filename": scene.located(attributes["filename"], self.folders, self.location)}
         elif tag == "string" and "value" in attributes and len(self.kinds) > 1:
             scene.texts.append((len(scene.lines), self.kinds[-2], attributes, self.location))
+        self._note_reference(tag, attributes)
         self._line(_tag(tag, attributes))
+
+    def _note_reference(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """Note to which objects a named one leads: those that it refers to, and those with names inside."""
+        references, name = self.scene.references, attributes.get("id", "")
+        if tag == "alias":
+            references.setdefault(attributes.get("as", ""), set()).add(name)
+        elif name and (outer := next(filter(None, reversed(self.ids[:-1])), "")):
+            references.setdefault(outer, set()).add(name)
 
     def _default(self, attributes: Mapping[str, str]) -> None:
         name, value = self._required("default", attributes, "name", "value")

@@ -1,11 +1,11 @@
-"""A crew of many processes, here or on many machines, by Dask. Dask is asked for only when a cluster is.
+"""Many processes, here or on many machines, by Dask. Dask is asked for only when a cluster is.
 
     with Cluster(workers=4):                          # processes of this machine
     with Cluster("tcp://10.0.0.7:8786"):              # whatever has joined that scheduler
 
-Whoever dies, freezes or cannot be reached: the part is done again by another, and the first answer counts, since all
-answers have the same bits. A part that fails by its input fails the job, and is not tried again. A worker with another
-version of Gonio, or another processor, would not give the same bits, and is refused by name.
+The part of a worker that fails, freezes or cannot be reached is done again by another one, and the first answer counts,
+since all answers have the same bits. A part that fails by its input fails the job, and is not tried again. A worker of
+another version of Gonio, or with another processor, would not give the same bits, and is refused by name.
 """
 
 from __future__ import annotations
@@ -343,12 +343,12 @@ class _Job:
             return
         try:
             fetch = self.client._gather
-            found = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH)
+            results = self.client.sync(fetch, list(done.values()), errors="raise", callback_timeout=FETCH)
         except Exception:  # one of the workers died, or froze, with what it had: ask for each again, elsewhere
             for index in done:
                 self._failed(index, TimeoutError())
             return
-        for index, (seconds, arrays) in zip(done, found, strict=True):
+        for index, (seconds, arrays) in zip(done, results, strict=True):
             self.took.append(seconds)
             self.missing.discard(index)
             for future in self.out.pop(index, []):
