@@ -117,6 +117,7 @@ def test_every_verb_is_asked() -> None:
     assert {command.split()[0] for command in COMMANDS.values()} == set(Verb.family.all())
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_word_makes_a_verb_fail(command: str, folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     words = [*_files(), "metadata.npz", *WORDS]
@@ -125,6 +126,7 @@ def test_no_word_makes_a_verb_fail(command: str, folder: Path, capfd: pytest.Cap
         assert code in (0, 2) and "Gonio failed" not in text and "Traceback" not in text, (word[:80], code, text[-500:])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("command", WRITING)
 def test_no_name_of_a_file_to_write_makes_a_verb_fail(
     command: str, folder: Path, capfd: pytest.CaptureFixture[str]
@@ -150,6 +152,7 @@ def test_a_current_folder_that_was_deleted_is_one_error(
     assert "no current folder" in done.stdout + done.stderr
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("command", ["schema", "models", "models --json", "--version", "no-such-verb --json"])
 @pytest.mark.parametrize("output", ["/dev/full", "&-"])
 def test_an_output_that_takes_nothing_is_one_error(command: str, output: str) -> None:
