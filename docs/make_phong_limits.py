@@ -11,9 +11,10 @@ from typing import Any
 
 import gonio as go
 import numpy as np
+from gonio.energy.albedo import cubature
 from gonio.ops import dot, sqr, where
 from gonio.optics.frame import mirror
-from gonio.verify import Report, cubature, directions, subject, verify
+from gonio.verify import Report, directions, subject, verify
 from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent

@@ -30,8 +30,8 @@ def relmse(x: np.ndarray, r: np.ndarray) -> float:
 @pytest.fixture
 def shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Shares are worth it whatever they save."""
-    monkeypatch.setattr(until, "PAYS_SAMPLES", 0)
-    monkeypatch.setattr(until, "PAYS", 2.0)
+    monkeypatch.setattr(until, "MIN_SAVED", 0)
+    monkeypatch.setattr(until, "MAX_GAIN", 2.0)
 
 
 def drawing(scene: Path, error: float, tmp_path: Path, **options: object) -> until.Until:
@@ -52,7 +52,7 @@ def finish(render: until.Until, size: int = 7) -> np.ndarray:
 def test_the_error_is_what_was_promised(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, adapts: bool
 ) -> None:
-    monkeypatch.setattr(until, "PAYS_SAMPLES", 0 if adapts else 10**12)
+    monkeypatch.setattr(until, "MIN_SAVED", 0 if adapts else 10**12)
     truth = go.render(scene, spp=16384, size=(48, 32), seed=99)
     true, told = [], []
     for seed in range(6):
