@@ -29,6 +29,8 @@ FEW = 12_000  # pixels on which the way is found; the last steps are taken on al
 CHUNK = 1 << 17  # pixels at a time, so that memory stays flat
 FARTHEST = 8.0  # standard deviations to which a fault of the calibration may go
 LEAST_NOISE = 1e-4  # relative: below it pixels are as good as exact, and a number of exactly 0 could not be divided by
+CERTAIN = 20.0  # standard deviations of its own noise, from which on a pixel tells what other noise there is
+MEDIAN_CHI2 = 0.454936  # of a squared normal number
 BALL = ("ball.x", "ball.y", "ball.radius")
 LAMP = ("right", "down", "intensity")
 
@@ -250,11 +252,21 @@ class Problem:
         self._weights = [self._weight(part, self.predicted(part, numbers, False)[0]) for part in self.parts]
 
     def _weight(self, part: Pixels, predicted: Floats) -> Floats:
+        return np.asarray(1.0 / (self._spread(part, predicted) * np.sqrt(self.alike)))
+
+    def _spread(self, part: Pixels, predicted: Floats) -> Floats:
+        """Standard deviation of pixels, (N, 3). It is that of the prediction: pixels that are low by chance would
+        count more by their own."""
         floor = 1e-6 * float(np.abs(part.value).max())
         # a pixel that a fault has moved into the dark is not weighed by the dark
         size = np.maximum(np.abs(predicted), 0.1 * np.abs(part.value))
-        spread = np.sqrt((self.noise * size) ** 2 + part.step**2 + floor**2)
-        return np.asarray(1.0 / (spread * np.sqrt(self.alike)))
+        return np.asarray(np.sqrt((self.noise * size) ** 2 + part.variance(size) + floor**2))
+
+    def relative_spread(self, numbers: Floats) -> float:
+        """Mean standard deviation of pixels over their mean."""
+        predicted = [(part, self.predicted(part, numbers, False)[0]) for part in self.parts]
+        total = sum(float(np.abs(values).sum()) for _, values in predicted)
+        return sum(float(self._spread(part, values).sum()) for part, values in predicted) / max(total, 1e-300)
 
     def off(self, numbers: Floats) -> list[tuple[Pixels, Floats, Floats]]:
         """Of each part (pixels, predicted - seen, predicted)."""
@@ -339,7 +351,7 @@ class Fitted:
 
     fit      its parameters, as `go.fit` gives them
     faults   what came of each open fault of the calibration: (in its own standard deviations, how sure)
-    noise    relative, of a pixel about the fit
+    noise    mean standard deviation of pixels about the fit, over their mean
     problem  as it was solved, numbers what solved it
     """
 
@@ -421,13 +433,26 @@ def _data(scene: Scene, parts: Sequence[Pixels]) -> Data:
 
 
 def _noise(problem: Problem, numbers: Floats) -> float:
-    """Relative standard deviation of pixels about the prediction, robust, what quantisation does taken off."""
-    found = []
+    """Relative standard deviation of pixels about the prediction, beside that of their photons, reading and
+    quantisation: with it half of the bright ones lie within the quartiles of their spread."""
+    squares, variances = [], []
     for part, off, predicted in problem.off(numbers):
-        bright = predicted > 20.0 * part.step + 1e-3 * float(np.percentile(predicted, 99.0))
-        found.append(off[bright] / predicted[bright])
-    together = np.concatenate(found)
-    return max(1.4826 * float(np.median(np.abs(together))) if len(together) else 0.0, LEAST_NOISE)
+        bright = predicted > 1e-3 * float(np.percentile(predicted, 99.0))
+        squares.append((off / np.where(bright, predicted, 1.0))[bright] ** 2)
+        variances.append(part.variance(predicted)[bright] / predicted[bright] ** 2)
+    square, variance = np.concatenate(squares), np.concatenate(variances)
+    if not len(square):
+        return LEAST_NOISE
+    # those that are told best, as far as there are enough of them
+    told = variance <= max(1.0 / CERTAIN**2, float(np.quantile(variance, 0.1)))
+    square, variance = square[told], variance[told]
+    low, high = LEAST_NOISE**2, max(float(square.max()), LEAST_NOISE**2) * 4.0
+    if np.median(square / (low + variance)) <= MEDIAN_CHI2:
+        return LEAST_NOISE
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if np.median(square / (middle + variance)) > MEDIAN_CHI2 else (low, middle)
+    return float(np.sqrt(high))
 
 
 def _alike(problem: Problem, numbers: Floats) -> float:
@@ -473,7 +498,8 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
         _data(problem.scene, _some(Chosen(tuple(problem.parts), {}), FEW)),
     )
     faults = zip(problem.open, numbers[problem.own :], errors[problem.own :], strict=True)
-    return Fitted(fit, {name: (float(v), float(e)) for name, v, e in faults}, problem.noise, problem, numbers)
+    of_faults = {name: (float(v), float(e)) for name, v, e in faults}
+    return Fitted(fit, of_faults, problem.relative_spread(numbers), problem, numbers)
 
 
 def _correlation(covariance: Floats) -> Floats:
