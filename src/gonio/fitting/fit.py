@@ -19,14 +19,19 @@ from ..measure import read
 from ..measure.tables.base import Floats, Measurement
 from ..owner import public
 from .data import GRAZING, Data, data_of
-from .parameters import Free, free_of, start_of, with_values
-from .solver import METRICS, Problem, Solution, covariance, reweighed, solve
+from .parameters import NAMES, Free, free_of, ranges, start_of, with_values
+from .solver import METRICS, Problem, Solution, covariance, solve
 
 FEW = 6000  # values from which starts are judged
 SOME = 60_000  # from which the best start goes on
 WIDTHS = (0.03, 0.1, 0.3, 0.7)  # of lobes, tried as starts
 COLOURS = (0.5, 2.0)  # of colours without an upper end, such as indices, whose default may be a place without a slope
 STARTS = 24  # tried at most
+RANDOM = 6  # more, drawn at random
+OPEN = 4.0  # how far numbers without an upper end are drawn
+SOLVED = 8  # of them that are followed by the metric itself on a few values
+ENDS = 3  # of them that are followed to their end
+SAME = 1e-4  # relative difference of two costs from which on two ends are two
 NORMAL_95 = 1.96
 TIED = 0.98  # correlation from which two numbers are called tied
 SHORT = {
@@ -46,7 +51,8 @@ class Fit:
     values       theirs, (K,)
     errors       standard errors, (K,): inf where the data do not tell
     correlation  (K, K)
-    metric       on which differences were measured, error the root of their mean square on it
+    metric       on which differences were measured, error the root of their mean square on it (of "relative" ones of
+                 the deviance, which is the same where they are small)
     relative     mean |difference| over mean value of f cos theta_i
     criterion    Bayesian information criterion: lower is better; more parameters cost
     count        values that were fitted to
@@ -89,6 +95,8 @@ class Fit:
             "relative": self.relative,
             "criterion": self.criterion,
             "values": self.count,
+            "negative": [int(count) for count in self.data.negative],
+            "left_out": dict(self.data.out),
             "seconds": round(self.seconds, 3),
             "parameters": {
                 name: {"value": float(v), "error": float(e) if np.isfinite(e) else None}
@@ -193,32 +201,41 @@ def fit(
     cells = (
         data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
     )
-    # "relative" weighs by the model itself, so its way there leads over the logarithm, which needs no weights
-    rough = "log" if metric == "relative" else metric
-    floor = Problem(material, moving, cells.some(SOME), rough).floor
-
-    def problem(part: Data, name: str) -> Problem:
-        return Problem(material, moving, part, name, floor)
-
-    few = problem(cells.some(FEW), rough)
-    tried = []
-    for start in _starts(material, moving):
-        tried.append(solve(few, start, steps=12, tolerance=1e-3))
-        progress(f"start {len(tried)}: {np.sqrt(tried[-1].cost / max(3 * len(few.data), 1)):.4g}")
-    tried.sort(key=lambda one: one.cost)
-    middle = problem(cells.some(SOME), rough)
-    # the two best, where they differ: a few values may not tell which is better
-    ends = [solve(middle, one.numbers, steps=40) for one in tried[:2]]
-    best = min(ends, key=lambda one: one.cost)
-    if metric != rough:
-        middle = problem(middle.data, metric)
-        best = reweighed(middle, best.numbers, times=3)
+    middle = Problem(material, moving, cells.some(SOME), metric)
+    best = _best(middle, _starts(material, moving), progress)
     whole = middle
     if len(cells) > SOME:
-        whole = problem(cells, metric)
-        best = reweighed(whole, best.numbers, times=1)
+        whole = Problem(material, moving, cells, metric, middle.floor, middle.floors)
+        best = solve(whole, best.numbers, steps=2)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
     return _result(whole, best, metric, time.perf_counter() - started)
+
+
+def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:
+    """The least cost that starts lead to. All are followed on a few values by the logarithm, which is smooth from
+    anywhere, then the best by the metric itself, at last the best that differ on all values."""
+    data = problem.data.some(FEW)
+    few = _with_data(problem, data, problem.name)
+    rough = _with_data(problem, data, "log") if problem.name == "relative" else few
+    begins: list[Floats] = []
+    for start in starts:
+        end = solve(rough, start, steps=12, tolerance=1e-3).numbers
+        # the logarithm is blind to what its floor hides: where it leads is no better than its start at times
+        begins.append(min((end, start), key=few.cost))
+        progress(f"start {len(begins)}: {np.sqrt(few.cost(begins[-1]) / max(3 * len(data), 1)):.4g}")
+    begins.sort(key=few.cost)
+    tried = sorted((solve(few, one, steps=12, tolerance=1e-3) for one in begins[:SOLVED]), key=lambda one: one.cost)
+    different = [tried[0]]
+    for one in tried[1:]:
+        if all(abs(one.cost / max(other.cost, 1e-300) - 1.0) > SAME for other in different):
+            different.append(one)
+    ends = [solve(problem, one.numbers, steps=40) for one in different[:ENDS]]
+    return min(ends, key=lambda one: one.cost)
+
+
+def _with_data(problem: Problem, data: Data, metric: str) -> Problem:
+    """The same problem on other data, its floors as they are."""
+    return Problem(problem.material, problem.free, data, metric, problem.floor, problem.floors)
 
 
 def _starts(material: BSDF, free: list[Free]) -> list[Floats]:
@@ -237,7 +254,21 @@ def _starts(material: BSDF, free: list[Free]) -> list[Floats]:
                 value = width if one.kind == "alpha" else 2.0 / (width * width)  # a cosine's power of that width
                 other[at] = np.clip(value, one.low, one.high)
             found.append(other)
-    return found[:STARTS]
+    return found[:STARTS] + _random_starts(first, free)
+
+
+def _random_starts(first: Floats, free: list[Free]) -> list[Floats]:
+    """Where to begin beside: anywhere in the ranges of the numbers, those that are open as far as `OPEN`."""
+    low, high, ratio = ranges(free)
+    high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
+    low = np.where(low < -1e5, -high, low)
+    rng = np.random.default_rng(23)
+    found = []
+    for _ in range(RANDOM):
+        share = rng.random(len(first))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
+    return found
 
 
 def _exponent(one: Free) -> bool:
@@ -268,7 +299,7 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float) -> Fi
         relative,
         float(3 * runs * np.log(max(mean, 1e-300)) + len(numbers) * np.log(3 * runs)),
         len(data),
-        tuple(notes_on(problem.free, numbers, errors, correlation, names)),
+        (*notes_on(problem.free, numbers, errors, correlation, names), *_notes_on_data(data)),
         seconds,
         data,
     )
@@ -292,6 +323,18 @@ def notes_on(
             notes.append(
                 f"{names[i]} and {names[j]} are tied (correlation {correlation[i, j]:.3f}): fix one to tell the other"
             )
+    return notes
+
+
+def _notes_on_data(data: Data) -> list[str]:
+    """What is odd about the values themselves."""
+    notes = []
+    if data.negative.any():
+        share = ", ".join(f"{name} {100.0 * n / len(data):.2g} %" for name, n in zip(NAMES, data.negative, strict=True))
+        notes.append(f"{int(data.negative.sum())} of {3 * len(data)} values are negative ({share})")
+    for why in ("saturated", "not finite"):
+        if why in data.out:
+            notes.append(f"{data.out[why]} of {len(data) + sum(data.out.values())} places are {why} and left out")
     return notes
 
 

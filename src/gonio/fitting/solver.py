@@ -23,13 +23,14 @@ from .parameters import CHANNELS, Free, ranges, start_of, with_drjit
 
 Array = backend.Array
 BLOCK = 1 << 16  # rows that BLAS sums in float32 at a time
-SMALL = 1e-3  # of the largest value: where "log" turns from relative to absolute
+SMALL = 1e-3  # of the largest value: where "log" and "relative" turn from relative to absolute
+NEAR = 0.1  # relative difference under which a series is more accurate than the logarithm in float32
 
 
 # --------------------------------------------------------------------------- metrics
 
 METRICS = {
-    "relative": "difference over the model's own value, which noise of the data cannot bias",
+    "relative": "difference over the model's own value, which noise of the data cannot bias; its logarithm from 2 on",
     "log": "log(1 + f cos / c), c a thousandth of the brightest value in the data's median channel: nearly relative",
     "log1p": "log(1 + f cos), as Low2012",
     "cuberoot": "(f cos)^(1/3), near to what eyes see",
@@ -38,7 +39,7 @@ METRICS = {
 
 
 def metric(name: str, value: Array, floor: Array) -> Array:
-    """A value on the scale on which differences are measured, of one channel; "relative" ones are weighted instead."""
+    """A value on the scale on which differences are measured, of one channel; for "relative" see `deviance`."""
     dr = backend.drjit()
     if name in ("linear", "relative"):
         return value
@@ -46,6 +47,36 @@ def metric(name: str, value: Array, floor: Array) -> Array:
         size = dr.maximum(dr.abs(value), 1e-9)
         return dr.copysign(dr.exp(dr.log(size) / 3.0), value)
     return dr.copysign(dr.log(1.0 + dr.abs(value) / (1.0 if name == "log1p" else floor)), value)
+
+
+def deviance(model: Array, value: Array, floor: Array) -> Array:
+    """Residual r of a model f against a value v, r^2 = 2 rho, of the metric "relative".
+
+    Least squares of (v - f) / (f + c), weighed by the model where it stands, solve sum((v - f) / (f + c)^2 df) = 0.
+    These are the quasi-likelihood's equations for a standard deviation in proportion to f + c (Wedderburn1974), however
+    the noise is distributed: they have the truth for a root if v is right in the mean. But nothing is minimized by
+    them: a model of 0 has as good a root. What has that derivative is the deviance of the gamma distribution,
+
+        rho = u - log(1 + u),  u = (v - f) / (f + c),
+
+    which a model of 0 makes large. From u = 1 on (data twice the model, which noise does not make) rho is log(1 + u)
+    plus a constant: its derivative stops there, as Huber's does (Huber1964), and as it stops at u = -1 by itself. So no
+    value counts more than 1 / (f + c). A value under -c / 2 has v + c, at least 0, in the derivative as it is; the
+    constant is that of -c / 2, since no model is negative.
+    """
+    dr = backend.drjit()
+    size = dr.abs(model)
+    nearest = dr.maximum(value, -0.5 * floor)
+    share = dr.maximum(value + floor, 0.0) / (nearest + floor)
+    u = (nearest - size) / (size + floor)
+    small = dr.abs(u) < NEAR
+    # 2 rho / u^2 = 2 sum of (-u)^k / (k + 2)
+    s = dr.select(small, u, 0.0)
+    series = 1.0 + s * (-2 / 3 + s * (1 / 2 + s * (-2 / 5 + s * (1 / 3 + s * (-2 / 7 + s / 4)))))
+    b = dr.select(small, 1.0, u)
+    logarithm = dr.log(1.0 + b)
+    rho = dr.select(b > 1.0, logarithm + (1.0 - 2.0 * np.log(2.0)), share * b - logarithm)
+    return dr.select(small, -s * dr.sqrt(series), -dr.copysign(dr.sqrt(2.0 * rho), b))
 
 
 # --------------------------------------------------------------------------- residuals and their derivatives
@@ -70,6 +101,7 @@ class Problem:
 
     material  what is fitted, free its parameters that move
     name      of the metric
+    floor     value of "log" where it turns absolute; floors (3,) those of "relative", of each channel
     """
 
     material: BSDF
@@ -77,14 +109,16 @@ class Problem:
     data: Data
     name: str = "log"
     floor: float = 0.0
+    floors: Floats | None = None
     _given: tuple[Array, Array, list[Array]] | None = field(default=None, repr=False)
-    _weights: list[Array] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.name not in METRICS:
             raise InputError(f"unknown metric '{self.name}'", "metric", " | ".join(METRICS))
         if self.floor <= 0.0:
             self.floor = max(SMALL * float(np.percentile(np.abs(self.data.value), 99.0)), 1e-6)
+        if self.floors is None:
+            self.floors = floors_of(self.data.value)
         self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
@@ -127,24 +161,18 @@ class Problem:
     def _floor(self, types: backend.Types) -> Any:
         return backend.float_of(self.floor, types)
 
-    def reweigh(self, numbers: Floats) -> None:
-        """Weigh by the values of the material with these numbers: 1 / (|f cos| + c)."""
-        if self.name != "relative":
-            return
-        types = backend.types("float32")
-        wo, wi, _ = self._loaded(types)
-        dr, floor = backend.drjit(), self._floor(types)
-        values = [backend.float_of(float(x), types) for x in numbers]
-        seen = with_drjit(self.material, self.free, values, types).eval(wo, wi)
-        self._weights = [1.0 / (dr.abs(seen[c]) + floor) for c in range(CHANNELS)]
-        dr.eval(self._weights)
-
-    def _residual(self, seen: Array, types: backend.Types) -> list[Array]:
+    def _residual(self, values: Array, types: backend.Types) -> list[Array]:
         wanted = self._loaded(types)[2]
-        found = [metric(self.name, seen[c], self._floor(types)) - wanted[c] for c in range(CHANNELS)]
-        if self._weights is not None:
-            found = [r * w for r, w in zip(found, self._weights, strict=True)]
-        return found
+        if self.name == "relative":
+            assert self.floors is not None, "set when it was made"
+            floors = [backend.float_of(float(floor), types) for floor in self.floors]
+            return [deviance(values[c], wanted[c], floors[c]) for c in range(CHANNELS)]
+        return [metric(self.name, values[c], self._floor(types)) - wanted[c] for c in range(CHANNELS)]
+
+    def cost(self, numbers: Floats) -> float:
+        """Sum of the squared residuals; infinite where one is not finite."""
+        total = sum(float(np.sum(r.astype(np.float64) ** 2)) for r in self.residuals(numbers))
+        return total if np.isfinite(total) else np.inf
 
     def residuals(self, numbers: Floats) -> list[NDArray[np.float32]]:
         """Of each channel, (N,)."""
@@ -186,6 +214,13 @@ class Problem:
             jacobian = np.stack([np.asarray(backend.to_numpy(d[c], rows)) for d in derivatives], axis=1)
             found.append((np.asarray(backend.to_numpy(residual[c], rows)), jacobian, which))
         return found
+
+
+def floors_of(value: Floats) -> Floats:
+    """Where "relative" turns absolute, of each channel, (3,): by the data alone, a thousandth of its brightest values.
+    Values under 0 do not count for it: in real files they lie in highlights whose color is out of gamut."""
+    brightest = np.percentile(np.maximum(value, 0.0), 99.0, axis=0)
+    return np.maximum(SMALL * brightest, 1e-6)
 
 
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
@@ -286,15 +321,6 @@ def solve(
         if drop < tolerance and moved < 1e-4:
             break
     return Solution(numbers, cost, taken)
-
-
-def reweighed(problem: Problem, start: Floats, times: int) -> Solution:
-    """Weigh by the material where it stands, and step; so many times. Of metrics without weights, steps alone."""
-    best = Solution(start, np.inf, 0)
-    for _ in range(times):
-        problem.reweigh(best.numbers)
-        best = solve(problem, best.numbers, steps=1)
-    return best
 
 
 def covariance(problem: Problem, numbers: Floats) -> Floats:
