@@ -153,8 +153,22 @@ def test_a_colour_whose_channels_mix_has_a_derivative_for_each() -> None:
 
 
 def test_what_the_data_do_not_tell_is_said() -> None:
-    found = fit(table(go.Lambert(0.3)), Sum(go.Lambert(0.3), go.Lambert(0.1)))
-    assert any("a.albedo.r and b.albedo.r are tied" in note for note in found.notes)
+    """Two lobes of one width over a table of one: each may have any share."""
+    cells = data.data_of(table(go.Conductor(alpha=0.3), shape=(12, 12, 16)))
+    twice = Sum(go.Conductor(alpha=0.3, albedo=0.6), go.Conductor(alpha=0.3, albedo=0.4))
+    shares = ("a.albedo", "b.albedo")
+    held = {f"{part}.{name}": tree.value_at(twice, f"{part}.{name}") for part in "ab" for name in ("eta", "k", "alpha")}
+    found = fit(cells, twice, free=shares, fixed=held)
+    assert np.isinf(found.errors).all()
+    assert any("do not tell a.albedo.r and b.albedo.r from each other" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("model", "gone"), [("lambert+lambert", "b.albedo"), ("lambert+ward", "b.diffuse")])
+def test_of_parts_that_do_the_same_one_moves(model: str, gone: str) -> None:
+    found = fit(table(go.Lambert((0.3, 0.2, 0.1)), shape=(12, 12, 16)), model)
+    assert not any(name.startswith(gone) for name in found.names)
+    assert f"{gone} is held at 0: a.albedo does the same" in found.notes
+    np.testing.assert_allclose(found.values[:3], [0.3, 0.2, 0.1], rtol=0.01)
 
 
 def test_parameters_that_are_held_stay() -> None:

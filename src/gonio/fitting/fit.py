@@ -6,40 +6,33 @@ import itertools
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..catalog import notation
 from ..errors import InputError
-from ..material import BSDF, tree
-from ..materials.combined.sum import Sum
+from ..material import BSDF
 from ..measure import read
 from ..measure.tables.base import Floats, Measurement
 from ..owner import public
+from .certainty import certainty, information
 from .data import GRAZING, Data, data_of
-from .parameters import NAMES, Free, free_of, ranges, start_of, with_values
-from .solver import METRICS, Problem, Solution, covariance, solve
+from .models import modelled as modelled
+from .models import moving_of as moving_of
+from .models import moving_with_notes
+from .parameters import NAMES, Free, with_values
+from .solver import METRICS, Problem, Solution, solve
+from .starts import starts_of
 
 FEW = 6000  # values from which starts are judged
 SOME = 60_000  # from which the best start goes on
-WIDTHS = (0.03, 0.1, 0.3, 0.7)  # of lobes, tried as starts
-COLOURS = (0.5, 2.0)  # of colours without an upper end, such as indices, whose default may be a place without a slope
-STARTS = 24  # tried at most
-RANDOM = 6  # more, drawn at random
-OPEN = 4.0  # how far numbers without an upper end are drawn
 SOLVED = 8  # of them that are followed by the metric itself on a few values
 ENDS = 3  # of them that are followed to their end
 SAME = 1e-4  # relative difference of two costs from which on two ends are two
 NORMAL_95 = 1.96
 TIED = 0.98  # correlation from which two numbers are called tied
-SHORT = {
-    "ggx": "conductor(fresnel=schlick,eta=1.5,k=0)",
-    "beckmann": "conductor(fresnel=schlick,eta=1.5,k=0,ndf=beckmann)",
-}
-FIXED = {"ggx": ("k",), "beckmann": ("k",)}
-AT_LEAST = {"ggx": {"eta": 1.0}, "beckmann": {"eta": 1.0}}  # 1 / eta reflects as much
 
 
 @dataclass(frozen=True)
@@ -115,58 +108,6 @@ class Fit:
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
 
-class Model(NamedTuple):
-    """What is fitted: a material, the paths that stay as they are, and others' least values."""
-
-    material: BSDF
-    fixed: tuple[str, ...] = ()
-    least: Mapping[str, float] = {}
-
-
-def modelled(text: str, lobes: int = 1) -> Model:
-    """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=.2)".
-
-    lobes  how many of the last one are added up. "ggx" and "beckmann" are a microfacet lobe of that distribution with
-    Schlick's Fresnel term of an index without absorption, so that colour is all in eta.
-    """
-    if lobes < 1:
-        raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")
-    parts = [part.strip() for part in text.split("+")]
-    if not all(parts):
-        raise InputError(f"'{text}' is no sum of materials", "model", 'such as "lambert+ggx"')
-    parts += parts[-1:] * (lobes - 1)
-    made: list[Model] = []
-    for part in parts:
-        head, bracket, rest = part.partition("(")
-        spelled = SHORT.get(head, head)
-        if bracket:
-            own = spelled.partition("(")[2].rstrip(")")
-            spelled = f"{spelled.partition('(')[0]}({','.join(filter(None, [own, rest.removesuffix(')')]))})"
-        material = notation.named(spelled)[0]
-        given = [name.partition("=")[0] for name in rest.removesuffix(")").split(",") if "=" in name]
-        made.append(Model(material, (*FIXED.get(head, ()), *given), AT_LEAST.get(head, {})))
-    whole = made[0]
-    for other in made[1:]:
-        fixed = (*(f"a.{path}" for path in whole.fixed), *(f"b.{path}" for path in other.fixed))
-        least = {f"a.{p}": v for p, v in whole.least.items()} | {f"b.{p}": v for p, v in other.least.items()}
-        whole = Model(Sum(whole.material, other.material), fixed, least)
-    return whole
-
-
-def moving_of(
-    model: str | BSDF, lobes: int = 1, fixed: Mapping[str, object] | None = None, free: Sequence[str] = ()
-) -> tuple[BSDF, list[Free]]:
-    """A model with the values that `fixed` holds, and its parameters that move; as `fit` takes them."""
-    material, stays, least = Model(model) if isinstance(model, BSDF) else modelled(model, lobes)
-    given = dict(fixed or {})
-    if given:
-        texts = {path: value for path, value in given.items() if isinstance(value, str)}
-        others = {path: value for path, value in given.items() if path not in texts}
-        material = tree.replace(notation.changed(material, texts), others)
-    moving = free_of(material, {**given, **dict.fromkeys(stays)}, tuple(free))
-    return material, [replace(one, low=max(one.low, least.get(one.path, one.low))) for one in moving]
-
-
 @public
 def fit(
     data: str | os.PathLike[str] | Measurement | Data,
@@ -197,18 +138,18 @@ def fit(
     started = time.perf_counter()
     if metric not in METRICS:
         raise InputError(f"unknown metric '{metric}'", "metric", " | ".join(METRICS))
-    material, moving = moving_of(model, lobes, fixed, free)
+    material, moving, notes = moving_with_notes(model, lobes, fixed, free)
     cells = (
         data if isinstance(data, Data) else data_of(read(data) if not isinstance(data, Measurement) else data, grazing)
     )
     middle = Problem(material, moving, cells.some(SOME), metric)
-    best = _best(middle, _starts(material, moving), progress)
+    best = _best(middle, starts_of(material, moving), progress)
     whole = middle
     if len(cells) > SOME:
         whole = Problem(material, moving, cells, metric, middle.floor, middle.floors)
         best = solve(whole, best.numbers, steps=2)
     progress(f"all {len(cells)} values: {np.sqrt(best.cost / (3 * len(cells))):.4g}")
-    return _result(whole, best, metric, time.perf_counter() - started)
+    return _result(whole, best, metric, time.perf_counter() - started, notes)
 
 
 def _best(problem: Problem, starts: Sequence[Floats], progress: Callable[[str], None]) -> Solution:
@@ -238,81 +179,59 @@ def _with_data(problem: Problem, data: Data, metric: str) -> Problem:
     return Problem(problem.material, problem.free, data, metric, problem.floor, problem.floors)
 
 
-def _starts(material: BSDF, free: list[Free]) -> list[Floats]:
-    """Where to begin: as the material is, and at other widths of its lobes, each lobe its own, and other indices."""
-    first = start_of(material, free)
-    found = [first]
-    open_ended = np.repeat([one.kind == "spectrum" and one.high > 1e5 for one in free], [one.count for one in free])
-    firsts = [first, *(np.where(open_ended, value, first) for value in COLOURS if open_ended.any())]
-    places = np.cumsum([0, *(one.count for one in free)])
-    lobes = [int(at) for at, one in zip(places, free, strict=False) if one.kind == "alpha" or _exponent(one)]
-    for widths in itertools.combinations_with_replacement(WIDTHS, len(lobes)):
-        for begin in firsts:
-            other = begin.copy()
-            for at, width in zip(lobes, widths, strict=True):
-                one = free[int(np.searchsorted(places, at, side="right")) - 1]
-                value = width if one.kind == "alpha" else 2.0 / (width * width)  # a cosine's power of that width
-                other[at] = np.clip(value, one.low, one.high)
-            found.append(other)
-    return found[:STARTS] + _random_starts(first, free)
-
-
-def _random_starts(first: Floats, free: list[Free]) -> list[Floats]:
-    """Where to begin beside: anywhere in the ranges of the numbers, those that are open as far as `OPEN`."""
-    low, high, ratio = ranges(free)
-    high = np.where(high > 1e5, np.maximum(OPEN, 2.0 * np.abs(first)), high)
-    low = np.where(low < -1e5, -high, low)
-    rng = np.random.default_rng(23)
-    found = []
-    for _ in range(RANDOM):
-        share = rng.random(len(first))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found.append(np.where(ratio, low ** (1.0 - share) * high**share, low + share * (high - low)))
-    return found
-
-
-def _exponent(one: Free) -> bool:
-    return one.kind == "float" and one.ratio and one.high >= 1e3
-
-
-def _result(problem: Problem, best: Solution, metric: str, seconds: float) -> Fit:
+def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes: Sequence[str]) -> Fit:
     data, numbers, cost = problem.data, best.numbers, best.cost
-    matrix = covariance(problem, numbers)
-    errors = np.sqrt(np.diag(matrix))
-    told = np.isfinite(errors) & (errors > 0.0)
-    correlation = np.eye(len(numbers))
-    correlation[np.ix_(told, told)] = matrix[np.ix_(told, told)] / np.outer(errors[told], errors[told])
+    hessian, pushes = information(problem.linearized(numbers), data.row, problem.count)
+    runs = max(int(np.count_nonzero(np.bincount(data.row))), 1)
+    sure = certainty(hessian, pushes * np.sqrt(runs / max(runs - problem.count, 1)))
     names = tuple(name for one in problem.free for name in one.names)
     material = with_values(problem.material, problem.free, numbers)
     value = material.eval(data.wo, data.wi)
     relative = float(np.abs(value - data.value).mean() / max(float(np.abs(data.value).mean()), 1e-30))
-    runs = max(int(np.count_nonzero(np.bincount(data.row))), 1)
+    told = notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold)
     mean = cost / max(3 * len(data), 1)
     return Fit(
         material,
         names,
         numbers,
-        errors,
-        correlation,
+        sure.errors,
+        sure.correlation,
         metric,
         float(np.sqrt(mean)),
         relative,
         float(3 * runs * np.log(max(mean, 1e-300)) + len(numbers) * np.log(3 * runs)),
         len(data),
-        (*notes_on(problem.free, numbers, errors, correlation, names), *_notes_on_data(data)),
+        (
+            *notes,
+            *notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold),
+            *_notes_on_data(data),
+        ),
         seconds,
         data,
     )
 
 
 def notes_on(
-    free: Sequence[Free], numbers: Floats, errors: Floats, correlation: Floats, names: tuple[str, ...]
+    free: Sequence[Free],
+    numbers: Floats,
+    errors: Floats,
+    correlation: Floats,
+    names: tuple[str, ...],
+    untold: Sequence[Sequence[int]] = (),
 ) -> list[str]:
-    """What a reader must know before the values are trusted."""
+    """What a reader must know before the values are trusted.
+
+    untold  groups of numbers of which the data tell at most a combination
+    """
     notes, at = [], 0
+    for group in untold:
+        if len(group) > 1:
+            listed = ", ".join(names[k] for k in group[:-1]) + f" and {names[group[-1]]}"
+            notes.append(f"the data do not tell {listed} from each other, only a combination of them: fix one")
+    together = {k for group in untold if len(group) > 1 for k in group}
     for one in free:
         for k in range(at, at + one.count):
-            if not np.isfinite(errors[k]):
+            if not np.isfinite(errors[k]) and k not in together:
                 notes.append(f"the data do not tell {names[k]}")
             elif numbers[k] <= one.low or numbers[k] >= one.high:
                 notes.append(f"{names[k]} ends at {numbers[k]:.4g}, an end of its range")

@@ -321,29 +321,3 @@ def solve(
         if drop < tolerance and moved < 1e-4:
             break
     return Solution(numbers, cost, taken)
-
-
-def covariance(problem: Problem, numbers: Floats) -> Floats:
-    """Covariance of the numbers, (K, K): the sandwich over runs of neighbours, which holds for errors of any size that
-    are alike within a run (Liang1986). A number that the data do not move at all has an infinite variance."""
-    count = problem.count
-    rows = problem.data.row
-    runs = int(rows.max()) + 1 if len(rows) else 1
-    hessian, pushes = np.zeros((count, count)), np.zeros((runs, count))
-    for residual, jacobian, which in problem.linearized(numbers):
-        for column, number in enumerate(which):
-            pushes[:, number] += np.bincount(rows, weights=residual * jacobian[:, column], minlength=runs)
-        for start in range(0, len(residual), BLOCK):
-            j = jacobian[start : start + BLOCK]
-            hessian[np.ix_(which, which)] += j.T @ j
-    scale = np.sqrt(np.diag(hessian))
-    told = scale > 0.0
-    found = np.full((count, count), 0.0)
-    found[np.diag_indices(count)] = np.inf
-    if told.any():
-        s = scale[told]
-        inverse = np.linalg.pinv(hessian[np.ix_(told, told)] / np.outer(s, s), rcond=1e-9) / np.outer(s, s)
-        used = int(np.count_nonzero(np.bincount(rows, minlength=runs)))
-        spread = pushes[:, told].T @ pushes[:, told] * (used / max(used - count, 1))
-        found[np.ix_(told, told)] = inverse @ spread @ inverse
-    return found

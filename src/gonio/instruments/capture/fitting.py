@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...fitting import fit as tables
+from ...fitting.certainty import groups_of, null_space
 from ...fitting.data import Data
 from ...fitting.fit import Fit
 from ...fitting.parameters import CHANNELS, Free, ranges, start_of, with_drjit, with_values
@@ -472,7 +473,9 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
     covariance = inverse @ (spread + prior) @ inverse
     # where few tiles tell a number, their residuals are small for that very reason: no smaller than by the noise alone
     variance = np.maximum(np.diag(covariance), np.diag(inverse))
-    errors = np.sqrt(np.where(np.diag(hessian + prior) > 0.0, variance, np.inf))
+    untold = groups_of(null_space(hessian + prior))
+    variance[[number for group in untold for number in group]] = np.inf
+    errors = np.sqrt(variance)
     own = slice(0, problem.own)
     correlation = _correlation(covariance[own, own])
     material = with_values(problem.material, problem.moving, numbers[own])
@@ -493,7 +496,7 @@ def _result(problem: Problem, numbers: Floats, started: float) -> Fitted:
         float(np.abs(off).sum() / max(float(size.sum()), 1e-30)),
         float(3 * runs * np.log(max(mean, 1e-300)) + problem.own * np.log(3 * runs)),
         len(off),
-        tuple(tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names)),
+        tuple(tables.notes_on(problem.moving, numbers[own], errors[own], _apart(problem, hessian), names, untold)),
         time.perf_counter() - started,
         _data(problem.scene, _some(Chosen(tuple(problem.parts), {}), FEW)),
     )
