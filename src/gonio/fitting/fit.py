@@ -203,7 +203,7 @@ def _result(problem: Problem, best: Solution, metric: str, seconds: float, notes
         len(data),
         (
             *notes,
-            *notes_on(problem.free, numbers, sure.errors, sure.correlation, names, sure.untold),
+            *told,
             *_notes_on_data(data),
         ),
         seconds,

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument
+from typer import Argument, Option
 
 from ..options import Exposure, Json
 from ..output import print_warnings
@@ -18,6 +18,10 @@ def convert(
     source: Annotated[str, Argument(metavar="IN", help="A picture, measured values, or a material.")],
     output: Annotated[Path, Argument(metavar="OUT", help="The file to write, in the format of its suffix.")],
     exposure: Exposure = "0",
+    phi: Annotated[
+        int | None,
+        Option("--phi", metavar="180|360", help="Cells of phi_d in a .binary; 360 keep what is not reciprocal."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a picture, a measured material, or another program's material in another format.
@@ -32,6 +36,7 @@ def convert(
       gonio convert ball.exr ball.png --exposure auto
       gonio convert ball.exr ball.hdr
       gonio convert gold.binary gold.bsdf
+      gonio convert paint.bsdf paint.binary --phi 360
       gonio convert paint.mtlx paint.json
     """
     from ...catalog import documents, operands
@@ -49,12 +54,16 @@ def convert(
     if kind is Kind.TABLE:
         from ...measure import compare
 
-        made = compare.convert(source, output)
+        made = compare.convert(source, output, phi)
         if as_json:
             print(json.dumps(made.as_dict()))
             return
         how = "resampled" if made.resampled else "the same values"
         print(f"{made.path}  {made.size / 1e6:.2f} MB, {made.kind}, {how}: {100.0 * made.error:.2g} % off on average")
+        if made.reciprocity:
+            lost, coarse = 100.0 * made.reciprocity, 100.0 * made.resolution
+            hint = "; --phi 360 keeps it" if output.suffix == ".binary" else ""
+            print(f"  of it {coarse:.2g} % by resolution, {lost:.2g} % since the table is not reciprocal{hint}")
         return
     from ...pictures import exposures, images
 

@@ -17,6 +17,8 @@ from ..warp import named
 from .base import Floats, Measurement, finite, in_rgb, of_channels, padded
 from .guided import Guided
 
+GRAZING = 0.03  # cosine of light under which a value f cos theta_i tells nothing of f: 1.7 degrees from the horizon
+
 
 class HalfDifference(Guided, Measurement):
     """f over (theta_h, theta_d, phi_d) in cells, theta_h by its square root (Rusinkiewicz1998, Matusik2003).
@@ -180,15 +182,22 @@ def sampled(
 ) -> HalfDifference:
     """A table of any f cos theta_i (wo, wi) -> (N, 3), found at the middles of the cells.
 
-    A cell whose middle lies below the surface is invalid: -1. Half a turn of phi_d holds one value for a pair and its
-    exchange: the mean of both.
+    A cell whose middle lies below the surface is invalid: -1. Half a turn of phi_d holds one value f for a pair and its
+    exchange, whose values are f cos theta_i and f cos theta_o where reciprocity holds: least squares of both give
+
+        f = (v cos theta_i + v' cos theta_o) / (cos^2 theta_i + cos^2 theta_o).
+
+    A mean of the quotients would divide what a measurement is off by at grazing light by a cosine of about 0.
     """
     wo, wi = centres(shape, turn)
     lowest = np.minimum(wo[:, 2], wi[:, 2])
     values = np.full((len(wo), 3), -1.0)
     lit = lowest > 1e-9
-    found = value(wo[lit], wi[lit]) / wi[lit, 2:]
-    if turn < 4.0:
-        found = 0.5 * (found + value(wi[lit], wo[lit]) / wo[lit, 2:])
-    values[lit] = np.maximum(found, 0.0)
+    cosine_o, cosine_i = wo[lit, 2:], wi[lit, 2:]
+    there = value(wo[lit], wi[lit])
+    both = there * cosine_i + value(wi[lit], wo[lit]) * cosine_o
+    f = both / (cosine_i**2 + cosine_o**2)
+    if turn > 4.0:  # each has its own value, but where its light grazes
+        f = np.where(cosine_i > GRAZING, there / cosine_i, f)
+    values[lit] = np.maximum(f, 0.0)
     return HalfDifference(values.reshape(*shape, 3), turn, **about)
