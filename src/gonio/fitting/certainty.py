@@ -28,14 +28,16 @@ def null_space(hessian: Floats) -> Floats:
 
 def groups_of(projector: Floats) -> list[list[int]]:
     """Numbers that no data tell, those together of which a combination is told; from the projector of `null_space`."""
-    beside = np.abs(projector) > PART
-    left, groups = set(np.flatnonzero(np.diag(projector) > PART)), []
+    tied = np.abs(projector) > PART
+    left = set(np.flatnonzero(np.diag(projector) > PART).tolist())
+    groups: list[list[int]] = []
     while left:
-        group, more = set(), {min(left)}
+        group: set[int] = set()
+        more = {min(left)}
         while more:
             group |= more
-            more = {int(j) for i in more for j in np.flatnonzero(beside[i])} & left - group
-        groups.append(sorted(map(int, group)))
+            more = {j for i in more for j in np.flatnonzero(tied[i]).tolist()} & left - group
+        groups.append(sorted(group))
         left -= group
     return groups
 

@@ -37,10 +37,10 @@ class Model(NamedTuple):
 
 
 def modelled(text: str, lobes: int = 1) -> Model:
-    """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=.2)".
+    """A model by name: "conductor", "lambert+ggx", "oren-nayar(sigma=0.2)".
 
     lobes  how many of the last one are added up. "ggx" and "beckmann" are a microfacet lobe of that distribution with
-    Schlick's Fresnel term of an index without absorption, so that colour is all in eta.
+    Schlick's Fresnel term of an index without absorption, so that color is all in eta.
     """
     if lobes < 1:
         raise InputError(f"{lobes} lobes given, at least 1 expected", "lobes")

@@ -1,6 +1,6 @@
 """Nonlinear least squares by Levenberg and Marquardt, with derivatives from Dr.Jit.
 
-One kernel evaluates the residuals of all data and their derivatives, in forward mode; of a colour whose channels do not
+One kernel evaluates the residuals of all data and their derivatives, in forward mode; of a color whose channels do not
 mix in `eval`, one derivative serves all three. The normal equations are then sums over rows, which BLAS makes. A pass
 over 1.46 million cells and six numbers moves some 70 MB, and is bound by that and by exp, log and sqrt.
 """
@@ -122,7 +122,7 @@ class Problem:
         self.columns = self._of_parameters()
 
     def _of_parameters(self) -> list[list[int]]:
-        """The numbers that one derivative is taken along: each alone, or the three of a colour together."""
+        """The numbers that one derivative is taken along: each alone, or the three of a color together."""
         dr, types = backend.drjit(), backend.types("float32")
         groups: list[list[int]] = []
         at = 0
@@ -137,7 +137,7 @@ class Problem:
                 seen = with_drjit(self.material, self.free, values, types).eval(wo, wi)
                 dr.forward_from(values[together[0]])
                 others = np.abs([backend.to_numpy(dr.grad(seen[c]), len(probe)) for c in (1, 2)])
-                if others.max() > 0.0:  # a colour that acts as a whole, by its mean
+                if others.max() > 0.0:  # a color that acts as a whole, by its mean
                     groups += [[column] for column in together]
                     continue
             groups.append(together)
@@ -224,7 +224,7 @@ def floors_of(value: Floats) -> Floats:
 
 
 def columns_of(material: BSDF, free: list[Free]) -> list[list[int]]:
-    """Which numbers of a material one derivative is taken along: each alone, or a colour's three where its channels do
+    """Which numbers of a material one derivative is taken along: each alone, or a color's three where its channels do
     not mix; found by asking a few directions."""
     w = np.random.default_rng(3).normal(size=(2, 64, CHANNELS))
     w[..., 2] = np.abs(w[..., 2]) + 0.1

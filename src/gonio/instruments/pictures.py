@@ -225,7 +225,7 @@ class Problem:
         self.mi, self.scene, self.targets, self.spp, self.seed = mi, built.scene, targets, spp, seed
         self.depth = depth
         self.wanted = wanted.astype(np.float64)
-        # a mean of neighbours: a pixel's own noise must not weigh it
+        # a mean of neighbors: a pixel's own noise must not weigh it
         level = ndimage.uniform_filter(np.abs(self.wanted), (3, 3, 1))
         lit = level[level > 0.0]
         self.weight = 1.0 / (level + DARK * float(np.median(lit)))

@@ -71,7 +71,7 @@ class Pixels:
     kind    "ball" or "flat"
     place   (N, 2), pixel coordinates of their middles
     lamp    (N,), which lamp
-    tile    (N,), which run of neighbours
+    tile    (N,), which run of neighbors
     value   (N, 3), radiance in the camera's unit
     step    (N, 3), its standard deviation by quantisation, and in a series of exposures by photons and reading
     photon  (N, 3), derivative of the square of `step` along the radiance
@@ -112,7 +112,7 @@ class Pixels:
 def seen(scene: Scene, kind: Kind, ray: Array, lamp: Array, ball: tuple[Array, Array] | None = None) -> Seen:
     """What rays see of a sample under lamps.
 
-    ball  its centre and radius, where they are not the scene's
+    ball  its center and radius, where they are not the scene's
     """
     types = backend.types_like(type(ray))
     if kind == "ball":

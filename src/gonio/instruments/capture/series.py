@@ -204,7 +204,7 @@ def _spread(
 
 
 def _noise(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDArray[np.bool_]) -> Noise:
-    """Read noise, gain and relative noise from the differences of neighbouring exposures."""
+    """Read noise, gain and relative noise from the differences of neighboring exposures."""
     found = np.zeros((3, 3))
     for channel in range(3):
         bins = [
@@ -299,8 +299,10 @@ def _times(exposures: Sequence[Exposed], times: Floats, light: Floats, used: NDA
     found = np.array(logs)
     if np.ptp(found) > np.log1p(WRONG) + SIGMAS * np.sqrt(unsure):
         worst = int(np.argmax(np.abs(found - np.median(found))))
-        seconds = exposures[worst].seconds * float(np.exp(found[worst] - np.median(np.delete(found, worst))))
-        what = f"{exposures[worst].seconds:g} s are stated, its pixels and those of the others tell {seconds:.3g} s"
+        told_seconds = exposures[worst].seconds * float(np.exp(found[worst] - np.median(np.delete(found, worst))))
+        what = (
+            f"{exposures[worst].seconds:g} s are stated, its pixels and those of the others tell {told_seconds:.3g} s"
+        )
         hint = 'correct "seconds" in the calibration file, or leave this exposure out; is the response right?'
         raise InputError(what, exposures[worst].file, hint)
     return np.ones(len(found)) if sure else np.exp(found - found.mean())
