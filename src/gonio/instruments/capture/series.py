@@ -6,7 +6,8 @@ A camera that is linear stores y_i = L t_i + noise of light L exposed for t_i se
 
 (the EMVA standard 1288, and a relative part: what grows with the signal, such as a flickering lamp; q_i, which is
 known, is what the file's steps add). Of all unbiased means of x_i = y_i / t_i the one with the least variance weighs by
-1 / v_i, v_i = Var(y_i) / t_i^2 (Gauss and Markov), and its variance is 1 / sum(1 / v_i).
+1 / v_i, v_i = Var(y_i) / t_i^2 (Gauss and Markov; Debevec1997 weighs by the value alone), and its variance is
+1 / sum(1 / v_i).
 
 v_i depends on L. Taken at the exposure's own value, a value that is low by chance counts more, and the mean is biased
 by about -gain / t. Taken at the merged value it is not: at these weights the merged value is uncorrelated with
